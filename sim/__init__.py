@@ -1,1 +1,1 @@
-"""The loop: world, servo, devices, users, recorder, viewer."""
+"""The simulation: servo loop, world, devices, users, figure control, recorder, viewer."""

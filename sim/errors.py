@@ -1,5 +1,5 @@
-"""What goes wrong with a world, a device, a run or a recording."""
+"""The base error of this package: faults of a world, a device, a run or a recording."""
 
 
 class SimError(ValueError):
-    """Base of the errors of this package: says what is wrong, where, and what would be right."""
+    """Base class of this package's errors: the message says what is wrong, where, and what was expected."""

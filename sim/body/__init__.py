@@ -1,1 +1,1 @@
-"""What follows the reference: the physical figure, or a robot arm."""
+"""Bodies that track the reference: the physical figure, or a robot arm, and their control."""

@@ -1,11 +1,11 @@
 r"""A clip as a smooth motion: poses, velocities and accelerations at any time, lap after lap.
 
-Poses are splined component by component, s(t) a C² cubic spline through the frames; a rotation is q = s/‖s‖, with
+Each component of the pose is a C² cubic spline s(t) through the frames; a rotation is q = s/‖s‖, with
 
 .. math:: \omega = \frac{2\,\mathrm{vec}(\bar s \dot s)}{\|s\|^2}, \qquad
           \dot\omega = \frac{2\,\mathrm{vec}(\bar s \ddot s)}{\|s\|^2} - \frac{2\,(s \cdot \dot s)}{\|s\|^2}\,\omega
 
-in its own frame, as in MuJoCo's qvel.
+in the body's own frame, as in MuJoCo's qvel.
 """
 
 from typing import NamedTuple
@@ -17,8 +17,8 @@ from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.clip import Clip
 
-_MARGIN = 8  # frames of the neighbouring laps that shape the spline at the ends
-_SEAM = 1e-3  # [rad], [m]: how nearly a clip must close to be repeated
+_MARGIN = 8  # frames of the neighbouring laps that the spline is fitted to beyond both ends
+_SEAM = 1e-3  # [rad], [m]: largest gap between last and first frame of a clip that is repeated
 
 
 class ClipMotion(NamedTuple):
@@ -41,7 +41,7 @@ class ClipMotion(NamedTuple):
 
 
 def clip_motion(clip: Clip, times: Array) -> ClipMotion:
-    """Sample a clip; one that closes goes on lap after lap, travelling as it does, another one holds its last pose.
+    """Sample a clip. A closed clip is repeated, each lap displaced by the clip's travel; another holds its last pose.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def _relative(q: Array, r: Array) -> Array:
 
 
 def _frames(clip: Clip, end: float) -> tuple[Array, int]:
-    """Frames to beyond a time, and which of them is at time 0."""
+    """Frames from before time 0 to beyond `end` [s], and the index of the frame at time 0."""
     wanted = int(np.ceil(end * clip.fps)) + _MARGIN + 1
     if not clip.closes(_SEAM):
         held = np.repeat(clip.poses[-1:], max(wanted - clip.n_frames, 1), axis=0)
@@ -91,7 +91,7 @@ def _frames(clip: Clip, end: float) -> tuple[Array, int]:
 
 
 def _inverse_lap(clip: Clip) -> Array:
-    """The lap before the first: what the lap's displacement moves onto it."""
+    """The lap before the first: the lap that the clip's displacement moves onto the first."""
     there = clip.displacement
     c, s = np.cos(there.yaw), np.sin(there.yaw)
     back = type(there)(-c * there.x - s * there.y, s * there.x - c * there.y, -there.yaw)

@@ -1,17 +1,17 @@
-r"""Contact forces within friction, by regularised non-negative least squares whose dual has only six unknowns.
+r"""Contact forces within friction cones, by regularised non-negative least squares whose dual has only six unknowns.
 
-A contact force is a non-negative combination of the edges of its linearised friction cone, so a root wrench b that is
-to come from the ground asks for
+A contact force is a non-negative combination of the edges of its linearised friction cone. The contact forces x that
+come nearest to a root wrench b solve
 
 .. math:: \min_{x \ge 0}\ \tfrac12\|b - A x\|^2 + \tfrac12 \sum_j x_j^2 / s_j ,
 
-with a column of A for each edge and its *share* s_j ≥ 0: points above the floor get a small one and lose their load
-gradually, not at once. The optimality conditions are x_j = s_j max(0, a_jᵀ y) with the residual y = b − A x, and leave
+with a column a_j of A for each edge and its *share* s_j ≥ 0: a point above the floor gets a small share, so that it is
+unloaded gradually. The optimality conditions are x_j = s_j max(0, a_jᵀ y) with the residual y = b − A x; they leave
 
 .. math:: y + \sum_j s_j \max(0, a_j^T y)\, a_j = b ,
 
-the stationarity of a strictly convex, piecewise quadratic function of y ∈ R⁶. Newton's method with exact Hessians ends
-in a handful of steps however many edges there are, and y itself is what the ground could not give.
+the stationarity condition of a strictly convex, piecewise quadratic function of y ∈ R⁶. Newton's method with exact
+Hessians ends in a handful of steps however many edges there are, and y is the wrench that the ground cannot give.
 """
 
 import numpy as np
@@ -21,14 +21,14 @@ from controllers.state import Array
 from controllers.work_array import work_array
 from sim.body.stance import factor, substitute
 
-N_EDGES = 4  # of a linearised friction cone
+N_EDGES = 4  # edges of a linearised friction cone
 _STEPS = 40
 _TOLERANCE = 1e-10
 
 
 @njit
 def cone_edges(point: Array, friction: float, edges: Array) -> None:
-    """Wrenches about the origin of unit vertical force along the edges of a cone of friction at a point.
+    """Wrenches about the origin of the four edges of a friction cone at a point, each of unit vertical force.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
     Returns
     -------
     int
-        Newton steps taken.
+        Newton steps taken, at most `_STEPS`.
     """
     n = share.size
     H, step, gradient, trial = work_array((6, 6)), work_array(6), work_array(6), work_array(6)

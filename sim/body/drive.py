@@ -1,6 +1,6 @@
-"""What follows the reference: a figure or a robot arm in the physics, a figure that is only shown, or nothing.
+"""Dispatch by body type: a figure or a robot arm in the physics, a figure that is only shown, or no body.
 
-The unit that sets the torques is chosen by the body's type, and what of the reference is updated too.
+The body's type selects the compilation unit that sets the torques, and whether the reference is updated at all.
 """
 
 from collections.abc import Callable
@@ -28,12 +28,12 @@ _DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotStat
 
 
 def drive_unit(body: FigureState | RobotState) -> Unit:
-    """The unit that sets a body's torques for the reference of a control tick: pose, velocity, acceleration."""
+    """The unit that sets a body's torques for the reference pose, velocity and acceleration of a control tick."""
     return Unit.of(_DRIVES[type(body)], types.CPointer(types.Tuple((typeof(body), VECTOR, VECTOR, VECTOR))))
 
 
 def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, ...]:
-    """Units that `follow` calls by their addresses, in their order: the reference's, then the body's; or fewer."""
+    """Units that `follow` calls by address: the reference's, then the body's; only those that the body type needs."""
     if isinstance(body, NoFigure):
         return ()
     driven = (drive_unit(body),) if isinstance(body, FigureState | RobotState) else ()
@@ -41,7 +41,7 @@ def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, .
 
 
 def follow_addresses(body: BodyState, reference: CompiledReference) -> IntArray:
-    """Their addresses, 0 for what is not needed, shape (2,); compiles what is not kept."""
+    """Addresses of `follow_units`, 0 for one that is not needed, shape (2,); compiles those not in the cache."""
     addresses = np.zeros(2, dtype=np.int64)
     for i, unit in enumerate(follow_units(body, reference)):
         addresses[i] = unit.address()
@@ -50,15 +50,18 @@ def follow_addresses(body: BodyState, reference: CompiledReference) -> IntArray:
 
 @njit(inline="always")
 def lend_followed(body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> tuple[Any, Any]:
-    """What `follow` takes, for as long as the caller runs: of the map's argument (7,) and the field's trace."""
+    """The arguments of `follow`'s two kernels, lent for as long as the caller runs.
+
+    `argument` (7,) is the stylus pose at which the map is evaluated, `trace` the trace of the field.
+    """
     asked = lend((reference, argument, trace))
     return asked, lend((body, reference.pose, reference.velocity, reference.acceleration))
 
 
 def follow(units: IntArray, body: BodyState, followed: tuple[Any, Any]) -> None:
-    """Update the reference, and what of a body follows it.
+    """Update the reference, and set the torques of the body that tracks it.
 
-    `units` are `follow_addresses`, `followed` is of `lend_followed`. For compiled code only.
+    `units` are `follow_addresses`, `followed` is the result of `lend_followed`. For compiled code only.
     """
     raise NotImplementedError("compiled code only")
 
@@ -85,7 +88,7 @@ _FOLLOWS: dict[type, Any] = {
 }  # fmt: skip
 
 
-# Inlined, as a call would hand over all the arrays of body and reference, number by number.
+# Inlined, since a call would pass every pointer, shape and stride of the body's and the reference's arrays.
 @overload(follow, strict=False, inline="always")
 def _follow(units: Any, body: Any, followed: Any) -> Any:
     return _FOLLOWS[body.instance_class]

@@ -1,15 +1,15 @@
-r"""A figure that falls lies where it fell for a second, and is then set back onto the animation.
+r"""Fall detection and recovery: a fallen figure lies for a second and is then set back onto the animation.
 
-It has fallen when trunk, head or legs meet the floor where the reference has them well above it, or when it touches
-the floor half a metre from the reference. From then on its motors are off: it is caught by its body. When it has lain
-for `LIES`, what it follows for `RISES` goes over from the pose (p₀, R₀) in which it lay to the reference (p, R): its
-root goes from one place to the other, and each rotation is the reference's, from which it still differs less and less,
+The figure has fallen when trunk, head or legs touch the floor while the reference has them well above it, or when it
+touches the floor with its root half a metre from the reference's. Its motors are then off. When it has lain for
+`LIES`, it tracks for `RISES` an interpolation from the pose (p₀, R₀) in which it lay to the reference (p, R), of the
+root's position p and of every rotation R, whose offset from the reference decays:
 
 .. math:: p(u) = p_0 + S(u)\,(p - p_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad
           R(u) = R\,\exp((1 - S(u))\,\log(R^T R_0)|_{u=0}) , \qquad 0 \le u \le 1 ,
 
-with the smooth step S and the height h by which its feet clear the floor meanwhile. What carries it then is a wrench
-at the root without bounds, recorded as the residual, and no measure of the figure is taken of it.
+with the smooth step S and an additional height h for foot clearance. Meanwhile an unbounded wrench at the root carries
+the figure; it is recorded as the residual, and this time is left out of all measures of the figure.
 """
 
 from typing import NamedTuple
@@ -27,37 +27,37 @@ from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 IntArray = npt.NDArray[np.int64]
 
 UP, DOWN, SET_BACK = 0.0, 1.0, 2.0
-FALLEN = 0.5  # [m] of the root from the reference's, beyond which a figure will not come back
-LIES, RISES = 1.0, 1.0  # [s] on the floor, and until it is back on the animation
-_TOUCHES = 2e-3  # [m] over the floor within which a body bears on it: MuJoCo's contacts are as soft
-_HELD_ABOVE = 0.05  # [m] over the floor, of a body of the reference that is not to touch it; a standing shank's 0.058
-_CLEARANCE = 0.25  # [m] h at the default stature; feet go 0.15 m below the straight way from lying to standing
-_MODE, _SINCE, _FALLS = 0, 1, 2
-_ARMS = ("clavicle", "arm", "forearm", "hand")  # whoever puts a hand out has not fallen
+FALLEN = 0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
+LIES, RISES = 1.0, 1.0  # [s] of lying on the floor, and of the way back onto the animation
+_TOUCHES = 2e-3  # [m] height below which a body counts as in contact: MuJoCo's contacts are about as soft
+_HELD_ABOVE = 0.05  # [m] height from which a body of the reference is clear of the floor; a standing shank is at 0.058
+_CLEARANCE = 0.25  # [m] h at the default stature; the interpolation alone takes the feet 0.15 m below the floor
+_MODE, _SINCE, _FALLS = 0, 1, 2  # places in `FallState.state`
+_ARMS = ("clavicle", "arm", "forearm", "hand")  # left out: a figure that props itself on a hand has not fallen
 _SPHERE, _CAPSULE = int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE)
 
 
 class FallState(NamedTuple):
-    """What is looked at to see whether the figure has fallen, and how it is set back.
+    """State of fall detection and recovery. The *twin* is the figure alone, in the reference pose.
 
     Attributes
     ----------
     period : float
-        Between two updates of the control [s].
+        Period of the control [s].
     clearance : float
         h [m].
     geoms, twin_geoms : IntArray
-        Of trunk, head and legs, in the world and in the figure alone, shape (n,).
+        Geoms of trunk, head and legs, in the world and in the twin, shape (n,).
     kinds, sizes : IntArray, Array
         Their types, shape (n,), and sizes [m], shape (n, 3).
     pos, mat, twin_pos, twin_mat : Array
-        Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the figure alone.
+        Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the twin.
     state : Array
-        `UP`, `DOWN` or `SET_BACK`; how long it has lain or been set back [s]; number of falls; shape (3,).
+        `UP`, `DOWN` or `SET_BACK`; time that it has lain or been set back [s]; number of falls; shape (3,).
     lying, way : Array
-        p₀ (3,), and the pose in which it lay less the reference's then, in tangent coordinates (57).
+        p₀ (3,), and the tangent from the reference pose to the pose in which it lay, at that time (57,).
     target, before, velocity, still : Array
-        The pose that is followed and the one a period ago (75), its velocity, and no acceleration (57).
+        The pose to be tracked and that of one period ago (75,), its velocity, and a zero acceleration (57,).
     """
 
     period: float
@@ -81,7 +81,7 @@ class FallState(NamedTuple):
 
 @njit
 def _lowest(kind: int, size: Array, pos: Array, mat: Array) -> float:
-    """Least height of a sphere, capsule or ellipsoid: z − r, z − r − ℓ|d_z|, z − ‖s d‖ with d the vertical in it."""
+    """Lowest height of a sphere z − r, capsule z − r − ℓ|d_z| or ellipsoid z − ‖s d‖; d: the vertical in its frame."""
     if kind == _SPHERE:
         return pos[2] - size[0]
     if kind == _CAPSULE:
@@ -91,16 +91,16 @@ def _lowest(kind: int, size: Array, pos: Array, mat: Array) -> float:
 
 @njit
 def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
-    """Whether the figure is up, lies or is being set back in this period.
+    """Update and return the mode of this period: `UP`, `DOWN` or `SET_BACK`.
 
     Parameters
     ----------
     model : int
-        Address of the figure alone.
+        Address of the twin's model.
     fall : FallState
-        Updated; the figure alone is in the reference pose.
+        Updated; the twin must be in the reference pose.
     pose, q_r : Array
-        Of the figure and of the reference, shape (75,).
+        Pose of the figure and of the reference, shape (75,).
     sole : float
         Height of the figure's lowest contact point [m].
     """
@@ -135,9 +135,9 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
 
 @njit
 def follow_back(model: int, fall: FallState, q_r: Array) -> None:
-    """Pose and velocity that a figure follows which is set back, into `target` and `velocity`.
+    """Write the pose and velocity that a figure tracks while it is set back to `target` and `velocity`.
 
-    `model` is the address of the figure alone.
+    `model` is the address of the twin's model.
     """
     u = fall.state[_SINCE] / RISES
     share = smooth_step(u)
@@ -154,7 +154,7 @@ def fall_state(
     model: mujoco.MjModel, data: mujoco.MjData, twin: mujoco.MjModel, twin_data: mujoco.MjData, prefix: str,
     period: float, stature: float,
 ) -> FallState:  # fmt: skip
-    """The state of a figure that stands; arguments as of `sim.body.figure.Figure`, whose geoms the twin has too."""
+    """The state of a figure that has not fallen; for the arguments see `sim.body.figure.Figure`."""
     own = [
         geom
         for geom in range(twin.ngeom)

@@ -1,4 +1,4 @@
-"""The accelerations that bring the figure to its reference: feedforward, and critically damped feedback."""
+"""The wanted acceleration of the figure: feedforward of the reference, and critically damped feedback."""
 
 import numpy as np
 from numba import njit
@@ -8,7 +8,7 @@ from sim.body.figure_state import Array, FigureState
 
 @njit
 def rotation_error(q: Array, q_r: Array, error: Array) -> None:
-    """Rotation vector of q⁻¹ q_r, in the frame of q; unit quaternions wxyz, shape (4,), result (3,) [rad]."""
+    """Write the rotation vector of q⁻¹ q_r, in the frame of q, to `error` (3,) [rad]; unit quaternions wxyz (4,)."""
     w = q[0] * q_r[0] + q[1] * q_r[1] + q[2] * q_r[2] + q[3] * q_r[3]
     x = q[0] * q_r[1] - q[1] * q_r[0] - q[2] * q_r[3] + q[3] * q_r[2]
     y = q[0] * q_r[2] - q[2] * q_r[0] - q[3] * q_r[1] + q[1] * q_r[3]
@@ -22,7 +22,7 @@ def rotation_error(q: Array, q_r: Array, error: Array) -> None:
 
 @njit
 def turned(rotation: Array, vector: Array, out: Array) -> None:
-    """Turn a vector by a rotation vector, out = exp(rotation) vector (Rodrigues), all of shape (3,)."""
+    """Rotate a vector by a rotation vector, out = exp(rotation) vector (Rodrigues), all of shape (3,)."""
     angle = np.sqrt(rotation[0] ** 2 + rotation[1] ** 2 + rotation[2] ** 2)
     a = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
     b = 0.5 if angle < 1e-4 else (1.0 - np.cos(angle)) / angle**2
@@ -36,7 +36,7 @@ def turned(rotation: Array, vector: Array, out: Array) -> None:
 
 @njit
 def shorten(vector: Array, longest: float) -> bool:
-    """Scale a vector of shape (3,) down to a length, in place; returns whether it was longer."""
+    """Scale a vector of shape (3,) down to at most a length, in place; returns whether it was longer."""
     length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if length > longest:
         vector *= longest / length
@@ -45,12 +45,15 @@ def shorten(vector: Array, longest: float) -> bool:
 
 @njit(forceinline=True)
 def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    """a* = a_r + 2ω (v_r − v) + ω² (q_r ⊖ q) into `s.acceleration`; a rotating joint's a_r and v_r turn with its error.
+    """Write a* = a_r + 2ω (v_r − v) + ω² (q_r ⊖ q) to `s.acceleration`.
+
+    Angular v_r and a_r are rotated by the orientation error from the reference's frame to that of the joint. Errors
+    and accelerations are saturated by the gains.
 
     Parameters
     ----------
     s : FigureState
-        Reads the figure's state and gains.
+        State and gains are read.
     q_r, v_r, a_r : Array
         Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
     """

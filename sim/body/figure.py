@@ -1,22 +1,21 @@
-r"""The physical figure: joint torques and ground contact that follow a reference pose, and as little else as possible.
+r"""The physical figure: it tracks a reference by joint torques and ground contact, with a bounded residual wrench.
 
-Whole-body inverse dynamics at each control tick (`sim.body.whole_body`). With the reference pose, velocity and
+Whole-body inverse dynamics at each control tick (`sim.body.whole_body`). For the reference pose, velocity and
 acceleration (q_r, v_r, a_r) the wanted acceleration of all 57 degrees of freedom is
 
 .. math:: a^* = a_r + 2\omega\,(v_r - v) + \omega^2\,(q_r \ominus q) ,
 
-amended in the legs so that loaded feet rest (`sim.body.stance`) and feet in flight land where the reference's do
-(`sim.body.foot_placement`). Nothing but the ground may push the root, so its six
-rows of M a + c = S^T τ + J^T f + w are a demand on the contact forces,
+amended in the legs so that feet in stance rest (`sim.body.stance`) and feet in flight land where the reference's do
+(`sim.body.foot_placement`). The root has no motors, so its six rows of M a + c = S^T τ + J^T f + w are a demand on the
+contact forces,
 
 .. math:: (M a^* + c)_r = J_r^T f + w ,
 
-met by f within the friction cones of the points that touch (`sim.body.contact_forces`). The residual wrench w is what
-is
-left, bounded, in proportion to the support, and zero while the reference flies or nothing touches: then the root falls
-as it must. The torques are the other 51 rows. A motor that would need more than its limit gives way: its joint's
-acceleration becomes the one that the limit allows, and the plan is made again; what the saturated joints of a standing
-leg cannot give is residual too. No spring holds the root. A figure that falls lies, and is set back (`sim.body.falls`).
+met by f within the friction cones of the points in contact (`sim.body.contact_forces`). The residual wrench w is the
+rest, bounded in proportion to the support, and zero while the reference flies or nothing touches the floor: then the
+root falls freely. The torques follow from the other 51 rows. Where a motor would exceed its limit, its joint's
+acceleration is reduced to what the limit allows and the plan is made again; torque that saturated joints of a standing
+leg lack becomes residual too. No spring holds the root. A figure that falls is set back (`sim.body.falls`).
 """
 
 from dataclasses import dataclass, field
@@ -49,7 +48,7 @@ from sim.errors import SimError
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
-_RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
+_RELIED_ON = 0.9  # share of the coefficient of friction that contact forces are planned with
 _N_MOTORS = N_TANGENT - 6
 _MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")
 
@@ -68,18 +67,19 @@ class Figure:
     model, data
         The compiled world and its state; kept alive here, since the kernel holds their addresses.
     twin
-        The figure alone, of the same stature and mass (`models.humanoid.skeleton.figure_model`).
+        Model of the figure alone, of the same stature and mass (`models.humanoid.skeleton.figure_model`), on which the
+        reference pose is evaluated.
     prefix : str
-        Of the figure's names in the world.
+        Prefix of the figure's names in the world.
     gains : FigureGains
         Feedback and bounds.
     period : float
-        Between two updates of the control [s].
+        Period of the control [s].
 
     Raises
     ------
     SimError
-        If the world holds no such figure, or a gain is no positive finite number; some may be 0.
+        If the world has no figure of that prefix, or a gain is not finite and positive (those of `_MAY_BE_ZERO`: ≥ 0).
     """
 
     model: mujoco.MjModel
@@ -100,7 +100,7 @@ class Figure:
         object.__setattr__(self, "state", self._state())
 
     def update(self, q_r: Array, v_r: Array, a_r: Array) -> None:
-        """Set torques and residual for a reference, once; loops call the kernel `figure_torque` instead.
+        """Set torques and residual for a reference, once, from Python; the servo calls `figure_torque` directly.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Figure:
 
     @cached_property
     def _kernel(self) -> int:
-        return drive_unit(self.state).address()  # of the same unit as in the servo's loop
+        return drive_unit(self.state).address()  # the same unit as in the servo's loop
 
     def _state(self) -> FigureState:
         m, d, twin = self.model, self.data, self.twin

@@ -1,4 +1,4 @@
-"""What the physical figure's control works on: its gains, and views of the world with scratch memory beside them."""
+"""Gains and state of the physical figure's control: views of the world's arrays, and scratch memory."""
 
 from typing import NamedTuple
 
@@ -13,47 +13,49 @@ IntArray = npt.NDArray[np.int64]
 N_FOOT = 4  # contact points of a foot
 
 REPORT_SUPPORT, REPORT_SATURATED, REPORT_RESIDUAL, REPORT_FLIES, REPORT_DOWN, REPORT_SIZE = 0, 1, 2, 8, 9, 10
-"""Places in a figure's report: support (0 while the reference flies or nothing touches), number of saturated motors,
-residual (6), 1 while the reference flies, and 1 while the figure lies where it fell, 2 while it is set back."""
+"""Places in a figure's report: support (0 while the reference flies or nothing touches the floor), number of saturated
+motors, residual (6), 1 while the reference flies, and the mode: 1 while the figure lies after a fall, 2 while it is set
+back, else 0."""
 
 
 class FigureGains(NamedTuple):
-    """How closely the physical figure tracks, and how much help it may get.
+    """Feedback gains of the physical figure, and the bounds of its residual wrench.
 
     Attributes
     ----------
     joint_rate, root_rate : float
-        ω of the critically damped feedback on joints and root [1/s]. They are alike: a foot that stands hangs on
-        both, and where the root comes back at another rate than the joints, one feedback moves the foot and the floor
-        holds it. `hvf track walk` has 1.2 % with 40 and 40, 12 % with 25 and 40. With 25 and 25 landings of the run are
-        softer, and a figure that is led comes back less exactly.
+        ω of the critically damped feedback on joints and root [1/s]. They must be equal: both determine where a foot in
+        stance is to be, and if they differ, the feedback moves a foot that the floor holds. The residual of `hvf track
+        walk` is 1.2 % with 40 and 40, 12 % with 25 and 40. With 25 and 25 landings of the run are softer, and a figure
+        that is led retraces its path less exactly.
     joint_reach : float
-        Largest error of a joint that the feedback acts on [rad]: beyond, it comes back at a steady speed, ω/2 times
-        this, and its motors have torque left to stop it with.
+        Joint error at which the feedback saturates [rad]: a larger error decays at a constant speed, ω/2 times this, so
+        that the motors have torque left to stop the joint.
     root_pull, root_turn : float
-        Largest acceleration that feedback may ask of the root [m/s²], [rad/s²]: a late landing is absorbed.
+        Largest linear and angular acceleration that feedback may ask of the root [m/s²], [rad/s²], so that a late
+        landing is absorbed.
     linear_limit, angular_limit : float
         Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is rough.
     force_bound, moment_bound : float
-        Largest residual force as a share of body weight, and moment as a share of body weight × stature: the least of
-        those tried on which all that are to stand do (docs/validation/residual-bounds.md).
+        Largest residual force as a share of body weight, and moment as a share of body weight × stature: the least
+        values tried with which every motion that should stand does (docs/validation/residual-bounds.md).
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
     settling_reach : float
-        The same for a point of a foot that bears load with another one [m]: what is about to be set down is planned
-        with, or the ankle holds it up.
+        As `contact_reach`, for a point of a foot that bears load on another point [m]: a point about to be set down is
+        planned with, since otherwise the ankle would hold it up.
     stance_height : float
-        Height from which the reference lifts a contact point that stood [m].
+        Height of a contact point of the reference from which it is no longer in stance [m].
     swing_speed : float
-        Speed over the floor from which a low contact point of the reference swings and does not stand [m/s].
+        Horizontal speed of a low contact point of the reference from which it is in swing, not in stance [m/s].
     flight_height : float
         The reference flies, and no residual is applied, while all its contact points are higher than this [m].
     lift_time : float
-        How far ahead the reference is looked at for contact points about to be lifted [s].
+        Prediction time for contact points of the reference that are about to be lifted [s].
     placement_reach : float
-        Largest horizontal distance by which a foot in flight is put beside its place under the root, towards the one
-        in the world (`sim.body.foot_placement`) [m]. With none cmu 01_01, jumps and turns, lacks 12.9 % of weight over
-        20 s and deepmimic/jump falls; with 8 cm they lack 4.9 and 4.0 %. 5 to 15 cm differ little.
+        Largest horizontal displacement of a foot in flight from its place relative to the root towards its place in the
+        world (`sim.body.foot_placement`) [m]. Without it the residual of cmu 01_01 (jumps and turns) is 12.9 % of
+        weight over 20 s, and deepmimic/jump falls; with 8 cm the residuals are 4.9 and 4.0 %. 5 to 15 cm differ little.
     """
 
     joint_rate: float = 40.0
@@ -76,7 +78,8 @@ class FigureGains(NamedTuple):
 
 
 CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)
-"""Of a clip at its own pace: the least help on which the embedded ones stand (docs/validation/residual-bounds.md)."""
+"""Gains for a clip at its own pace: the least bounds with which the embedded clips stand
+(docs/validation/residual-bounds.md)."""
 
 
 class FigureState(NamedTuple):
@@ -85,39 +88,41 @@ class FigureState(NamedTuple):
     Attributes
     ----------
     model, data, twin_model, twin_data : int
-        Addresses of the world, and of the figure alone in which the reference pose is looked at.
+        Addresses of the world, and of the twin: the figure alone, on which the reference pose is evaluated.
     qpos, qvel, bias, passive, ctrl, applied : Array
         The figure's part of the world's arrays: 75, 57, 57, 57, 51 motors and the 6 degrees of freedom of the root.
     xpos, xmat : Array
-        Positions (18, 3) and rotation matrices (18, 9) of its bodies.
+        Positions (18, 3) and rotation matrices (18, 9) of the figure's bodies.
     contact_pos, contact, contact_body : Array
-        Positions of the world's geoms, the contact spheres among them (10,), and their bodies among the figure's.
+        Positions of all geoms of the world, indices of the contact spheres in them (10,), and indices of the spheres'
+        bodies among the figure's (10,).
     twin_qpos, twin_contact_pos, twin_contact : Array
-        The same in the figure alone.
+        Configuration, geom positions and indices of the contact spheres of the twin.
     mass : MassMatrix
-        Of its degrees of freedom.
+        Mass matrix of the figure's degrees of freedom.
     parent, legs : IntArray
         Parent of each body, and thigh, shank and foot of each leg, shape (2, 3).
     torque_limit : Array
-        Of the motors [N m], shape (51,).
+        Torque limits of the motors [N m], shape (51,).
     weight, stature, radius, friction : float
-        Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction that is relied on.
+        Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction that is planned with.
     acceleration, wanted_root : Array
-        Planned acceleration (57), and the root's as the feedback asks for it (6).
+        Planned acceleration (57), and the wanted acceleration of the root before contacts are planned (6).
     loaded : Array
         1 where a foot touches the floor, 0 where it does not, shape (2,).
     share, near : Array
-        How much each contact point may bear, and whether it stands in the reference, 0 to 1, shape (10,).
+        Share of load that each contact point may bear, and degree to which it is in stance in the reference, 0 to 1,
+        shape (10,).
     force, given : Array
-        Planned contact forces [N] in the world (10, 3) and the generalised forces they make (57).
+        Planned contact forces [N] in the world (10, 3) and their generalised forces (57).
     wrench : Array
         Residual: force in the world [N], moment in the root's frame [N m], shape (6,).
     lost, yielding : Array
-        Torque beyond each motor's limit [N m] and whether its joint gives way, shape (51,).
+        Torque beyond each motor's limit [N m], and 1 where the joint's acceleration is reduced, shape (51,).
     report : Array
         See `REPORT_SUPPORT` and what follows it, shape (10,).
     fall : FallState
-        Whether it has fallen, and how it is set back.
+        State of fall detection and recovery.
     """
 
     model: int

@@ -1,16 +1,16 @@
-r"""Where feet go in a flight whose root is not where the reference has it: over their places on the floor all the same.
+r"""Foot placement in flight: feet are brought over the reference's footholds although the root is off its reference.
 
-With the joints of the reference a foot is off by what the root is. It would land there and stay, while the root is
-brought back over it; the legs would push off from the wrong place, and the next flight would miss by more. So in
-flight the joints of each leg are displaced by
+With the joint angles of the reference a foot has the error of the root. It would land with this error and keep it while
+the root is brought back; the legs would then push off from the wrong place, and the next flight would miss by more. So
+in flight the joints of each leg are displaced by
 
 .. math:: \min_\delta \tfrac12 \|\delta\|^2 + \tfrac\kappa2 \sum_p \|H (J_p\, \delta - \sigma (p_r - T p_r))\|^2 ,
 
-where p_r are the contact points of the foot in the reference, T takes the reference's root to the figure's, H takes the
-horizontal part (a leg that were to reach up or down would bend or stretch far), and σ ≤ 1 shortens what is longer than
-a reach: legs that turn far turn the root the other way. σ also ends, between 26 and 60° from the plumb line, for a foot
-that is not under the root: in a somersault none is about to land. The wanted acceleration of the leg has ω² δ + 2ω δ'
-more, δ' of the rate at which the root's error grows.
+where p_r are the contact points of the foot in the reference, T is the displacement from the reference's root to the
+figure's, and H takes the horizontal part (corrections of height would bend or stretch the leg far). σ ≤ 1 bounds the
+displacement by `placement_reach`, since legs that swing far turn the root the other way. σ also fades to zero as the
+line from root to foot goes from 26 to 60° off the plumb line: in a somersault no foot is about to land. ω² δ + 2ω δ' is
+added to the wanted acceleration of the leg, δ' being the solution for the rate of the root's error.
 """
 
 import numpy as np
@@ -22,10 +22,11 @@ from controllers.work_array import work_array
 from sim.body.figure_state import N_FOOT, FigureState
 from sim.body.stance import N_LEG, cross_add, factor, substitute
 
-_CLOSENESS = 300.0  # κ [1/m²]: within 1 % of what is asked for, and bounded where a leg is straight
+_CLOSENESS = 300.0  # κ [1/m²]: within 1 % of the displacement, and δ stays bounded where a leg is straight
 _ASIDE, _UNDER = 0.5, 0.9
-"""Cosines of the angles between root to foot and the plumb line, from which a foot is placed at all, and wholly.
-Without them snu/backflip lacks 27 % of weight, with them 8 (no placement: 7); a ramp up to 0.75 leaves 14."""
+"""Cosines of the angle between the line from root to foot and the plumb line at which placement begins and is full.
+Without this fading the residual of snu/backflip is 27 % of weight, with it 8 % (no placement: 7 %); a ramp up to 0.75
+leaves 14 %."""
 
 
 @njit
@@ -35,7 +36,7 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
     Parameters
     ----------
     s : FigureState
-        Reads state, reference's contact points and gains, writes `acceleration`.
+        State, contact points of the reference and gains are read, `acceleration` is written.
     q_r, v_r : Array
         Reference pose (75) and velocity (57), in the conventions of qpos and qvel.
     """
@@ -50,14 +51,14 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
 
 @njit
 def _displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, away: Array, drift: Array) -> None:
-    """What contact points of a foot are to be displaced by, σ (p_r − T p_r) (4, 3) [m], and its rate [m/s]."""
+    """Write the wanted displacements of a foot's contact points, σ (p_r − T p_r) (4, 3) [m], and their rates [m/s]."""
     R, turn, arm = s.xmat[0], work_array(3), work_array(3)
     turning = rotate(q_r[3], q_r[4], q_r[5], q_r[6], v_r[3], v_r[4], v_r[5])
     for i in range(3):
         turn[i] = turning[i] - (R[3 * i] * s.qvel[3] + R[3 * i + 1] * s.qvel[4] + R[3 * i + 2] * s.qvel[5])
     for p in range(N_FOOT):
         there = s.twin_contact_pos[s.twin_contact[N_FOOT * leg + p]]
-        own = rotate(  # of the point in the root's frame
+        own = rotate(  # the point in the root's frame
             q_r[3], -q_r[4], -q_r[5], -q_r[6], there[0] - q_r[0], there[1] - q_r[1], there[2] - q_r[2]
         )
         size = 0.0
@@ -79,7 +80,7 @@ def _displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, away: Array
 def _leg_for(
     bodies: IntArray, points: Array, xpos: Array, xmat: Array, away: Array, drift: Array, offset: Array, rate: Array
 ) -> None:
-    """Displacement δ of a leg's joints (9,) [rad] for those of its contact points, and its rate."""
+    """Write the displacement δ of a leg's joints (9,) [rad] for displacements of its contact points, and its rate."""
     normal, J = work_array((N_LEG, N_LEG)), work_array((3, N_LEG))
     axis, arm = work_array(3), work_array(3)
     offset[:], rate[:], normal[:] = 0.0, 0.0, 0.0
@@ -94,7 +95,7 @@ def _leg_for(
                 arm[i] = points[p, i] - xpos[body, i]
             cross_add(axis, arm, J[:, k])
         for k in range(N_LEG):
-            for i in range(2):  # horizontally
+            for i in range(2):  # the horizontal components only
                 offset[k] += _CLOSENESS * J[i, k] * away[p, i]
                 rate[k] += _CLOSENESS * J[i, k] * drift[p, i]
                 for m in range(k + 1):

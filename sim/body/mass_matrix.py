@@ -1,4 +1,7 @@
-"""The figure's block of the mass matrix M, read where MuJoCo has it: a tree's, so half of its entries are zero."""
+"""The figure's block of the mass matrix M, read in place from MuJoCo's sparse storage.
+
+The figure is a kinematic tree, so half of the entries of M are always zero.
+"""
 
 from typing import NamedTuple
 
@@ -10,17 +13,17 @@ from controllers.state import Array, IntArray
 
 
 class MassMatrix(NamedTuple):
-    """M of some degrees of freedom of a world, which are coupled to no others.
+    """M of a set of degrees of freedom of a world that are coupled to no others.
 
     Attributes
     ----------
     values : Array
-        View of MuJoCo's own, the lower triangle of the world's M by rows, without what is always zero.
+        View of MuJoCo's `MjData.M`: the lower triangle of the world's M by rows, without structural zeros.
     rows, columns, places : IntArray
-        Entries of row i that are not always zero, of both triangles, are those from ``rows[i]`` to ``rows[i + 1]``:
-        their columns, which increase, and places in `values`.
+        The full symmetric matrix by compressed rows: entries ``rows[i]`` to ``rows[i + 1]`` of `columns` and `places`
+        are the columns of row i, increasing, and their indices in `values`.
     where : IntArray
-        Place of each entry in `values`, −1 for one that is always zero, shape (n, n).
+        Index of each entry in `values`, −1 for a structural zero, shape (n, n).
     """
 
     values: Array
@@ -32,21 +35,21 @@ class MassMatrix(NamedTuple):
 
 @njit
 def inertia(mass: MassMatrix, i: int, k: int) -> float:
-    """M_ik."""
+    """The entry M_ik."""
     place = mass.where[i, k]
     return float(mass.values[place]) if place >= 0 else 0.0
 
 
 @njit
 def inertial_force(mass: MassMatrix, i: int, acceleration: Array, force: float) -> float:
-    """F + (M a)_i, summed from left to right."""
+    """F + (M a)_i, summed from left to right so that the rounding is reproducible."""
     for n in range(mass.rows[i], mass.rows[i + 1]):
         force += float(mass.values[mass.places[n]] * acceleration[mass.columns[n]])
     return force
 
 
 def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData, dofs: slice) -> MassMatrix:
-    """M of degrees of freedom of a world, which must outlive it."""
+    """M of the degrees of freedom `dofs` of a world, which must outlive the result."""
     n = dofs.stop - dofs.start
     where = np.full((n, n), -1, dtype=np.int64)
     for i in range(n):

@@ -1,4 +1,4 @@
-r"""The residual of a physical figure beside what is asked of simulations of movement.
+r"""The residual wrench of a physical figure, compared with published bounds for simulations of movement.
 
 Hicks et al. (2015, "Is my model good enough?", J. Biomech. Eng. 137, 020905, section 3.1.3) recommend residual forces
 of at most 5 %, peak and RMS, of the measured net external force, and residual moments of at most 1 % of the height of
@@ -18,13 +18,14 @@ FORCE, MOMENT = 0.05, 0.01
 
 @dataclass(frozen=True)
 class Residual:
-    """Residual force, as a share of body weight, and moment, of weight × height of the centre of mass, over some time.
+    """RMS and peak of the residual over some time.
 
     Attributes
     ----------
     seconds : float
-        How long [s].
+        Duration [s].
     force_rms, force_max, moment_rms, moment_max : float
+        Force as a share of body weight, moment as a share of weight × height of the centre of mass.
     """
 
     seconds: float
@@ -34,14 +35,14 @@ class Residual:
     moment_max: float
 
     def brief(self) -> str:
-        """The figures in percent, RMS and peak."""
+        """RMS and peak of force and moment in percent, in words."""
         return (
             f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.0f} % of weight, moment "
             f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} % of weight × height of the centre of mass"
         )
 
     def missed(self) -> tuple[str, ...]:
-        """Which of the bounds of Hicks et al. it does not keep."""
+        """Names of the bounds of Hicks et al. that are exceeded."""
         kept = {
             "RMS force": self.force_rms <= FORCE,
             "peak force": self.force_max <= FORCE,
@@ -58,7 +59,10 @@ class Residual:
 
 
 class ResidualMeasure:
-    """`Residual` of wrenches that come in blocks, `period` [s] apart, of a figure of a weight [N] and height [m]."""
+    """Accumulates `Residual` over blocks of wrenches sampled every `period` [s].
+
+    `weight` is the figure's [N], `com_height` the height of its centre of mass when it stands [m].
+    """
 
     def __init__(self, weight: float, com_height: float, period: float):
         self._scale = np.array([weight, weight * com_height])
@@ -73,7 +77,7 @@ class ResidualMeasure:
         self._count += len(wrenches)
 
     def summary(self) -> Residual:
-        """What was taken so far; zero of nothing."""
+        """The residual of all wrenches added so far; zero if there were none."""
         (force, moment), n = self._squares, max(self._count, 1)
         most = self._largest.tolist()
         return Residual(

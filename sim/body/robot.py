@@ -1,9 +1,9 @@
-r"""A robot arm that follows a reference by computed torque, in one world with the Phantom.
+r"""Computed-torque control of a robot arm that tracks the reference, in one world with the Phantom.
 
 .. math:: \tau = M(q)\,\bigl(a_r + 2\omega\,(v_r - v) + \omega^2\,(q_r - q)\bigr) + c(q, v) - \tau_{passive}
 
-cut at the motors' limits. c holds Coriolis, centrifugal and gravity torques. The error decays with a double pole at −ω
-as long as no motor saturates (Craig, Introduction to Robotics, chapter 10).
+saturated at the motors' limits. c holds Coriolis, centrifugal and gravity torques. The error decays with a double pole
+at −ω as long as no motor saturates (Craig, Introduction to Robotics, chapter 10).
 """
 
 from typing import Any, NamedTuple
@@ -42,7 +42,7 @@ class RobotState(NamedTuple):
     torque_limit : Array
         [N m], shape (7,).
     acceleration : Array
-        What is asked for [rad/s²], shape (7,).
+        Wanted joint accelerations [rad/s²], shape (7,).
     report : Array
         Number of saturated motors at `REPORT_SATURATED`, shape (8,).
     """
@@ -65,7 +65,11 @@ class RobotState(NamedTuple):
 
 @njit
 def robot_torque(place: Any) -> None:
-    """Set the motors' torques for what is lent: state, reference angles [rad], rates, accelerations, (7,) each."""
+    """Set the motors' torques.
+
+    `place` is the address (`controllers.kernel_call.lend`) of a tuple of: the `RobotState`, and the reference's joint
+    angles [rad], velocities [rad/s] and accelerations [rad/s²], shape (7,) each.
+    """
     s, q_r, v_r, a_r = lent(place)
     _act(s, q_r, v_r, a_r)
 
@@ -88,12 +92,12 @@ def _act(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
 
 
 def robot_state(world: RobotWorld, rate: float) -> RobotState:
-    """What the arm's control works on.
+    """The state of the arm's control.
 
     Parameters
     ----------
     world : RobotWorld
-        Must outlive the state, which holds its addresses.
+        Must outlive the state, which holds addresses of its memory.
     rate : float
         ω [1/s].
 

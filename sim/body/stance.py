@@ -1,14 +1,15 @@
-r"""How the legs move while their feet stand: the floor, not the reference, says where a loaded foot is.
+r"""Legs in stance: a loaded foot rests where it landed, not where the reference has it.
 
-A foot that landed a centimetre from where the reference has it would be torn along the floor by the feedback, and the
-friction that this meets was not planned for. So the wanted accelerations of a leg's nine degrees of freedom are
-amended, by as little as possible, towards contact points at rest on the floor:
+The feedback would drag a foot that landed a centimetre off its reference along the floor, against friction that was not
+planned for. So the wanted accelerations of a leg's nine degrees of freedom are changed by the least δ that brings its
+contact points to rest on the floor:
 
 .. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p
           + \tfrac14 \eta^2 h_p e_z\|^2_{W_p} ,
 
-over the points p that stand in the reference; the weights W_p hold a point along the floor as far as it bears load, and
-bring it down (h_p is its height) as far as any point of its foot does: a foot that lands tilted is set flat.
+over the points p that are in stance in the reference, with h_p the height of a point. The horizontal weights in W_p are
+the share of load of the point itself, the vertical one the largest share in its foot: a foot that lands tilted is set
+flat.
 """
 
 import numpy as np
@@ -20,9 +21,9 @@ from controllers.work_array import work_array
 
 IntArray = npt.NDArray[np.int64]
 
-_ADHERENCE = 300.0  # κ
-_SETTLING = 40.0  # η, rate at which a foot is asked to come to rest on the floor [1/s]
-N_LEG = 9
+_ADHERENCE = 300.0  # κ, weight of contact points at rest against small δ
+_SETTLING = 40.0  # η [1/s], rate at which a foot is to come to rest on the floor
+N_LEG = 9  # degrees of freedom of a leg: three each of hip, knee and ankle
 
 
 @njit
@@ -45,22 +46,22 @@ def stance_response(
     bodies: IntArray, points: Array, share: Array, near: Array, xpos: Array, xmat: Array, v: Array, a: Array,
     offset: Array, response: Array,
 ) -> None:  # fmt: skip
-    """Amend the wanted accelerations of one leg so that its loaded contact points rest.
+    """Compute the change of one leg's wanted accelerations that brings its loaded contact points to rest.
 
     Parameters
     ----------
     bodies : IntArray
         Indices of thigh, shank and foot among the figure's bodies; the root is 0.
     points, share : Array
-        Positions (n, 3) of the foot's contact points in the world, floor at z = 0, and their shares (n,).
+        Positions (n, 3) of the foot's contact points in the world, floor at z = 0, and their shares of load (n,).
     near : Array
-        1 where the point stands in the reference, 0 where it does not, shape (n,).
+        Degree to which the point is in stance in the reference, 0 to 1, shape (n,).
     xpos, xmat : Array
         Positions (18, 3) and rotation matrices (18, 9) of the figure's bodies.
     v, a : Array
         Velocity and wanted acceleration of the figure (57).
     offset, response : Array
-        Results: δ (9,), and its derivative K by the root's acceleration (9, 6), how the leg follows the root.
+        Written: δ (9,), and its derivative K with respect to the root's acceleration (9, 6).
     """
     offset[:] = 0.0
     response[:] = 0.0
@@ -73,7 +74,7 @@ def stance_response(
         normal[k, k] = 1.0
     J, J_root, wanted = work_array((3, N_LEG)), work_array((3, 6)), work_array(3)
     axis, relative, arm, spin = work_array(3), work_array(3), work_array(3), work_array(3)
-    # angular velocities of root, thigh, shank, foot; acceleration of the foot's origin under velocities alone
+    # Of root, thigh, shank, foot: angular velocity ω, and the linear and angular acceleration due to velocities alone.
     omega, drift, turning = work_array((4, 3)), work_array((4, 3)), work_array((4, 3))
     omega[:], drift[:], turning[:] = 0.0, 0.0, 0.0
     for level in range(4):
@@ -146,7 +147,7 @@ def stance_response(
 
 @njit
 def factor(H: Array) -> None:
-    """Cholesky factor of a small symmetric positive definite matrix, in its lower triangle."""
+    """Replace the lower triangle of a small symmetric positive definite matrix by its Cholesky factor."""
     for i in range(H.shape[0]):
         for j in range(i + 1):
             total = H[i, j]
@@ -157,7 +158,7 @@ def factor(H: Array) -> None:
 
 @njit
 def substitute(L: Array, g: Array) -> None:
-    """Solve L Lᵀ z = g; g becomes z."""
+    """Solve L Lᵀ z = g in place; g becomes z."""
     n = g.size
     for i in range(n):
         for k in range(i):

@@ -1,4 +1,4 @@
-"""A clip through the physical figure alone: what torques and ground can do of it, and how much help it took."""
+"""A clip tracked by the physical figure alone, without Phantom: tracking errors, residual, foot skate, falls."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ from sim.errors import SimError
 Flags = npt.NDArray[np.bool_]
 
 _PREFIX = "figure/"
-_BEARS = 1.0  # [N] from which the ground bears the figure
+_BEARS = 1.0  # [N] vertical ground reaction force from which the ground supports the figure
 
 
 @dataclass(frozen=True)
 class TrackingConfig:
-    """How the figure is stepped.
+    """Time steps, body and gains of a tracking simulation.
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ class TrackingConfig:
     control_steps : int
         Physics steps between two updates of the control.
     stature, mass : float
-        Of the figure [m], [kg].
+        Stature [m] and mass [kg] of the figure.
     gains : FigureGains
-        Of its control.
+        Gains of its control.
 
     Raises
     ------
     SimError
-        If the step is not within 0 to 5 ms, or the control is not updated every 1 to 100 steps.
+        If the physics step is not within 0 to 5 ms, or the number of control steps not within 1 to 100.
     """
 
     physics_step: float = 5e-4
@@ -66,24 +66,24 @@ class TrackingConfig:
 
 
 class TrackedMotion(NamedTuple):
-    """What happened, one row for each control update.
+    """The log of a tracking simulation, one row per control update.
 
     Attributes
     ----------
     reference : ClipMotion
-        What was asked for.
+        The reference motion.
     poses : Array
-        What the figure did, shape (n, 75).
+        Poses of the figure, shape (n, 75).
     reports : Array
         See `sim.body.figure_state.REPORT_SUPPORT` and what follows it, shape (n, 10).
     contacts : Array
         Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
     ground : Array
-        Force of the ground on the figure [N], shape (n, 3).
+        Ground reaction force on the figure [N], mean over a control period, shape (n, 3).
     weight, com_height : float
-        Of the figure [N], and of its centre of mass over the floor where it stands [m].
+        Weight of the figure [N], and height of its centre of mass when it stands [m].
     warnings : int
-        Warnings that MuJoCo gave.
+        Number of MuJoCo's warnings.
     """
 
     reference: ClipMotion
@@ -103,29 +103,29 @@ class TrackingReport:
     Attributes
     ----------
     seconds, flight_seconds : float
-        How long the motion was, and how long the reference was in flight [s].
+        Duration of the motion, and time that the reference was in flight [s].
     falls : tuple of float
-        When the figure fell [s].
+        Times at which the figure fell [s].
     up_seconds : float
-        For how long it neither lay nor was set back [s]. What follows is of that time.
+        Time that the figure neither lay nor was set back [s]. All that follows is measured over that time.
     joint_error : float
         RMS over joints and time of the angle between a joint and its reference [deg].
     root_error, root_error_max : float
         RMS and largest distance of the root from its reference [m].
     residual_force, residual_force_max : float
-        Of `stance`, as shares of body weight.
+        RMS and peak force of `stance`, as shares of body weight.
     residual_in_flight : float
         Largest component of the residual while the reference flies [N, N m]; zero by construction.
     stance, without_ground_force : Residual
-        Residual while a foot of the reference stands, and while the ground does not bear the figure.
+        Residual while the reference is not in flight, and while the ground does not support the figure.
     grounded : float
-        Share of the time in which the reference stands that the ground bears the figure.
+        Share of the reference's time out of flight in which the ground supports the figure.
     slide : float
-        Largest distance that a contact point moved over the floor while it stood [m].
+        Foot skate: largest distance that a contact point slid over the floor while in contact [m].
     saturation : float
         Share of motors at their limits, mean over time.
     warnings : int
-        Warnings that MuJoCo gave.
+        Number of MuJoCo's warnings.
     """
 
     seconds: float
@@ -177,7 +177,7 @@ def _simulate(
 
 
 def floor_world(config: TrackingConfig) -> mujoco.MjModel:
-    """The figure alone on a floor, prefix ``figure/``."""
+    """The model of the figure alone on a floor; names have the prefix ``figure/``."""
     spec = mujoco.MjSpec()
     spec.option.timestep = config.physics_step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -189,14 +189,14 @@ def floor_world(config: TrackingConfig) -> mujoco.MjModel:
 def tracked_motion(
     clip: Clip, seconds: float, config: TrackingConfig, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> TrackedMotion:
-    """Run a clip through the physical figure, which starts in the clip's first pose and with its velocity.
+    """Let the physical figure track a clip, starting in the clip's first pose and with its velocity.
 
-    `ready` is called before compiled code is needed, with its units.
+    `ready` is called with the units of compiled code, before they are needed.
 
     Raises
     ------
     SimError
-        If the time is not within 0 to an hour.
+        If `seconds` is not within 0 to an hour.
     """
     if not 0.0 < seconds <= 3600.0:
         raise SimError(f"{seconds} s of tracking; expected more than 0 and at most an hour")
@@ -209,7 +209,7 @@ def tracked_motion(
     mujoco.mj_forward(model, data)
     poses, reports = np.empty((n, model.nq)), np.empty((n, REPORT_SIZE))
     contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
-    # Rows of what is not contiguous are of another type, and nothing checks that.
+    # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
     motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
     numbers: tuple[Any, ...] = (
         figure.state, config.control_steps, *motion, poses, reports, contacts, ground, data.qfrc_constraint[:3],
@@ -236,12 +236,12 @@ def track(
     config: TrackingConfig | None = None,
     ready: Callable[[tuple[Unit, ...]], None] = lambda units: None,
 ) -> TrackingReport:
-    """Run a clip through the physical figure and report how it went; see `tracked_motion`."""
+    """Let the physical figure track a clip and return the measures; see `tracked_motion`."""
     return report(tracked_motion(clip, seconds, config or TrackingConfig(), ready))
 
 
 def report(motion: TrackedMotion) -> TrackingReport:
-    """Sum up a tracked motion."""
+    """The measures of a tracked motion."""
     times = motion.reference.times
     period = float(times[1] - times[0]) if len(times) > 1 else 0.0
     up = motion.reports[:, REPORT_DOWN] == UP
@@ -284,7 +284,7 @@ def _rms(values: Array) -> float:
 
 
 def _slide(contacts: Array, touches: Flags) -> float:
-    """Largest distance of a touching point from where it began to touch."""
+    """Largest horizontal distance of a point in contact from where the contact began [m]."""
     largest = 0.0
     for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate(([False], touch, [False])).astype(np.int8)))

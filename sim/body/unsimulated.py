@@ -1,4 +1,4 @@
-"""Figures that are not in the physics: one that only shows the animation, and none at all."""
+"""Bodies outside the physics: a kinematic figure that only shows the animation, and no figure at all."""
 
 from typing import NamedTuple
 
@@ -9,12 +9,12 @@ from sim.body.figure_state import REPORT_SIZE
 
 
 class KinematicFigure(NamedTuple):
-    """A figure that is where the map has it: h(p) is evaluated and recorded, and nothing follows it.
+    """A figure shown in the reference pose: the haptic map is evaluated and recorded, and no body tracks it.
 
     Attributes
     ----------
     applied, report : Array
-        As of the physical figure, always zero: no residual wrench (6,), nothing to report (10,).
+        Residual wrench (6,) and report (10,) as of the physical figure, always zero.
     """
 
     applied: Array
@@ -29,10 +29,10 @@ class NoFigure(NamedTuple):
 
 
 def kinematic_figure() -> KinematicFigure:
-    """What a servo holds for a figure that is only shown."""
+    """A servo's body for a figure that is only shown."""
     return KinematicFigure(np.zeros(6), np.zeros(REPORT_SIZE))
 
 
 def no_figure() -> NoFigure:
-    """What a servo holds where there is no figure."""
+    """A servo's body where there is no figure."""
     return NoFigure(np.zeros(6), np.zeros(REPORT_SIZE))

@@ -1,4 +1,4 @@
-"""The control of the physical figure, compiled: see `sim.body.figure` for its equations."""
+"""Whole-body control of the physical figure, compiled; see `sim.body.figure` for the equations."""
 
 from typing import Any
 
@@ -25,10 +25,10 @@ from sim.body.mass_matrix import inertia, inertial_force
 from sim.body.stance import N_LEG, factor, stance_response, substitute
 from sim.compilation.native import mj_integrate_pos, mj_kinematics
 
-_LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a residual force
+_LEVER = 0.5  # [m] lever arm that converts moment to force in the cost of the residual
 _FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
-_PLANS = 4  # plans at most in a tick, each with the joints that saturated in the one before giving way
-_SET_BACK_SPEED = 20.0  # [m/s], [rad/s] at most, of what a figure follows that is set back
+_PLANS = 4  # most plans per tick; in each, joints that saturated in the previous one are given less acceleration
+_SET_BACK_SPEED = 20.0  # [m/s], [rad/s] largest speed of the target of a figure that is set back
 
 
 @njit
@@ -38,9 +38,9 @@ def figure_torque(place: Any) -> None:
     Parameters
     ----------
     place
-        Where is lent (`controllers.kernel_call.lend`): the `FigureState`, whose state is read, and the dynamics of the
-        last physics step, and whose `ctrl`, `applied` and `report` are written; reference pose (75), velocity (57) and
-        acceleration (57), in the conventions of qpos and qvel.
+        Address (`controllers.kernel_call.lend`) of a tuple of: the `FigureState`, whose state and dynamics of the last
+        physics step are read, and whose `ctrl`, `applied` and `report` are written; reference pose (75), velocity (57)
+        and acceleration (57), in the conventions of qpos and qvel.
     """
     s, q_r, v_r, a_r = lent(place)
     _act(s, q_r, v_r, a_r)
@@ -70,7 +70,7 @@ def _act(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
 
 @njit
 def _saturated(torques: Array, limits: Array) -> int:
-    """How many motors are at their limits."""
+    """Number of motors at their limits."""
     count = 0
     for k in range(torques.shape[0]):
         if abs(torques[k]) >= 0.999 * limits[k]:
@@ -80,13 +80,13 @@ def _saturated(torques: Array, limits: Array) -> int:
 
 @njit(forceinline=True)
 def _set_back(s: FigureState, q_r: Array) -> None:
-    """Torques and a wrench at the root, without bounds, that carry a figure from where it lay to the reference."""
+    """Torques, and an unbounded wrench at the root, that carry a fallen figure back to the reference."""
     follow_back(s.twin_model, s.fall, q_r)
     for k in range(0, s.fall.velocity.shape[0], 3):
-        shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # where the reference jumps
+        shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # the reference may jump
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
     rate = s.gains.root_rate
-    for i in range(3):  # without the bound on the root's pull: the animation may have gone far
+    for i in range(3):  # without the bound `root_pull`: the animation may have moved far away
         s.acceleration[i] = 2.0 * rate * (s.fall.velocity[i] - s.qvel[i]) + rate**2 * (s.fall.target[i] - s.qpos[i])
     s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
     for plan in range(_PLANS):
@@ -119,18 +119,19 @@ def _stand(s: FigureState, support: float) -> None:
 
 @njit
 def _nearness(height: float, reach: float) -> float:
-    """1 on the floor or below, 0 from a height `reach` on, C¹ between."""
+    """1 at height 0 or below, 0 from a height `reach` on, C¹ between."""
     x = min(max(height / reach, 0.0), 1.0)
     return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
 
 
 @njit(forceinline=True)
 def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
-    """Share of each contact point: it touches, and the reference has it near the floor now and a moment ahead.
+    """Set the share of load of each contact point, and return the support.
 
-    A point that the reference is about to lift is unloaded before, so that its leg need not catch up; one that swings
-    low over the floor does not stand, and is not held to it. Returns the largest share by the narrower measure of what
-    counts as flight.
+    A point bears load if it touches the floor and the reference has it near the floor both now and `lift_time` ahead:
+    a point about to be lifted is thus unloaded before, so that its leg need not catch up. A point of the reference that
+    swings low over the floor is not in stance. The support is the largest contact of a point that the reference has
+    below `flight_height`, 0 to 1.
     """
     s.twin_qpos[:] = q_r
     mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.gains.lift_time)
@@ -165,9 +166,9 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
 
 @njit(forceinline=True)
 def _plan_contacts(s: FigureState, support: float) -> bool:
-    """Contact forces and residual that meet the root's demand (M a* + c)_r, and the generalised forces they make.
+    """Plan contact forces and residual for the root's demand (M a* + c)_r, and their generalised forces.
 
-    Returns whether they meet it: not if the residual was beyond its bounds.
+    Returns whether the demand is met: it is not if no point bears load or the residual exceeded its bounds.
     """
     R, w, y, arm = s.xmat[0], s.wrench, s.residual, work_array(3)
     w[:] = 0.0
@@ -178,7 +179,7 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
         return False
     for i in range(6):
         s.demand[i] = inertial_force(s.mass, i, s.acceleration, s.bias[i] - s.passive[i])
-    for i in range(3):  # moments in world axes, so that the cones need no turning
+    for i in range(3):  # moments in world axes, so that the friction cones need not be rotated
         s.scaled[i] = s.demand[i] / s.weight
         moment = R[3 * i] * s.demand[3] + R[3 * i + 1] * s.demand[4] + R[3 * i + 2] * s.demand[5]
         s.scaled[3 + i] = moment / (s.weight * _LEVER)
@@ -204,7 +205,7 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
 
 @njit(forceinline=True)
 def _bound_residual(s: FigureState, support: float) -> bool:
-    """Shorten the residual to its bounds, which shrink with the support; returns whether it was beyond them."""
+    """Saturate the residual at its bounds, which scale with the support; returns whether it exceeded them."""
     force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
     moment = shorten(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
     return force or moment
@@ -212,7 +213,7 @@ def _bound_residual(s: FigureState, support: float) -> bool:
 
 @njit(forceinline=True)
 def _add_contact(s: FigureState, c: int) -> None:
-    """Add Jᵀ f of one contact point: the root's force, and moments about it and about every joint on the way there."""
+    """Add Jᵀ f of one contact point: the force on the root, and moments about each joint from the body to the root."""
     f = s.force[c]
     s.given[:3] += f
     body = s.contact_body[c]
@@ -227,10 +228,10 @@ def _add_contact(s: FigureState, c: int) -> None:
 
 @njit(forceinline=True)
 def _let_root_fall(s: FigureState, support: float) -> None:
-    """Without support the root's acceleration is what the forces make it: M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
+    """Blend the root's planned acceleration with that of its free motion, M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
 
-    So it is where the residual is at its bounds: torques planned for an acceleration that does not come throw the limbs
-    about.
+    The wanted acceleration counts by the support, the free one by the rest. The caller sets the support to zero where
+    the residual is at its bounds too: torques planned for an acceleration that does not occur throw the limbs about.
     """
     if support >= 1.0:
         return
@@ -249,7 +250,7 @@ def _let_root_fall(s: FigureState, support: float) -> None:
 
 @njit(forceinline=True)
 def _plan_torques(s: FigureState) -> bool:
-    """Torques of the planned motion, within the motors' limits; returns whether any needed more."""
+    """Set the torques of the planned motion within the motors' limits; returns whether any motor saturates."""
     a, saturated = s.acceleration, False
     for motor in range(s.ctrl.shape[0]):
         i = motor + 6
@@ -264,7 +265,10 @@ def _plan_torques(s: FigureState) -> bool:
 
 @njit(forceinline=True)
 def _give_way(s: FigureState) -> bool:
-    """Give saturated joints the acceleration that their limits allow, M_ss Δa = −lost; not those of standing legs."""
+    """Reduce the accelerations of saturated joints to what their limits allow: M_ss Δa = −lost.
+
+    Joints of standing legs are left out (see `_make_up_for_legs`). Returns whether any acceleration was changed.
+    """
     for motor in range(s.lost.shape[0]):
         if s.lost[motor] != 0.0:
             s.yielding[motor] = 1
@@ -297,7 +301,7 @@ def _give_way(s: FigureState) -> bool:
 
 @njit(forceinline=True)
 def _make_up_for_legs(s: FigureState, support: float) -> None:
-    """What standing legs cannot give within their limits is residual, by virtual work: Kᵀ lost."""
+    """Add to the residual what standing legs cannot give within their torque limits, by virtual work: Kᵀ lost."""
     for leg in range(2):
         for k in range(N_LEG):
             lost = s.lost[3 * s.legs[leg, k // 3] + k % 3 - 3]

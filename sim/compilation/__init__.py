@@ -1,1 +1,1 @@
-"""Compiled kernels: their cache, their addresses, and MuJoCo's functions for them."""
+"""Compilation of kernels by numba: compilation units, their cache on disk, calls by address, MuJoCo's C functions."""

@@ -1,7 +1,7 @@
-"""C functions by their address, called from compiled code; and compiled functions by theirs, called from C.
+"""Calls of C functions by address from compiled code, and addresses of compiled functions for C.
 
-Arguments go by value with the types that they have in compiled code: nothing checks them. A char goes as an int, which
-is how all calling conventions of 64 bits have it.
+Arguments are passed by value with their types in compiled code, unchecked. A char is passed as an int, as in all 64-bit
+calling conventions.
 """
 
 import ctypes
@@ -33,18 +33,19 @@ def _calls(result: types.Type) -> Any:
 
 
 call_int: Any = _calls(types.int32)
-"""What a C function at an address returns, of a tuple of arguments."""
+"""Calls a C function that returns int: ``call_int(address, arguments)``."""
 call_void: Any = _calls(types.none)
+"""Calls a C function that returns nothing: ``call_void(address, arguments)``."""
 
 
 def struct_heads(hidden: bool) -> Any:
-    """What calls C functions that take nothing and return a struct of 9 to 16 bytes, of which it gives the first int.
+    """An intrinsic that calls a C function without arguments that returns a struct of 9 to 16 bytes: its first int.
 
     Parameters
     ----------
     hidden : bool
-        Whether such a struct is written to where a first argument points, as on Windows' x86-64; it comes in two
-        registers elsewhere.
+        Whether such a struct is returned through a hidden pointer argument, as on Windows x86-64; elsewhere it is
+        returned in two registers.
     """
 
     def calling(_: Any, function: Any) -> Any:
@@ -65,23 +66,25 @@ def struct_heads(hidden: bool) -> Any:
 
 
 call_struct_head: Any = struct_heads(_HIDDEN)
-"""The first int of a struct of 9 to 16 bytes that a C function at an address returns."""
+"""`struct_heads` for this platform: ``call_struct_head(address)``."""
 
 
 def address_of(function: Any) -> int:
-    """Where a function of a library lies that ctypes loaded."""
+    """Address of a function of a library loaded by ctypes."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def address_for_c(function: Callable[..., object], signature: Any) -> int:
-    """Where C finds a compiled function, an entry point of numbers; it runs without the GIL, and must not raise.
+    """Address at which C can call a compiled `entry_point` of scalar arguments.
+
+    The function runs without the GIL and must not raise.
 
     Parameters
     ----------
     function : callable
-        Of a module: its code lives as long as it.
+        A function of a module, so that its code stays alive.
     signature : numba signature
-        Of result and arguments.
+        Types of result and arguments.
     """
     compiled: Any = function
     found = compiled.get_compile_result(signature)

@@ -1,15 +1,14 @@
-"""numba's code generation, left to the unit: a function that only compiled code calls is not emitted by itself.
+"""Deferred code generation for numba: a function that only compiled code calls is not optimised and emitted by itself.
 
-numba optimises each called function, links its own callees into it, emits code for it and for a wrapper that Python
-could call, and does the same again one level up. Here a called function is typed and lowered only; the unit that is
-called from Python, or by its address, links all of them, is optimised once and emitted once. Results are the same to
-the last bit.
+numba optimises each called function, links its callees into it, emits code for it and for a wrapper that Python could
+call, and does the same again one level up. Here a called function is only typed and lowered; the unit that is called
+from Python, or by address, links all of them, is optimised once and emitted once. Results are bit for bit the same.
 
-This reaches into numba. With a version that it was not tested with, numba is left as it is: slower, not wrong.
+This patches numba's internals. With an untested version numba is left unpatched, which is slower but correct.
 """
 
 # pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
-# What is patched here is numba's own, and TESTED says of which versions.
+# The patched attributes are private to numba; TESTED lists the versions for which they are known.
 
 from typing import Any
 from weakref import WeakValueDictionary
@@ -22,10 +21,10 @@ from numba.core.environment import lookup_environment
 from sim.errors import SimError
 
 TESTED = ("0.68",)
-"""Minor versions of numba whose internals are known to be what is assumed here."""
+"""Minor versions of numba for whose internals the patches were tested."""
 
-_SYMBOL = "_ZN"  # begins the names that numba gives to functions
-_ENVIRONMENT = "_ZN08NumbaEnv"  # and to the places of their constants
+_SYMBOL = "_ZN"  # prefix of the names that numba gives to functions
+_ENVIRONMENT = "_ZN08NumbaEnv"  # prefix of the names of their environments, which hold constants
 
 
 class UndefinedSymbol(SimError):
@@ -33,11 +32,11 @@ class UndefinedSymbol(SimError):
 
 
 class _NoEntry:
-    """Stands for the entry point of a function that only compiled code calls."""
+    """Placeholder for the entry point of a function that only compiled code calls."""
 
 
 class _Depth:
-    """How many compilations the one at work is nested in, itself included; held under numba's compiler lock."""
+    """Nesting depth of the compilation in progress, 1 for the outermost; protected by numba's compiler lock."""
 
     now = 0
 
@@ -52,7 +51,7 @@ _defining: "WeakValueDictionary[str, UnitLibrary]" = WeakValueDictionary()
 
 
 class UnitLibrary(codegen.JITCodeLibrary):
-    """Code of one function: emitted if the compilation began with it, else kept to be linked into what did.
+    """Code of one function: emitted if the compilation began with it, else only linked into the outer unit.
 
     Attributes
     ----------
@@ -65,27 +64,27 @@ class UnitLibrary(codegen.JITCodeLibrary):
         self.deferred = _Depth.now > 1
 
     def add_ir_module(self, ir_module: ir.Module) -> None:
-        """Add a module of IR; where its functions are is kept in mind, for those that refer to them by name."""
+        """Add an IR module, and register the functions that it defines, for code that refers to them by name."""
         for function in ir_module.functions:
             if not function.is_declaration:
                 _defining[function.name] = self
         super().add_ir_module(ir_module)
 
     def finalize(self) -> None:
-        """Link, optimise and emit; or nothing of it."""
+        """Link, optimise and emit; if deferred, none of these."""
         if self.deferred:
             self._raise_if_finalized()
             self._finalized = True
             return
         self._linking_libraries = _needed(self._linking_libraries)
         super().finalize()
-        # Recursion goes by way of the address of a function, which therefore has to have one.
+        # Recursive calls go by address, so the called functions must be emitted.
         for name in referred_by_name(self._final_module):
             if name in _defining and _defining[name].deferred:
                 _defining[name].get_pointer_to_function(name)
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Address of a function; a library that was to be linked only is then emitted."""
+        """Address of a function; a deferred library is emitted first."""
         if self.deferred:
             self.deferred = self._finalized = False
             self.finalize()
@@ -96,7 +95,7 @@ class UnitLibrary(codegen.JITCodeLibrary):
             super()._optimize_functions(ll_module)
             return
         ll_module.data_layout = self._codegen._data_layout
-        # numba makes the passes anew for each function, also for those that are only declared.
+        # numba would set up the passes anew for each function, even for mere declarations.
         passes, builder = self._codegen._function_pass_manager()
         for function in ll_module.functions:
             if not function.is_declaration:
@@ -110,18 +109,18 @@ class UnitLibrary(codegen.JITCodeLibrary):
 
 
 def referred_by_name(module: Any) -> list[str]:
-    """Functions that a module of LLVM calls by addresses which numba finds while it runs: those that are recursive."""
+    """Functions that an LLVM module calls by addresses that numba resolves at run time: recursive ones."""
     prefix = codegen.RuntimeLinker.PREFIX
     return [v.name.removeprefix(prefix) for v in module.global_variables if v.name.startswith(prefix)]
 
 
 def undefined_symbols(module: Any) -> set[str]:
-    """Names of compiled functions that a module of LLVM uses and does not define."""
+    """Names of compiled functions that an LLVM module uses but does not define."""
     return {f.name for f in module.functions if f.is_declaration and f.name.startswith(_SYMBOL)}
 
 
 def _needed(libraries: list[Any]) -> list[Any]:
-    """Libraries and all that they need to be linked with, users first: LLVM takes only what is referred to already."""
+    """Libraries and all their dependencies in link order, users first: LLVM links only symbols already referred to."""
     order: list[Any] = []
     seen: set[int] = set()
 
@@ -139,17 +138,17 @@ def _needed(libraries: list[Any]) -> list[Any]:
 
 
 def is_nested() -> bool:
-    """Whether the compilation at work belongs to that of another function, whose unit it will be a part of."""
+    """Whether a compilation is in progress, so that a function compiled now becomes a part of its unit."""
     return _Depth.now > 0
 
 
 def install() -> bool:
-    """Leave code generation to units in this process, if this version of numba is one of those tested.
+    """Install deferred code generation in this process, if this version of numba is a tested one.
 
     Returns
     -------
     bool
-        Whether it is; asked again, it says the same and does nothing.
+        Whether it is installed; repeated calls have no further effect.
     """
     if not any(numba.__version__.startswith(version + ".") for version in TESTED):
         return False
@@ -205,7 +204,7 @@ def _spare_wrappers() -> None:
 
 
 def _set_environments(library: UnitLibrary) -> None:
-    """Tell emitted code where the constants of all functions in it are, as numba does for code that it has cached."""
+    """Set the environments (constants) of all functions in emitted code, as numba does for cached code."""
     library._ensure_finalized()
     for variable in library._final_module.global_variables:
         environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
@@ -214,7 +213,7 @@ def _set_environments(library: UnitLibrary) -> None:
 
 
 def _compile_anew_for_python() -> None:
-    """What has been a part of a unit is compiled once more when Python calls it, or asks for its code."""
+    """Make a function that was compiled as a part of a unit be compiled anew when Python calls it or needs its code."""
     compile_, result = dispatcher.Dispatcher.compile, dispatcher.Dispatcher.get_compile_result
 
     def forget_part(self: Any, arguments: tuple[Any, ...]) -> None:

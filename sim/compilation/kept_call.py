@@ -1,7 +1,7 @@
-"""A compiled function that is handed its arguments once: a call then takes none, and makes no memory.
+"""Calls of compiled functions with arguments that are unboxed once, so that a call allocates nothing.
 
-Else each of the arrays in its arguments is taken apart anew in every call, with a header of its own from the heap. The
-arguments lie as compiled code holds them in memory that is kept, and the function is called by its address.
+numba's own calls unbox every array of the arguments anew, with a header on the heap for each. Here the arguments are
+stored in their compiled representation, and the function is called by address.
 """
 
 from collections.abc import Callable
@@ -20,16 +20,16 @@ _ADDRESS, _NUMBER = types.uintp, types.int64
 
 
 class KeptCall:
-    """Call of a compiled function, whose arguments are kept.
+    """A compiled function bound to stored arguments.
 
     Parameters
     ----------
     function : callable
-        Compiled; it returns nothing, and does not keep its arguments.
+        A compiled function that returns nothing and keeps no reference to its arguments.
     before, after : tuple
-        Of its arguments, those before and after the whole number.
+        Its arguments before and after the integer.
     number : Array, optional
-        Where the whole number lies that the function takes between them, shape (1,); by default it takes none.
+        Array, shape (1,), whose value at each call is passed as an integer between them; by default none is passed.
     """
 
     def __init__(
@@ -70,13 +70,13 @@ _keep: Any = intrinsic(_keeping)
 
 @entry_point
 def keep_arguments(arguments: Any) -> int:
-    """Address of a copy of arguments as compiled code holds them, which keeps alive what they refer to."""
+    """Store arguments in their compiled representation; returns the address. The copy keeps their arrays alive."""
     return _keep(arguments)
 
 
 @cache
 def _compiled(function: Any, before: Any, number: Any, after: Any) -> tuple[Any, Any]:
-    """What calls a function with kept arguments, by their address, and what lets them go."""
+    """Functions of the address of stored arguments: one that calls `function` with them, and one that frees them."""
     kinds = (before, number, after)
     together, parts = types.Tuple(kinds), (*before.types, *(_NUMBER for _ in number.types), *after.types)
     function.compile(parts)

@@ -1,8 +1,8 @@
-"""Kernels compiled one by one, kept on disk, and called by their address.
+"""Compilation units of single kernels: laws of force and haptic maps, cached on disk and called by address.
 
-The servo's loop knows the arguments of a kernel, not the kernel (see `controllers.kernel_call`): a run compiles the
-laws of force and the kinds of map that it uses, each once for each version of the code. A unit is compiled from the
-very function that Python calls.
+The servo's loop depends only on the argument types of a kernel, not on the kernel (see `controllers.kernel_call`): a
+run compiles the laws and kinds of map that it uses, each once per version of its code. A unit is compiled from the same
+function that Python calls.
 """
 
 from collections.abc import Callable, Iterable
@@ -21,7 +21,7 @@ IntArray = npt.NDArray[np.int64]
 
 
 def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
-    """Addresses of the kernels that maps need, by kind; 0 for the others. Compiles what has not been yet.
+    """Addresses of the kernels that maps need, by kind; 0 for the others. Compiles those that are not in the cache.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
 
 
 def law_units(program: Program) -> IntArray:
-    """Addresses of the kernels of a field's laws, in their order; likewise."""
+    """Addresses of the kernels of a field's laws, in order. Compiles those that are not in the cache."""
     addresses = [
         _law_unit(kernel).address() if is_kept(kernel) else address_of(kernel, LAW_ARGUMENTS)
         for kernel in program.kernels
@@ -45,17 +45,17 @@ def law_units(program: Program) -> IntArray:
 
 
 def is_kept(kernel: Callable[..., None]) -> bool:
-    """Whether a law's kernel is a unit of its own, kept on disk: not one about a function of the user's."""
+    """Whether a law's kernel is cached on disk as a unit: not if it is a closure over a user-defined function."""
     return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
 
 
 def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
-    """Units that a map needs."""
+    """Compilation units that a map needs."""
     return tuple(_map_unit(needed) for needed in kinds_of(kind, params))
 
 
 def units_of_laws(program: Program) -> tuple[Unit, ...]:
-    """Units that the laws of a field need, each once."""
+    """Compilation units of the laws of a field, except those of user-defined functions."""
     return tuple(_law_unit(kernel) for kernel in program.kernels if is_kept(kernel))
 
 

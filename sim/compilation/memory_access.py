@@ -1,4 +1,4 @@
-"""Numbers in memory by their address, for compiled code."""
+"""Access to numbers in memory by address, for compiled code."""
 
 from typing import Any, cast
 
@@ -11,7 +11,7 @@ from sim.compilation.compiled import entry_point
 
 
 def loader(kind: types.Type) -> Any:
-    """What gives the value at an address, of a kind; arrays in it stay those of whoever keeps them there."""
+    """An intrinsic that loads a value of a given type from an address; arrays in it are shared, not copied."""
 
     def loading(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -25,23 +25,24 @@ def loader(kind: types.Type) -> Any:
 
 
 number_at: Any = loader(types.float64)
-"""The number at an address; nothing checks it."""
+"""The float64 at an address; the address is not checked."""
 int32_at: Any = loader(types.int32)
+"""The int32 at an address; the address is not checked."""
 
 
 def items(array: Array) -> "memoryview[float]":
-    """An array whose items are Python's numbers: to read one makes no object of NumPy's."""
+    """A view of an array whose items are Python floats: reading one creates no NumPy scalar."""
     return cast("memoryview[float]", array.data)
 
 
 @entry_point
 def gather(addresses: IntArray, into: Array) -> None:
-    """Copy numbers, each from its own address, shape (n,) both."""
+    """Copy numbers from individual addresses into an array, shape (n,) both."""
     for i in range(len(addresses)):
         into[i] = number_at(addresses[i])
 
 
 def addresses_of(arrays: list[Array]) -> IntArray:
-    """Where the numbers of arrays lie, one array after the other; the caller keeps them alive."""
+    """Addresses of the numbers of arrays, one array after the other; the caller must keep the arrays alive."""
     found = [array.ctypes.data + array.strides[0] * np.arange(len(array)) for array in arrays]
     return np.concatenate(found).astype(np.int64)

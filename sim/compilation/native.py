@@ -1,7 +1,7 @@
-"""MuJoCo's C functions, callable from compiled code by their symbol.
+"""MuJoCo's C functions, callable from compiled code by symbol.
 
-``numba.types.ExternalFunction`` refers to a function by name, so a loop that calls it is cached on disk and valid in
-the next process; an address held as a global would defeat the cache. Models and data are passed as addresses
+``numba.types.ExternalFunction`` refers to a function by name, so a loop that calls it can be cached on disk and is
+valid in the next process; an address in a global would prevent that. Models and data are passed as addresses
 (``MjModel._address``, ``MjData._address``); arrays as ``array.ctypes``. The signatures are those of mujoco.h.
 """
 
@@ -20,7 +20,7 @@ _void = types.void
 
 
 def _load_library() -> None:
-    """Make the symbols of the wheel's libmujoco known to the just-in-time linker."""
+    """Make the symbols of the libmujoco in the mujoco package known to the just-in-time linker."""
     folder = Path(mujoco.__file__).parent
     libraries = sorted(
         path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)

@@ -1,4 +1,4 @@
-"""`time.perf_counter` for compiled code, in threads that Python does not know: the C function that is behind it."""
+"""`time.perf_counter` for compiled code in threads unknown to Python, by the C function behind it."""
 
 import ctypes
 import time
@@ -12,22 +12,22 @@ from sim.compilation.c_function import call_int
 
 _SHAPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.POINTER(ctypes.c_int64), ctypes.c_void_p)
 _NAMES = "PyTime_PerfCounterRaw", "_PyTime_GetPerfCounterWithInfo"
-"""Of Python's C interface, from 3.13 on and before: each writes nanoseconds to where its first argument points. The
-second one of the older function may be null; the newer one takes none, and does not look at it."""
+"""Functions of Python's C interface, from 3.13 on and before: each writes nanoseconds to its first argument, a pointer.
+The older one takes a second pointer, which may be null; the newer one takes no second argument and ignores it."""
 
 
 @njit
 def seconds(clock: int) -> float:
-    """What the clock at an address tells [s]."""
+    """Time by the clock whose C function is at an address [s]."""
     room = work_integers(1)
     call_int(clock, (room.ctypes.data, 0))
     return room[0] / 1e9
 
 
 def clock_for_c(clock: Callable[[], float]) -> Any:
-    """A clock as a C function, whose address `seconds` takes; to be kept for as long.
+    """A clock as a C function for `seconds`; keep a reference for as long as its address is used.
 
-    `time.perf_counter` is read without the GIL. Any other clock is a function of Python, and holds it.
+    `time.perf_counter` is read without the GIL. Any other clock is a Python function and takes the GIL.
     """
     if clock is time.perf_counter:
         for name in _NAMES:

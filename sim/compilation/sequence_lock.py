@@ -1,7 +1,7 @@
-"""A sequence lock: numbers that one writes and others read, in compiled code of threads or of processes.
+"""A sequence lock in compiled code: one writer and any number of readers, in threads or in processes.
 
-Numbers of eight bytes are written whole; barriers between count and numbers let every reader, on every processor, see
-them in the order in which they are written (Lameter, "Effective synchronization on Linux/NUMA systems", 2005).
+Eight-byte numbers are written atomically; memory barriers between count and numbers make every reader, on every
+processor, see the writes in order (Lameter, "Effective synchronization on Linux/NUMA systems", 2005).
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 
-_TRIES = 20  # so a writer that was stopped in the middle costs its reader microseconds
+_TRIES = 20  # bounds the time that a reader loses to a writer that stopped in the middle of writing to microseconds
 
 
 def _fence(_: Any) -> Any:
@@ -24,12 +24,12 @@ def _fence(_: Any) -> Any:
 
 
 barrier: Any = intrinsic(_fence)
-"""What is written before it is seen before what is written after it."""
+"""Memory barrier: writes before it become visible before writes after it."""
 
 
 @entry_point
 def write_whole(count: IntArray, shared: Array, numbers: Array) -> None:
-    """Write all of `numbers`: the count, shape (1,), is odd meanwhile."""
+    """Write all of `numbers` to `shared`; meanwhile the count, shape (1,), is odd."""
     count[0] += 1
     barrier()
     for i in range(len(numbers)):
@@ -40,14 +40,14 @@ def write_whole(count: IntArray, shared: Array, numbers: Array) -> None:
 
 @entry_point
 def read_whole(count: IntArray, shared: Array, whole: Array, into: Array) -> bool:
-    """Read all; False, and nothing, if a writer was stopped in the middle of them.
+    """Read all numbers consistently; returns False, with `into` unchanged, if a writer stopped while writing.
 
     Parameters
     ----------
     count, shared : array
-        Of `write_whole`.
+        Those of `write_whole`.
     whole, into : Array
-        Of one length; `whole` is for what may not be whole.
+        Scratch, which may be left inconsistent, and result, of the same length.
     """
     for _ in range(_TRIES):
         before = count[0]

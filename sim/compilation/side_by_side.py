@@ -1,8 +1,8 @@
-"""Calls side by side, in processes that give back the memory that they take.
+"""Parallel function calls in worker processes, which release their memory when they end.
 
-One process is started, which reads the calls from its input, forks a worker for each and writes a line for each as it
-is done. So the workers have imported nothing but what is called, and know nothing of a run; nor does it matter how the
-program began that asks for them.
+One process is started that reads the calls from its standard input, forks a worker for each, and writes a line for each
+that is done. So the workers have imported only the modules of the called functions and share no state with the run, and
+the way in which the calling program was started does not matter.
 """
 
 import gc
@@ -16,7 +16,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-_MOST_WORKERS = 4  # each takes 200 MB and more
+_MOST_WORKERS = 4  # each needs 200 MB and more
 _ROOT = Path(__file__).resolve().parents[2]
 
 Call = tuple[Callable[..., object], tuple[Any, ...]]
@@ -25,18 +25,20 @@ Call = tuple[Callable[..., object], tuple[Any, ...]]
 def side_by_side(
     calls: Sequence[Call], done: Callable[[int], None] = lambda number: None, first: Callable[[], None] | None = None
 ) -> None:
-    """Make calls for what they keep. One that fails is left to whoever makes it again, and learns why.
+    """Make calls in parallel for their side effects, such as filling a cache. Failures are ignored.
+
+    A caller that repeats a failed call gets its exception.
 
     Parameters
     ----------
     calls : sequence of (function, arguments)
-        Functions of modules, and what can be pickled.
+        Functions of modules, with arguments that can be pickled.
     done : callable
-        Called with the number of each that ended well.
+        Called with the number of each call that succeeded.
     first : callable or None
         A function of a module that is called once, before the workers are forked.
     """
-    # The same sources as here, wherever this process was started.
+    # Use the sources of this project, whatever the working directory is.
     path = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     with subprocess.Popen(
         [sys.executable, "-P", "-m", __name__],
@@ -52,7 +54,7 @@ def side_by_side(
 
 
 def processors() -> int:
-    """How many calls are made at a time, at most."""
+    """Largest number of calls that are made at a time."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
     return min(_MOST_WORKERS, available)
 
@@ -60,7 +62,7 @@ def processors() -> int:
 def _made(numbered: tuple[int, Call]) -> tuple[int, bool]:
     number, (function, arguments) = numbered
     try:
-        with redirect_stdout(sys.stderr):  # the output is for numbers
+        with redirect_stdout(sys.stderr):  # standard output is reserved for the numbers of finished calls
             function(*arguments)
     except Exception:
         return number, False
@@ -72,7 +74,7 @@ def _work(calls: Sequence[Call], first: Callable[[], None] | None) -> None:
     context = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
     if first is not None:
         first()
-    gc.freeze()  # what is imported stays shared between the workers
+    gc.freeze()  # keeps the pages of imported modules shared between the workers
     with context.Pool(min(len(calls), processors()), maxtasksperchild=1) as pool:
         for number, well in pool.imap_unordered(_made, enumerate(calls)):
             if well:

@@ -1,8 +1,8 @@
-"""Compiled units on disk, each in a file named by its key: found again as long as nothing that it is made of changes.
+"""The cache of compiled units on disk, one file per unit, named by the unit's key (`sim.compilation.unit_key`).
 
-A file is written whole under another name and then renamed, so that of several processes the last one wins and none
-reads a half; it carries a hash of its contents, and one that is cut short, changed or not understood is not believed.
-Units that nobody has asked for in a long time are removed.
+A file is written completely under another name and then renamed, so that concurrent writers do not conflict and no
+process reads a partial file. It carries a hash of its contents; a file that is truncated, changed or cannot be loaded
+is ignored. Units that were not used for a long time are removed.
 """
 
 # pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
@@ -29,8 +29,8 @@ from sim.compilation.unit_key import unit_key
 
 _SUFFIX = ".unit"
 _HASH = hashlib.sha256().digest_size
-_FORGOTTEN = 60 * 86400.0  # [s] after which a unit that was not loaded is removed
-_LOOKED_AT = 86400.0  # [s] how exactly the time of loading is kept
+_FORGOTTEN = 60 * 86400.0  # [s] after which an unused unit is removed
+_LOOKED_AT = 86400.0  # [s] resolution of the stored time of last use
 
 
 def cache_folder() -> Path:
@@ -40,14 +40,14 @@ def cache_folder() -> Path:
 
 
 class UnitCache(_Cache):
-    """The units of one function, as a dispatcher of numba's asks for them: one for each types of arguments.
+    """The cache of a numba dispatcher: the units of one function, one per tuple of argument types.
 
     Parameters
     ----------
     function : callable
-        As Python sees it.
+        The Python function.
     options : dict
-        Of its compilation.
+        Options of its compilation.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]):
@@ -59,18 +59,18 @@ class UnitCache(_Cache):
         return str(cache_folder())
 
     def path(self, signature: Any) -> Path:
-        """File of the unit for a signature or a tuple of types, whether it is there or not.
+        """Path of the unit for a signature or a tuple of types, whether it exists or not.
 
         Raises
         ------
         UnknownIngredient
-            If no key can be made of it.
+            If no key can be computed.
         """
         arguments: Iterable[Any] = sigutils.normalize_signature(signature)[0]
         return cache_folder() / f"{self._name()}-{unit_key(self._function, arguments, self._options)}{_SUFFIX}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled unit, or None."""
+        """Load a compiled unit; None if it is not in the cache."""
         if not self._enabled or is_nested():
             return None
         target_context.refresh()
@@ -80,13 +80,13 @@ class UnitCache(_Cache):
             return None
         try:
             found = CompileResult._rebuild(target_context, *pickle.loads(content))
-        except Exception:  # what a file holds that is of our making and no good may raise anything
+        except Exception:  # unpickling an unusable file may raise anything
             return None
         _mark_used(path)
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a unit; a folder that cannot be written to is done without."""
+        """Save a compiled unit; a folder that cannot be written to is ignored."""
         if not self._enabled or is_nested():
             return
         if data.lifted or data.library.has_dynamic_globals or referred_by_name(data.library._final_module):
@@ -99,11 +99,11 @@ class UnitCache(_Cache):
             remove_forgotten(path.parent)
 
     def enable(self) -> None:
-        """Use what is kept, and keep more."""
+        """Switch the cache on, for loading and saving."""
         self._enabled = True
 
     def disable(self) -> None:
-        """Do neither."""
+        """Switch the cache off, for loading and saving."""
         self._enabled = False
 
     def flush(self) -> None:
@@ -116,7 +116,7 @@ class UnitCache(_Cache):
 
 
 def is_sound(path: Path) -> bool:
-    """Whether a file is there, and whole."""
+    """Whether a file exists and its hash is right."""
     return _read(path) is not None
 
 

@@ -1,9 +1,9 @@
-"""Key of a compiled unit: a hash of what its code is made of, and of nothing else.
+"""The cache key of a compiled unit: a hash of everything that its code depends on, and of nothing else.
 
-A walk from the unit's function over the globals and closures that it really names: functions by their instructions,
-constants by their value, types by their fields. Comments, docstrings, lines and folders are no part of it; so a unit is
-found again after any change that it does not depend on, and from another copy of the sources. What the walk does not
-know how to describe is an error: it might be something that the code depends on.
+The key is computed by a walk from the unit's function over the globals and closure variables that it names: functions
+count by their bytecode, constants by their value, types by their fields. Comments, docstrings, line numbers and folders
+do not count, so a unit is found again after a change that it does not depend on, and from another copy of the sources.
+A value of unknown kind is an error, since the code might depend on it.
 """
 
 # pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
@@ -33,7 +33,7 @@ from sim.errors import SimError
 
 Function = Callable[..., Any]
 
-# numba's settings that change the code; the others are of caches, threads and printing.
+# numba's settings that affect the generated code; the others concern caches, threads and printing.
 _SETTINGS = (
     "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS",
     "LLVM_REFPRUNE_FLAGS", "ENABLE_AVX", "USING_SVML", "DISABLE_JIT", "USE_LEGACY_TYPE_SYSTEM",
@@ -46,7 +46,7 @@ _PLAIN_TYPES = (
 
 
 class UnknownIngredient(SimError):
-    """A function refers to something of which a key cannot be made."""
+    """A function refers to a value that a key cannot be computed from."""
 
 
 class UnknownName(SimError):
@@ -59,21 +59,21 @@ def unit_key(function: Function, arguments: Iterable[Any], options: dict[str, An
     Parameters
     ----------
     function : callable
-        As Python sees it, not the dispatcher.
+        The Python function, not the dispatcher.
     arguments : iterable of numba types
-        Of its arguments.
+        Types of its arguments.
     options : dict
-        Of its compilation, a dispatcher's `targetoptions`.
+        Options of its compilation, a dispatcher's `targetoptions`.
 
     Raises
     ------
     UnknownIngredient
-        If something that it reaches is of an unknown kind.
+        If a value that it reaches is of an unknown kind.
     """
     digest = hashlib.sha256(repr((_platform(), [describe_type(argument) for argument in arguments])).encode())
     seen: dict[int, int] = {}
     waiting: list[tuple[Function, dict[str, Any]]] = [(function, options)]
-    # The place of a function in the walk stands for it, so two of one name are told apart.
+    # A function reached again is denoted by its place in the walk, which distinguishes functions of the same name.
     while waiting:
         reached, its_options = waiting.pop()
         if id(reached) in seen:
@@ -88,7 +88,7 @@ def unit_key(function: Function, arguments: Iterable[Any], options: dict[str, An
 
 
 def reached_functions(function: Function) -> list[Function]:
-    """All functions that are compiled into a unit of this one, itself first."""
+    """All functions that are compiled into a unit of a given function, which comes first."""
     found, waiting = {id(function): function}, [function]
     while waiting:
         for other, _ in _described(waiting.pop())[1]:
@@ -100,14 +100,14 @@ def reached_functions(function: Function) -> list[Function]:
 
 @cache
 def _platform() -> tuple[object, ...]:
-    """Versions, processor and settings that compiled code is for."""
+    """Versions, processor and settings that compiled code depends on."""
     settings = tuple((name, repr(getattr(config, name, None))) for name in _SETTINGS)
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__, mujoco.__version__)
     return versions, cpu_target.target_context.codegen().magic_tuple(), settings, _generation()
 
 
 def _generation() -> str:
-    """How code is generated: by numba as it is, or by `deferred_codegen`, of which the hash is taken."""
+    """The code generator: numba's own, or `deferred_codegen`, by the hash of its source file."""
     return hashlib.sha256(Path(deferred_codegen.__file__).read_bytes()).hexdigest() if install() else "numba"
 
 
@@ -116,7 +116,7 @@ _Others = list[tuple[Function, dict[str, Any]]]
 
 @cache
 def _described(function: Function) -> tuple[bytes, _Others]:
-    """A function by itself, and the functions it refers to with their options, in order."""
+    """Description of a function without its callees, and the functions it refers to with their options, in order."""
     others: _Others = []
     name = f"{function.__module__}.{function.__qualname__}"
     items: list[object] = [name, _code(function.__code__, name)]
@@ -130,7 +130,7 @@ def _described(function: Function) -> tuple[bytes, _Others]:
 
 
 def _instructions(code: python_types.CodeType) -> Iterator[tuple[int, int]]:
-    """Opcodes with their arguments, as `dis` reads them; this takes a sixth of its time, which a start waits for."""
+    """Opcodes with their arguments, as by `dis` but in a sixth of its time, which matters at the start of a run."""
     raw, above = code.co_code, 0
     for opcode, low in zip(raw[::2], raw[1::2], strict=True):
         argument = above | low
@@ -142,7 +142,7 @@ def _instructions(code: python_types.CodeType) -> Iterator[tuple[int, int]]:
 
 
 def _code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
-    """Instructions with what they name: not where they are written, nor a docstring, which none of them loads."""
+    """Description of bytecode with its constants and names; without line numbers and docstring."""
     instructions: list[tuple[int, object]] = []
     for opcode, argument in _instructions(code):
         if opcode in _CONSTANTS:
@@ -162,7 +162,8 @@ _GLOBALS = {dis.opmap["LOAD_GLOBAL"]: 1, dis.opmap["LOAD_NAME"]: 0}
 _ATTRIBUTES = {dis.opmap["LOAD_ATTR"]: 1} if sys.version_info >= (3, 12) else {
     dis.opmap["LOAD_ATTR"]: 0, dis.opmap["LOAD_METHOD"]: 0,
 }  # fmt: skip
-"""Opcodes that name a global, and an attribute of what was loaded last; and the bits of their argument that do not."""
+"""Opcodes that load a global, and an attribute of the last loaded value; the values are the number of low bits of the
+argument that are not part of the name's index."""
 _NOTHING = frozenset(dis.opmap[opcode] for opcode in ("CACHE", "PUSH_NULL") if opcode in dis.opmap)
 
 
@@ -181,7 +182,7 @@ def _literal(value: object, name: str) -> object:
 
 
 def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
-    """Names of globals, each with the attributes that are taken of it one after the other."""
+    """Names of globals, each with the chain of attributes that is taken of it."""
     found: set[tuple[str, ...]] = set()
     chain: tuple[str, ...] = ()
     for opcode, argument in _instructions(code):
@@ -209,7 +210,7 @@ def _global(function: Function, chain: tuple[str, ...], others: _Others) -> obje
         return "builtin"
     value = function.__globals__[chain[0]]
     for attribute in chain[1:]:
-        # Attributes of anything but a module or a class belong to the value, which is described as a whole.
+        # Only attributes of modules and enumerations are followed; any other value is described as a whole.
         if not isinstance(value, python_types.ModuleType) and not _is_enumeration(value):
             break
         value = getattr(value, attribute)
@@ -221,7 +222,7 @@ def _is_enumeration(value: object) -> bool:
 
 
 def _value(value: Any, name: str, others: _Others) -> object:
-    """What a global, a closure's variable, a default or an option is, so that another one differs."""
+    """Description of a global, closure variable, default or option that differs for different values."""
     if isinstance(value, Dispatcher):
         others.append((value.py_func, value.targetoptions))
         return "compiled function"
@@ -264,7 +265,7 @@ def _items(options: dict[str, Any]) -> list[object]:
 
 
 def _class(kind: type, name: str) -> tuple[object, ...]:
-    """A class: one of a library by its name; of ours those that compiled code can do something with."""
+    """Description of a class: of a library by name; of this project only NamedTuples and exceptions."""
     identity = (kind.__module__, kind.__qualname__)
     fields = getattr(kind, "_fields", None)
     if fields is not None:
@@ -275,9 +276,9 @@ def _class(kind: type, name: str) -> tuple[object, ...]:
 
 
 def _is_library(value: object) -> bool:
-    """Whether something is a module, a class or a function of a library, whose version is in the key already.
+    """Whether a value is a module, class or function of a library, whose version is in the key already.
 
-    An instance of a library's class is none of them, nor is a method of one: what they hold is nobody's version.
+    Instances of a library's classes and their bound methods are not: their state is not determined by the version.
     """
     if isinstance(value, python_types.ModuleType):
         name: object = value.__name__
@@ -307,12 +308,12 @@ def _overloads(function: Function) -> Iterator[Any]:
 
 
 def describe_type(kind: Any) -> object:
-    """A type of numba's with the names of the fields of its tuples, which its own name lacks.
+    """Description of a numba type, including the field names of tuples, which the type's own name lacks.
 
     Raises
     ------
     UnknownIngredient
-        If it is of an unknown kind.
+        If the type is of an unknown kind.
     """
     if isinstance(kind, types.NamedTuple | types.NamedUniTuple):
         inner = [describe_type(field) for field in kind.types]

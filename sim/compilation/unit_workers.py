@@ -1,4 +1,4 @@
-"""Units compiled side by side, in processes that have imported nothing but the units' modules."""
+"""Parallel compilation of units, in processes that import only the units' modules."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,20 +12,20 @@ from sim.compilation.units import Unit, unit_function
 
 
 def missing_units(units: Sequence[Unit]) -> tuple[Unit, ...]:
-    """Those that are not kept, the largest first."""
+    """The units that are not in the cache, the largest first."""
     missing = [unit for unit in dict.fromkeys(units) if not unit.is_kept()]
     return tuple(sorted(missing, key=_size, reverse=True))
 
 
 def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda unit: None) -> None:
-    """Compile units, which are then kept. One that cannot be is left to the process that will call it.
+    """Compile units into the cache. A unit that fails is left to the process that will call it.
 
     Parameters
     ----------
     units : sequence of Unit
-        Those that are not kept are compiled.
+        Those that are not in the cache are compiled.
     done : callable
-        Called after each that was compiled.
+        Called with each unit that was compiled.
     """
     missing = missing_units(units)
     if not missing:
@@ -39,7 +39,7 @@ def _size(unit: Unit) -> int:
 
 
 def _type_common_parts() -> None:
-    """Compile what nearly all units have in them of numba's own, so that the workers begin with it."""
+    """Compile functions of numba that nearly all units use, before the workers are forked, so that they share them."""
 
     def assign(target: Any, source: Any) -> Any:
         work, rows = np.empty(3), np.zeros((2, 3))

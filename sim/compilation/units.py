@@ -1,4 +1,4 @@
-"""Units of compiled code: a function and the types of its arguments, by which any process can find or compile it."""
+"""Compilation units: a function and its argument types, by which any process can find it in the cache or compile it."""
 
 import importlib
 from collections.abc import Callable
@@ -13,14 +13,14 @@ from sim.errors import SimError
 
 
 class Unit(NamedTuple):
-    """A function compiled by itself, with all that it calls; may be sent to another process.
+    """A function that is compiled separately, together with all that it calls by name; may be sent to another process.
 
     Attributes
     ----------
     module, name : str
-        Where the function is.
+        Module and name of the function.
     arguments : tuple of numba types
-        Of its arguments; it returns nothing.
+        Types of its arguments; it returns nothing.
     """
 
     module: str
@@ -29,27 +29,27 @@ class Unit(NamedTuple):
 
     @classmethod
     def of(cls, function: Callable[..., None], *arguments: Any) -> "Unit":
-        """Unit of a function of a module, which may be one that is compiled for others already."""
+        """Unit of a function of a module; the function may also be a part of other units."""
         return cls(function.__module__, function.__qualname__, arguments)
 
     def is_kept(self) -> bool:
-        """Whether it is on disk, compiled from what it would be compiled from now."""
+        """Whether the cache holds it, compiled from the present code."""
         kept: Any = unit_function(self.module, self.name)
         return is_sound(kept._cache.path(self.arguments))
 
     def load(self) -> Any:
-        """Result of its compilation, which happens if it is not kept."""
+        """Its compilation result, from the cache or compiled now."""
         return unit_function(self.module, self.name).get_compile_result(types.void(*self.arguments))
 
     def address(self) -> int:
-        """Where its code is in this process, to be called with exactly these types (see `controllers.kernel_call`)."""
+        """Address of its code in this process, to be called with exactly these types (`controllers.kernel_call`)."""
         compiled = self.load()
         return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 
-@cache  # the code of what is in it outlives every address
+@cache  # keeps the compiled code alive, so that addresses stay valid
 def unit_function(module: str, name: str) -> Any:
-    """The function compiled for calls from Python, and kept; from its own source, as every unit of it is.
+    """The dispatcher of a unit's function, with `UnitCache` as its cache.
 
     Raises
     ------

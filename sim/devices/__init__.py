@@ -1,1 +1,1 @@
-"""Devices that the loop runs with: the simulated Phantom, a replayed hand, and real ones by their drivers."""
+"""Haptic devices for the servo loop: the simulated Phantom, a replayed hand, and drivers of real devices."""

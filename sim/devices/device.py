@@ -1,12 +1,12 @@
-"""What a device is to the loop, chosen by type when the loop is compiled.
+"""The device interface of the servo loop; the implementation is chosen by type when the loop is compiled.
 
 A device is a NamedTuple with arrays `hand` (15,), `torque` (3,), `faults` and `force` (3,), and three kernels:
 
-- `sense(device, t)` fills `hand` at time t [s], and latches in `faults` what cannot be a reading;
+- `sense(device, t)` fills `hand` at time t [s], and latches an implausible reading in `faults`;
 - `actuate(device, force)` commands a force on the hand [N], in H;
-- `advance(device, plant, t, replay, applied)` lets a servo period pass in the world.
+- `advance(device, plant, t, replay, applied)` steps the world by one servo period.
 
-To add one: write it and its kernels in a file of its own, and name them here.
+To add a device, write its type and kernels in a file of their own, and list them in the tables here.
 """
 
 from typing import Any, TypeAlias
@@ -35,7 +35,7 @@ _ADVANCE: dict[type, Any] = {
 
 
 def sense(device: DeviceState, t: float) -> None:
-    """Fill the device's hand with what it tells at time t [s]."""
+    """Fill the device's hand vector with its reading at time t [s]."""
     _SENSE[type(device)](device, t)
 
 
@@ -45,14 +45,14 @@ def actuate(device: DeviceState, force: Array) -> None:
 
 
 def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: Array) -> None:
-    """Let one servo period pass in the world; the user's torques are written to `applied`, or read in a replay."""
+    """Step the world by one servo period; the user's torques are written to `applied`, or read from it in a replay."""
     _ADVANCE[type(device)](device, plant, t, replay, applied)
 
 
 _INLINED: Any = {"forceinline": True}
 
 
-# A call would hand over all the arrays of a device once more, number by number.
+# Inlined: a call would pass every pointer, shape and stride of the device's arrays once more.
 @overload(sense, strict=False, jit_options=_INLINED)
 def _sense(device: Any, t: Any) -> Any:
     return _SENSE[device.instance_class].py_func
@@ -70,7 +70,7 @@ def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
 
 @entry_point
 def read_device(device: DeviceState, t: float) -> None:
-    """`sense`, from Python: before the loop's tick, which then does not sense again."""
+    """`sense`, from Python, before the loop's tick of the same time t, which then does not sense again."""
     sense(device, t)
 
 
@@ -82,16 +82,16 @@ def write_device(device: DeviceState, plant: Plant, t: float, force: Array, appl
 
 
 def device_units(device: DeviceState) -> tuple[Unit, ...]:
-    """Units of compiled code that a device calls by their address."""
+    """Compilation units that a device calls by address."""
     return device.units() if isinstance(device, SimulatedPhantom) else ()
 
 
 def link_device(device: DeviceState) -> None:
-    """Find the addresses that a device calls; compiles what is not kept."""
+    """Set the addresses that a device calls; compiles the units that are not in the cache."""
     if isinstance(device, SimulatedPhantom):
         device.link()
 
 
 def ticks_of(device: DeviceState) -> int | None:
-    """How many ticks a device has in it; None where that is not known beforehand."""
+    """Number of ticks that a device can deliver; None if unlimited."""
     return len(device.rows) if isinstance(device, ReplayedHand) else None

@@ -1,8 +1,8 @@
-"""Force Dimension's DHD: omega, delta, sigma and Falcon devices through their vendor's library.
+"""Driver for Force Dimension devices (omega, delta, sigma, Falcon) through the vendor's DHD library.
 
-Positions are in metres and forces in newtons, in axes with x towards the user, y to the right and z up, from the middle
-of the workspace, which is taken for H's origin. The library compensates for the device's weight by itself. Signatures
-are those of the SDK's ``dhdc.h``. In the loop compiled code calls the library's functions by their address.
+Positions are in metres and forces in newtons, in axes with x towards the user, y to the right and z up; their origin,
+the middle of the workspace, is taken as H's origin. The library compensates for gravity itself. Signatures are those of
+the SDK's ``dhdc.h``. In the loop, compiled code calls the library's functions by address.
 """
 
 import ctypes
@@ -27,13 +27,13 @@ from sim.devices.virtual_arm import place_stylus, pose_fault, tip_force
 from sim.errors import SimError
 
 LARGEST = 8.5
-"""Largest force that is sent [N]: the Premium's at its stall. Falcon, omega and delta give 8 to 20 and more."""
+"""Largest force that is sent [N]: the stall force of the Premium. Falcon, omega and delta give 8 to 20 N and more."""
 
-_SIGNS = np.array([-1.0, -1.0, 1.0])  # the library's axes, D, in H
-_TIME_GUARD = 1  # nothing new since the last call
-_WATCHDOG_UNIT = 125e-6  # s
+_SIGNS = np.array([-1.0, -1.0, 1.0])  # diagonal of the rotation from the library's axes D to H
+_TIME_GUARD = 1  # result of a call with nothing new since the last one
+_WATCHDOG_UNIT = 125e-6  # [s]
 _ERROR_COM, _ERROR_TIMEOUT, _ERROR_NO_DEVICE = 2, 7, 5
-_UNKNOWN = -1.0  # whether the motors are on: they are told to be off again
+_UNKNOWN = -1.0  # state of the motors not known: the next command switches them again
 _FORCE_NOT_FINITE = int(Fault.FORCE_NOT_FINITE)
 
 _double_p = ctypes.POINTER(ctypes.c_double)
@@ -62,29 +62,29 @@ DHD = VendorLibrary(
 _IN_LOOP = "dhdGetPositionAndOrientationFrame", "dhdGetButton", "dhdSetForce", "dhdEnableForce"
 _GET_POSE, _GET_BUTTON, _SET_FORCE, _ENABLE_FORCE = range(len(_IN_LOOP))
 TOLD_RESULT, TOLD_FAULT, TOLD_VALUE, TOLD_ENABLE, TOLD_ENABLED, TOLD_SIZE = range(6)
-"""What the library returned, negative for an error; what is wrong with a pose or a torque, with its value; 1 to switch
-the motors on, and whether they were."""
+"""Places in `DhdMemory.told`: the library's result, negative for an error; the fault of a pose or a torque, with its
+value; 1 if the motors are to be on; 1 if they are on."""
 
 
 class DhdMemory(NamedTuple):
-    """A device as compiled code holds it.
+    """The state of a device in compiled code.
 
     Attributes
     ----------
     functions : IntArray
-        Addresses of the library's functions.
+        Addresses of the library's functions, in the order of `_IN_LOOP`.
     number : int
-        Of the device.
+        The device's number in the library.
     pose : Array
-        As the library tells it: tip [m], and the stylus's frame row by row, shape (12,).
+        Pose as the library returns it: tip [m], and the rotation matrix of the stylus by rows, shape (12,).
     frame : Array
         The stylus's orientation in H, shape (3, 3).
     reading : Array
-        The last one that can be, of `READING_SIZE`.
+        The last valid reading, of `READING_SIZE`.
     torque : Array
-        To be commanded [N m], shape (3,).
+        Joint torques to be commanded [N m], shape (3,).
     told : Array
-        See `TOLD_RESULT`.
+        Results of the kernels, see `TOLD_RESULT`.
     """
 
     functions: IntArray
@@ -116,7 +116,7 @@ def take_pose(dhd: DhdMemory) -> None:
 
 @entry_point
 def send_force(dhd: DhdMemory) -> None:
-    """Tell the library the force that the torques stand for; none where the motors are off, or one is not finite."""
+    """Send the library the tip force equivalent to the torques; zero if the motors are off or a torque not finite."""
     told, reading, torque, number = dhd.told, dhd.reading, dhd.torque, np.int32(dhd.number)
     told[TOLD_VALUE] = first_not_finite(torque)
     told[TOLD_FAULT] = 0.0 if told[TOLD_VALUE] == 0.0 else _FORCE_NOT_FINITE
@@ -141,12 +141,12 @@ class DhdDevice:
     library : ctypes.CDLL
         `DHD`, loaded.
     clock : callable
-        Seconds, which the readings carry.
+        Clock that timestamps the readings [s].
 
     Raises
     ------
     SimError
-        If there is no device.
+        If no device can be opened.
     """
 
     def __init__(self, library: ctypes.CDLL, clock: Callable[[], float] = time.perf_counter):
@@ -178,12 +178,12 @@ class DhdDevice:
         return DriverFault(Fault.UNPLUGGED if gone else Fault.DEVICE_REPORTED, code, self._words())
 
     def read(self, reading: Array, timeout: float) -> bool:
-        """See `sim.devices.driver.Driver.read`; the library waits for nothing, so this neither.
+        """See `sim.devices.driver.Driver.read`; the library does not block, so `timeout` is unused.
 
         Raises
         ------
         DriverFault
-            If the library reported an error, or the tip is where no Phantom's can be.
+            If the library reported an error, or the Phantom cannot reach the pose.
         """
         told, numbers = self._told, self._numbers
         self._take()
@@ -200,12 +200,12 @@ class DhdDevice:
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
-        """See `sim.devices.driver.Driver.write`: the force at the tip that the torques stand for.
+        """See `sim.devices.driver.Driver.write`; the library is sent the equivalent force at the tip.
 
         Raises
         ------
         DriverFault
-            If the library reported an error, or a torque is not finite: then the motors are off.
+            If the library reported an error, or a torque is not finite; the motors are then switched off.
         """
         told = self._told
         np.copyto(self._memory.torque, torque)
@@ -217,12 +217,12 @@ class DhdDevice:
             raise self._fault()
 
     def let_go(self) -> None:
-        """Motors off, at once; never raises."""
+        """Switch the motors off at once; never raises."""
         np.copyto(self._memory.torque, self._off)
         self._told[TOLD_ENABLE], self._told[TOLD_ENABLED] = 0.0, _UNKNOWN
         self._send()
 
     def close(self) -> None:
-        """Let go, and give the device back."""
+        """Switch the motors off and close the device."""
         self.let_go()
         self._dhd.dhdClose(self._id)

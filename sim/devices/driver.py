@@ -1,11 +1,11 @@
-"""What stands behind an `Exchange`: a driver that reads one real device, and commands it.
+"""The driver interface behind an `Exchange`: it reads one real device and commands its motors.
 
-A driver knows its device's transport and units; it knows no field, map, limit or clock of ours. The loop of the
-servo is
+A driver knows the transport and units of its device; it knows no field, map, limiter or clock of the servo. A servo
+period is
 
-    driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(command)
+    driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(torque, enable)
 
-Whatever cannot be a reading raises `DriverFault`; the servo latches it, lets go, and reports why.
+An implausible reading raises `DriverFault`; the servo latches it, switches the motors off, and reports the reason.
 """
 
 import math
@@ -20,16 +20,16 @@ from sim.errors import SimError
 
 
 class DriverFault(SimError):
-    """A device that can no longer be relied on.
+    """A fault of a device, after which it is no longer driven.
 
     Parameters
     ----------
     fault : Fault
-        Which.
+        Kind of fault.
     value : float
-        What was seen, in the fault's unit.
+        The offending value, in the fault's unit.
     detail : str
-        What the device says of it, where it has words.
+        The device's own message, if it has one.
     """
 
     def __init__(self, fault: Fault, value: float = 0.0, detail: str = ""):
@@ -38,23 +38,23 @@ class DriverFault(SimError):
 
 
 class DeviceIdentity(NamedTuple):
-    """Who a device is, and what it can do.
+    """Identity and capabilities of a device.
 
     Attributes
     ----------
     name, transport, serial, firmware : str
-        For people; empty where the device does not tell.
+        For display; empty where the device does not report them.
     forces : bool
         Whether it has motors.
     watchdog : bool
-        Whether its firmware lets go by itself when commands stay out. One without is announced as such.
+        Whether its firmware switches the motors off when commands stop. The user is told where there is none.
     calibrated : bool
-        Whether its encoders know their zero.
+        Whether the zero of its encoders is known.
     power_up : int
-        Another number after each power-up, where the device tells one, and else 0: encoders that count from where they
-        wake up have lost their zero then.
+        A number that differs after each power-up, or 0 if the device reports none: incremental encoders have then lost
+        their zero.
     own_weight : bool
-        Whether it carries its own weight: its driver takes the Phantom's off the torques again.
+        Whether the device compensates for its own weight: its driver then removes the Phantom's from the torques.
     """
 
     name: str
@@ -69,16 +69,16 @@ class DeviceIdentity(NamedTuple):
 
 
 TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, JITTER, STALENESS, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7, 8, 9
-"""Motors' temperatures [°C] (NaN where there is no sensor), last round trip [s], readings lost, read and refused,
-the arrival's jitter [s] (RFC 3550, section 6.4.1), and how much later than the quickest the last one came [s].
-What a transport cannot tell is NaN."""
+"""Places in a driver's telemetry: motor temperatures (3) [°C], last round trip [s], numbers of readings lost, read and
+refused, jitter of the arrivals [s] (RFC 3550, section 6.4.1), and latency of the last reading over the least one [s].
+A value that a transport or a device cannot give is NaN."""
 
 DRIFT = 2e-4
-"""How fast two clocks may go apart: 100 ppm each, which quartz keeps; in ten minutes that is 0.12 s."""
+"""Largest relative drift of two clocks: 100 ppm each, which quartz keeps; in ten minutes that is 0.12 s."""
 
 
 def fresh_telemetry() -> Array:
-    """Telemetry of a device that has told nothing yet: nothing read, lost or refused, all else not known."""
+    """Telemetry of a device before its first reading: nothing read, lost or refused, all else NaN."""
     telemetry = np.full(TELEMETRY_SIZE, np.nan)
     telemetry[[LOST, READ, BAD]] = 0.0
     return telemetry
@@ -86,11 +86,11 @@ def fresh_telemetry() -> Array:
 
 @njit
 def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
-    """A reading came at `now` that was made at `made` [s], each by its own clock: jitter and staleness are written.
+    """Update jitter and staleness for a reading made at `made` by the device's clock, received at `now` [s].
 
-    The two clocks began at different times and drift: only how their difference changes means something, and the
-    quickest reading is forgotten at the rate of `DRIFT`. `clocks` (3,) are the last difference of the clocks, the
-    least, and when the last reading came; its first is NaN before the first reading of a clock.
+    The two clocks have different origins and drift, so only changes of their difference are used, and the least
+    difference rises at the rate of `DRIFT`. `clocks` (3,) holds the last difference of the clocks (NaN before the first
+    reading of a device's clock), the least difference, and when the last reading came.
     """
     delay = now - made
     if math.isnan(clocks[0]):
@@ -108,16 +108,16 @@ class Driver(Protocol):
     Attributes
     ----------
     identity : DeviceIdentity
-        Who the device is.
+        Identity and capabilities of the device.
     telemetry : Array
-        See `TEMPERATURE`, of `TELEMETRY_SIZE`; rewritten in place by `read`.
+        See `TEMPERATURE`, of `TELEMETRY_SIZE`; updated in place by `read`.
     """
 
     identity: DeviceIdentity
     telemetry: Array
 
     def read(self, reading: Array, timeout: float) -> bool:
-        """Write the newest reading, its number last (`sim.devices.exchange.READING_SEQUENCE`), shape (9,).
+        """Write the newest reading, shape (9,) (`sim.devices.exchange.READING_SEQUENCE`).
 
         Returns
         -------
@@ -127,12 +127,12 @@ class Driver(Protocol):
         Raises
         ------
         DriverFault
-            If the device is gone, or told what cannot be.
+            If the device is gone, or its reading is impossible.
         """
         ...
 
     def write(self, torque: Array, enable: bool) -> None:
-        """Command the torques of the Phantom's joints θ1…θ3 [N m], shape (3,); motors off where not `enable`.
+        """Command torques of the Phantom's joints θ1…θ3 [N m], shape (3,), or switch the motors off if not `enable`.
 
         Raises
         ------
@@ -142,9 +142,9 @@ class Driver(Protocol):
         ...
 
     def let_go(self) -> None:
-        """Motors off, at once; never raises."""
+        """Switch the motors off at once; never raises."""
         ...
 
     def close(self) -> None:
-        """Let go, and give the device back."""
+        """Switch the motors off and close the device."""
         ...

@@ -1,9 +1,9 @@
-"""A device behind two arrays: a driver writes readings into one and takes commands from the other.
+"""A device as two shared arrays: a driver writes readings into one and takes commands from the other.
 
-This is the seam for hardware: the loop knows the arrays, not what is behind them. The driver, in Python or C, writes
-`reading` before each tick, raises its sequence number last, and applies the torques of `command` for as long as
-`valid_torque` allows. Angles and torques are the Phantom's joints': kinematics, velocity filter, weight and peak torque
-are the simulated device's own.
+This is the hardware interface: the loop knows only the arrays. The driver, in Python or C, writes `reading` before each
+tick, its sequence number last, and applies the torques of `command` for as long as `valid_torque` allows. Angles and
+torques are those of the Phantom's joints; kinematics, velocity filter, gravity compensation and peak torque are the
+same as for the simulated device.
 """
 
 from typing import NamedTuple
@@ -21,28 +21,30 @@ from sim.world.shown_phantom import ShownPhantom, show_angles, shown_phantom
 from sim.world.world import World
 
 READING_SEQUENCE, READING_CLOCK, READING_SWITCH, READING_THETA, READING_GIMBAL, READING_SIZE = 0, 1, 2, 3, 6, 9
-"""Number of the reading (from 1 on), the driver's clock [s], 1 while the switch is pressed, θ1…θ3 and gimbal [rad]."""
+"""Places in a reading: its number (from 1 on), the driver's clock [s], 1 while the switch is pressed, θ1…θ3 and the
+gimbal's three angles [rad]."""
 COMMAND_SEQUENCE, COMMAND_CLOCK, COMMAND_TORQUE, COMMAND_FORCE, COMMAND_FAULT, COMMAND_SIZE = 0, 1, 2, 5, 8, 9
-"""Number and clock of the reading that is answered, joint torques [N m], force in H [N], code of the fault or 0."""
+"""Places in a command: number and clock of the reading that it answers, joint torques [N m], force in H [N], code of
+the latched fault or 0."""
 
 
 class Exchange(NamedTuple):
-    """A device behind two arrays, as the loop holds it.
+    """A device as two shared arrays, with the state that the loop keeps for it.
 
     Attributes
     ----------
     reading, command : Array
         Shared with the driver (see `READING_SEQUENCE`, `COMMAND_SEQUENCE`), shapes (9,) and (9,).
     smoothing, silence : float
-        The velocity filter's share of the old, and how long a command is valid [s].
+        Share of the old value that the velocity filter keeps, and how long a command is valid [s].
     memory : Array
-        Of `sim.world.encoders.take_reading`.
+        State of `sim.world.encoders.take_reading`.
     gimbal : Array
-        Last gimbal angles taken [rad], shape (3,).
+        Last valid gimbal angles [rad], shape (3,).
     shown : ShownPhantom
-        The world's linkage, which goes where the device is.
+        The linkage in the world, which is shown in the device's configuration.
     hand, torque, faults, force : Array
-        As of every device; who holds it is not known, so the force is zero.
+        As for every device; the user's force is not known, so it is zero.
     """
 
     reading: Array
@@ -59,7 +61,7 @@ class Exchange(NamedTuple):
 
     @property
     def user_torques(self) -> int:
-        """Columns of zeros where a simulated hand's torques are recorded."""
+        """Number of columns, here of zeros, in which a simulated hand's torques are recorded."""
         return 3
 
 
@@ -70,7 +72,7 @@ def exchange(
     command: Array | None = None,
     silent: float = SILENT_PERIODS,
 ) -> Exchange:
-    """A device behind two arrays, which begins with no force and ramps it in.
+    """A device as two shared arrays; its force is ramped in from zero.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def exchange(
     reading, command : Array, optional
         Memory to share, such as a view of a mapped file; by default new arrays.
     silent : float
-        Periods without a reading or a command after which the device lets go.
+        Servo periods without a reading or a command after which the motors are switched off.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def exchange(
 
 @njit
 def sense_exchange(device: Exchange, t: float) -> None:
-    """Take the driver's reading, if it is a new one and one that can be."""
+    """Take the driver's reading if it is new and plausible."""
     r = device.reading
     theta = (r[READING_THETA], r[READING_THETA + 1], r[READING_THETA + 2])
     gimbal = (r[READING_GIMBAL], r[READING_GIMBAL + 1], r[READING_GIMBAL + 2])
@@ -122,7 +124,7 @@ def sense_exchange(device: Exchange, t: float) -> None:
 
 @njit
 def actuate_exchange(device: Exchange, force: Array) -> None:
-    """Leave the command for the driver, its number last."""
+    """Write the command for the driver, its number last."""
     c, r = device.command, device.reading
     motor_torques(device.faults, device.memory, device.hand[HAND_TIME], force, device.torque)
     for i in range(3):
@@ -134,7 +136,7 @@ def actuate_exchange(device: Exchange, force: Array) -> None:
 
 @njit
 def advance_exchange(device: Exchange, plant: Plant, t: float, replay: bool, applied: Array) -> None:
-    """Show the linkage where the device is, and step the physics of the figure."""
+    """Show the linkage in the device's configuration, and step the physics of the figure."""
     m, g = device.memory, device.gimbal
     if not replay:
         applied[:] = 0.0
@@ -144,14 +146,14 @@ def advance_exchange(device: Exchange, plant: Plant, t: float, replay: bool, app
 
 @njit
 def valid_torque(command: Array, silence: float, now: float, torque: Array) -> bool:
-    """What a driver applies at its time `now` [s]: the commanded torque; none when that is too old, or after a fault.
+    """Write the torque that a driver must apply at time `now`: the commanded one, or zero if too old or after a fault.
 
     Parameters
     ----------
     command, silence
-        Of the `Exchange`.
+        Those of the `Exchange`.
     now : float
-        By the clock that the driver's readings carry [s].
+        Time by the clock that timestamps the driver's readings [s].
     torque : Array
         Written [N m], shape (3,).
 

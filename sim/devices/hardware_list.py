@@ -1,12 +1,12 @@
-"""Which devices are at hand, and how to open one by its name.
+"""Discovery of connected devices, and opening a driver by device name.
 
 | name | what it opens |
 |---|---|
 | `hid:SERIAL`, or `hid` if there is only one | a Phantom that speaks the open HID protocol |
-| `hidraw:PATH` | the same, by its node |
+| `hidraw:PATH` | the same, by its device node |
 | `spacemouse`, `spacemouse:PATH` | a 3Dconnexion SpaceMouse |
-| `hdapi`, `hdapi:NAME` | a device of OpenHaptics, by its name in the vendor's set-up |
-| `dhd` | a device of Force Dimension |
+| `hdapi`, `hdapi:NAME` | an OpenHaptics device, by its name in the vendor's configuration |
+| `dhd` | a Force Dimension device |
 """
 
 import contextlib
@@ -33,29 +33,29 @@ _GENERIC_DESKTOP, _MULTI_AXIS = 0x01, 0x08
 _BUSES = {1: "usb", 2: "bluetooth", 3: "i2c", 4: "spi"}  # hidapi's hid_bus_type
 
 RULES_FILE = "/etc/udev/rules.d/70-hvf.rules"
-"""Before 73, where systemd gives the nodes with the tag `uaccess` to who sits at the machine."""
+"""Numbered below 73, the rule by which systemd gives nodes tagged `uaccess` to the user logged in at the machine."""
 
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that the machine sees.
+    """A device found on this machine.
 
     Parameters
     ----------
     name : str
-        For `open_device`; empty where there is no driver for it here.
+        Name for `open_device`; empty if there is no driver for the device.
     bus, transport, path : str
         Such as usb, hidraw, /dev/hidraw3.
     vendor_id, product_id : int
         0 where the transport has none.
     vendor, product, serial : str
-        As the device tells.
+        As reported by the device.
     kind : str
         ``phantom``, ``spacemouse``, ``touch``, ``vendor`` (behind a vendor's library) or ``other``.
     note : str
-        What a person has to know, or do, about it.
+        What the user has to know or do about it.
     usable : bool
-        Whether this user may open it.
+        Whether this user has permission to open it.
     """
 
     name: str
@@ -77,17 +77,17 @@ class FoundDevice:
         return f"{self.bus or '-':9} {ids:9} {self.transport:7} {self.path}"
 
     def who(self) -> str:
-        """Vendor and product, as the device tells them."""
+        """Vendor and product, as the device reports them."""
         return " ".join(filter(None, (self.vendor, self.product)))
 
     def udev_rule(self) -> str:
-        """The rule that gives this device's node to who sits at the machine."""
+        """The udev rule that gives this device's node to the user logged in at the machine."""
         ids = f'ATTRS{{idVendor}}=="{self.vendor_id:04x}", ATTRS{{idProduct}}=="{self.product_id:04x}"'
         return f'KERNEL=="hidraw*", SUBSYSTEM=="hidraw", {ids}, MODE="0660", TAG+="uaccess"'
 
 
 def hid_backend() -> Any:
-    """The module of hidapi that sees the kernel's nodes: `hidraw` on Linux, `hid` elsewhere.
+    """The hidapi module that uses the kernel's HID nodes: `hidraw` on Linux, `hid` elsewhere.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def hid_backend() -> Any:
 
 
 def found_devices() -> list[FoundDevice]:
-    """Every device that the machine sees; nothing is sent to any of them, and none is opened."""
+    """All devices found on this machine; none is opened and nothing is sent to any of them."""
     found = [_hid_device(row) for row in hid_backend().enumerate()]
     for name, transport, find, product in (
         ("hdapi", "HDAPI", HDAPI.find, "3D Systems Touch or Phantom"),
@@ -137,12 +137,12 @@ def _hid_device(row: dict[str, Any]) -> FoundDevice:
 
 
 def open_hid(path: str) -> HidHandle:
-    """Hidapi's handle of a node.
+    """Open a node with hidapi's Python binding.
 
     Raises
     ------
     SimError
-        If it cannot be opened, with what to do about it.
+        If it cannot be opened; the message says what to do about it.
     """
     handle = hid_backend().device()
     with _said_why(path):
@@ -151,7 +151,7 @@ def open_hid(path: str) -> HidHandle:
 
 
 def open_node(path: str) -> HidHandle | HidapiNode:
-    """A node by hidapi's own functions, or where its package does not export them by its binding.
+    """Open a node with hidapi's C functions or, where the package does not export them, with its Python binding.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def open_node(path: str) -> HidHandle | HidapiNode:
 
 @contextlib.contextmanager
 def _said_why(path: str) -> Generator[None, None, None]:
-    """Say why a node cannot be opened."""
+    """Turn an OSError into a `SimError` that says why the node cannot be opened."""
     try:
         yield
     except OSError:
@@ -177,14 +177,14 @@ def _said_why(path: str) -> Generator[None, None, None]:
 
 
 def open_device(name: str) -> Driver:
-    """The driver of a device by its name: see this file's head.
+    """Open the driver of a device by its name (see the table of this module).
 
     Raises
     ------
     SimError
-        If there is no such device, with those that there are; or it cannot be opened.
+        If there is no such device (the message lists those found), or it cannot be opened.
     DriverFault
-        If it does not answer as it should.
+        If the device does not answer as it should.
     """
     check_there(name)
     kind, _, rest = name.partition(":")
@@ -196,12 +196,12 @@ def open_device(name: str) -> Driver:
 
 
 def check_there(name: str) -> None:
-    """Refuse a name that no device has, or whose library is missing; none is opened.
+    """Check that a name denotes a device that is present, or whose library is installed, without opening it.
 
     Raises
     ------
     SimError
-        With what there is.
+        If it does not; the message lists the devices found.
     """
     kind, _, rest = name.partition(":")
     looks: dict[str, Callable[[], object]] = {
@@ -220,7 +220,7 @@ def _what_there_is() -> str:
 
 
 def _the_one(which: str, kind: str) -> FoundDevice:
-    """The device of a kind with a serial number or path; the only one where none is asked for."""
+    """The device of a kind with a given serial number or path; if `which` is empty, the only one of that kind."""
     there = found_devices()
     for device in there:
         if which and which in (device.serial, device.path) and device.kind != kind:

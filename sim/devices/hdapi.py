@@ -1,10 +1,10 @@
-"""OpenHaptics' HDAPI: how Phantoms and Touch devices with their vendor's driver take forces.
+"""Driver for Phantom and Touch devices through the vendor's library, OpenHaptics' HDAPI.
 
-The library is not ours to ship; it is loaded by ctypes where it is installed. Its scheduler calls back at its own rate
-(1 kHz) in its own thread: there the state is read and the last force commanded, by compiled code (`hdapi_frame.py`),
-and nothing else is done. Positions are in millimetres, in axes that are the device frame's P (x right, y up, z to the
-user), from the middle of the workspace, which is taken for P's origin; the end effector's frame is parallel to P when
-the pen points away from the user.
+The library may not be redistributed; it is loaded by ctypes where it is installed. Its scheduler calls back at 1 kHz in
+a thread of its own: that callback is compiled (`hdapi_frame.py`) and only reads the state and commands the last force.
+Positions are in millimetres, in the axes of the device frame P (x right, y up, z to the user), from the middle of the
+workspace, which is taken as P's origin; the end effector's frame is parallel to P when the pen points away from the
+user.
 
 Constants and signatures are those of OpenHaptics 3.4's ``hd.h``, ``hdDefines.h``, ``hdDevice.h`` and ``hdScheduler.h``.
 """
@@ -40,8 +40,8 @@ from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import pose_fault
 from sim.errors import SimError
 
-RATE = 1000  # Hz, of the vendor's scheduler
-_LOOK = 5e-5  # s, between two looks for a new sample
+RATE = 1000  # [Hz] of the vendor's scheduler
+_LOOK = 5e-5  # [s] polling interval for a new sample
 
 _INVALID_HANDLE = 0xFFFFFFFF
 _MAX_PRIORITY = 0xFFFF
@@ -58,13 +58,13 @@ ERRORS = {
     0x0401: "HD_ILLEGAL_END", 0x0402: "HD_FRAME_ERROR", 0x0500: "HD_INVALID_PRIORITY", 0x0501: "HD_SCHEDULER_FULL",
     0x0600: "HD_INVALID_LICENSE",
 }  # fmt: skip
-"""Every error that the library has, by its number."""
+"""Names of all errors of the library, by number."""
 
 _FAULTS = {0x0200: Fault.MOTORS_HOT, 0x0203: Fault.TOO_FAST, 0x0302: Fault.UNPLUGGED}
 
 
 class ErrorInfo(ctypes.Structure):
-    """HDErrorInfo."""
+    """The library's struct HDErrorInfo."""
 
     _fields_ = [
         ("errorCode", ctypes.c_uint), ("internalErrorCode", ctypes.c_int), ("hHD", ctypes.c_uint),
@@ -110,9 +110,9 @@ class HdapiDevice:
     library : ctypes.CDLL
         `HDAPI`, loaded.
     name : str
-        The device's name in the vendor's set-up; the default device where it is empty.
+        The device's name in the vendor's configuration; empty for the default device.
     clock : callable
-        Seconds, which the readings carry; any but `time.perf_counter` is asked for them with the GIL.
+        Clock that timestamps the readings [s]; any but `time.perf_counter` is called with the GIL held.
 
     Raises
     ------
@@ -138,7 +138,7 @@ class HdapiDevice:
         self._take, self._send = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
         for ability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
             library.hdEnable(ability)
-        # Kept for good: the vendor's thread must find it, whoever else is gone.
+        # The arguments are kept for ever: the vendor's thread may use them after this driver is gone.
         self._task = library.hdScheduleAsynchronous(frame_for_c(), keep_arguments(memory), _MAX_PRIORITY)
         library.hdSetSchedulerRate(RATE)
         library.hdStartScheduler()
@@ -150,7 +150,7 @@ class HdapiDevice:
         _asked[addresses[-1]] = self._clock
 
     def _error(self) -> int:
-        """The first of the errors that the library has kept, all of which are taken; 0 if there is none."""
+        """Empty the library's error stack and return its first error, 0 if there was none."""
         first = 0
         for _ in range(len(ERRORS)):
             code = int(self._hd.hdGetError().errorCode)
@@ -170,14 +170,14 @@ class HdapiDevice:
         return room.value
 
     def _calibrated(self) -> bool:
-        """Whether the encoders know their zero; a device that can do it by itself is asked to."""
+        """Whether the encoders' zero is known; a device that can calibrate itself is told to do so first."""
         if self._hd.hdCheckCalibration() == _CALIBRATION_NEEDS_UPDATE:
             self._hd.hdUpdateCalibration(self._integer(_CALIBRATION_STYLE))
         return self._hd.hdCheckCalibration() == _CALIBRATION_OK
 
     def _who(self, calibrated: bool) -> DeviceIdentity:
         name, serial = (self._hd.hdGetString(which) or b"" for which in (_MODEL, _SERIAL))
-        # The library documents no watchdog of the device: one without, then.
+        # The library documents no watchdog of the device, so none is assumed.
         return DeviceIdentity(
             name.decode(errors="replace"), "HDAPI", serial.decode(errors="replace"), "", True, False, calibrated,
             own_weight=True,
@@ -189,7 +189,7 @@ class HdapiDevice:
         Raises
         ------
         DriverFault
-            If the library reported an error, or the tip is where no Phantom's can be.
+            If the library reported an error, or the Phantom cannot reach the pose.
         """
         told, take = self._told, self._take
         take()
@@ -208,12 +208,12 @@ class HdapiDevice:
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
-        """See `sim.devices.driver.Driver.write`: the force that the torques stand for, from the next callback on.
+        """See `sim.devices.driver.Driver.write`; the equivalent tip force acts from the next callback on.
 
         Raises
         ------
         DriverFault
-            If a torque is not finite: then there is no force.
+            If a torque is not finite; the force is then zero.
         """
         told = self._told
         np.copyto(self._memory.torque, torque)
@@ -223,13 +223,13 @@ class HdapiDevice:
             raise DriverFault(Fault.FORCE_NOT_FINITE, told[TOLD_VALUE])
 
     def let_go(self) -> None:
-        """Motors off with the next callback; never raises."""
+        """Switch the motors off with the next callback; never raises."""
         np.copyto(self._memory.torque, self._off)
         self._told[TOLD_ENABLE] = 0.0
         self._send()
 
     def close(self) -> None:
-        """Let go, and give the device back."""
+        """Switch the motors off, stop the scheduler and close the device."""
         self.let_go()
         self._memory.numbers[N_CLOSING] = 1
         self._hd.hdDisable(_FORCE_OUTPUT)
@@ -240,7 +240,7 @@ class HdapiDevice:
 
 
 _asked: dict[int, Any] = {}
-"""Clocks that a vendor's thread asks, whether their drivers are still there or not, by their addresses."""
+"""Clocks by address, kept alive here because a vendor's thread may call them after their driver is gone."""
 
 
 def _words(code: int) -> str:

@@ -1,8 +1,8 @@
-"""A frame of HDAPI, compiled: what the vendor's scheduler calls in its own thread, and what the servo shares with it.
+"""The compiled HDAPI callback of the vendor's scheduler thread, and the memory that it shares with the servo.
 
-The thread of the scheduler runs no Python, so it never waits for the GIL, and takes nothing from the heap. Samples and
-commands pass behind sequence locks (`sim.compilation.sequence_lock`), an error by two counts: neither side waits for
-the other.
+The scheduler's thread runs no Python, so it never waits for the GIL, and allocates nothing on the heap. Samples and
+commands pass through sequence locks (`sim.compilation.sequence_lock`), errors through a pair of counters: neither side
+waits for the other.
 """
 
 from typing import Any, NamedTuple
@@ -23,9 +23,9 @@ from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, 
 from sim.devices.virtual_arm import place_stylus, tip_force
 
 SILENCE = 5e-3
-"""Time without a command after which the callback commands no force [s]; five of its periods."""
+"""Watchdog: age of the last command beyond which the callback commands zero force [s]; five of its periods."""
 MOST_ERRORS = 32
-"""That the library is asked for after a frame; those that it still keeps then are told after the next one."""
+"""Most errors that are fetched from the library per frame; the rest is fetched after the next frame."""
 
 _DONE, _CONTINUE = np.uint32(0), np.uint32(1)
 _BUTTONS, _POSITION, _VELOCITY, _TRANSFORM = np.uint32(0x2000), np.uint32(0x2050), np.uint32(0x2051), np.uint32(0x2052)
@@ -37,34 +37,35 @@ FUNCTIONS = (
     "hdBeginFrame", "hdEndFrame", "hdGetDoublev", "hdGetIntegerv", "hdSetDoublev", "hdEnable", "hdDisable",
     "hdGetError",
 )  # fmt: skip
-"""Of the library, in the order of their addresses; that of the clock is last."""
+"""The library's functions in the order of `HdMemory.functions`; the clock's address follows them."""
 _BEGIN, _END, _GET_DOUBLES, _GET_INTEGERS, _SET_DOUBLES, _ENABLE, _DISABLE, _GET_ERROR, _CLOCK = range(9)
 
 N_CLOSING, N_PRESSED, N_ENABLED, N_RAISED, N_HEARD, N_SIZE = range(6)
-"""1 from when the callback is to end; the buttons, as an int; whether the motors are on; errors that the callback has
-raised, and those that the servo has heard of."""
+"""Places in `HdMemory.numbers`: 1 once the callback is to end; the buttons, as an int; 1 while the motors are on; count
+of errors that the callback has raised, and count of those that the servo has taken."""
 ERROR_CODE, ERROR_VALUE, ERROR_SIZE = range(3)
-"""An error's number, and what was seen: a temperature [share of the highest], a speed [m/s], or the number."""
+"""Places in `HdMemory.error`: its number, and its value: a temperature [share of the highest], a speed [m/s], or the
+number again."""
 SAMPLE_POSITION, SAMPLE_TRANSFORM, SAMPLE_VELOCITY, SAMPLE_BUTTONS, SAMPLE_CLOCK, SAMPLE_NUMBER = 0, 3, 19, 22, 23, 24
 SAMPLE_SIZE = 25
-"""What a frame reads: tip [mm], the stylus's frame column by column (OpenGL), velocity [mm/s], buttons; the clock [s],
-and the frame's number, from 1 on."""
+"""Places in a sample: tip [mm], transform of the stylus by columns (as in OpenGL), velocity [mm/s], buttons, the clock
+[s], and the frame's number, from 1 on."""
 COMMAND_ENABLE, COMMAND_CLOCK, COMMAND_SIZE = 3, 4, 5
-"""After the force in P [N]: 1 where the motors are to be on, and when that was commanded [s]."""
+"""Places in a command, after the force in P [N]: 1 if the motors are to be on, and the time of the command [s]."""
 TOLD_NEW, TOLD_CODE, TOLD_FAULT, TOLD_VALUE, TOLD_ENABLE, TOLD_SIZE = range(6)
-"""1 where there is a new sample; the library's error, or what is wrong with pose or torque, with its value; 1 to
-switch the motors on."""
+"""Places in `HdMemory.told`: 1 if there is a new sample; the library's error; the fault of a pose or a torque; the
+value of either; 1 if the motors are to be on."""
 
 
 class Locked(NamedTuple):
-    """Numbers behind a sequence lock.
+    """Numbers shared through a sequence lock.
 
     Attributes
     ----------
     changes, shared : array
-        Count and numbers of `sim.compilation.sequence_lock`.
+        Count of changes and shared numbers (`sim.compilation.sequence_lock`).
     written, whole, read : Array
-        The writer's own, and the reader's.
+        The writer's private copy, and the reader's scratch and result.
     """
 
     changes: IntArray
@@ -75,17 +76,17 @@ class Locked(NamedTuple):
 
     @classmethod
     def fresh(cls, size: int) -> "Locked":
-        """Zeros."""
+        """A lock over `size` zeros."""
         return cls(np.zeros(1, np.int64), *(np.zeros(size) for _ in range(4)))
 
 
 class HdMemory(NamedTuple):
-    """A device as its driver and the vendor's thread share it.
+    """The state of a device, shared by its driver in the servo and the callback in the vendor's thread.
 
     Attributes
     ----------
     functions : IntArray
-        Addresses, see `FUNCTIONS`.
+        Addresses of the library's functions and of the clock, see `FUNCTIONS`.
     device : int
         The library's handle.
     largest : float
@@ -93,14 +94,14 @@ class HdMemory(NamedTuple):
     numbers : IntArray
         See `N_CLOSING`.
     sample, command : Locked
-        See `SAMPLE_POSITION`, `COMMAND_ENABLE`. The callback writes samples, the servo commands.
+        See `SAMPLE_POSITION`, `COMMAND_ENABLE`. The callback writes samples, the servo writes commands.
     force, heat : Array
-        The callback's: the force that it sends [N], and the motors' temperatures, shapes (3,) and (6,).
+        Owned by the callback: the force that it sends [N], and the motors' temperatures, shapes (3,) and (6,).
     error : Array
-        See `ERROR_CODE`: the servo's while it has not heard of it, else the callback's.
+        See `ERROR_CODE`. Owned by the servo from when it is raised until it is taken, else by the callback.
     frame, reading, torque, told, telemetry : Array
-        The servo's: the stylus's orientation in H (3, 3), the last reading that can be, the torques to be commanded
-        [N m], see `TOLD_NEW`, and the driver's telemetry.
+        Owned by the servo: the stylus's orientation in H (3, 3), the last valid reading, the torques to be commanded
+        [N m], results of the kernels (see `TOLD_NEW`), and the driver's telemetry.
     """
 
     functions: IntArray
@@ -120,7 +121,7 @@ class HdMemory(NamedTuple):
 
     @classmethod
     def fresh(cls, functions: list[int], device: int, largest: float, telemetry: Array) -> "HdMemory":
-        """Memory of a device with its motors off, of which no sample has come."""
+        """Memory of a device with its motors off, before the first sample."""
         return cls(
             np.array(functions, np.int64), device, largest, np.zeros(N_SIZE, np.int64), Locked.fresh(SAMPLE_SIZE),
             Locked.fresh(COMMAND_SIZE), np.zeros(3), np.zeros(6), np.zeros(ERROR_SIZE), np.zeros((3, 3)),
@@ -133,7 +134,7 @@ _memory_at: Any = loader(numba.typeof(HdMemory.fresh([], 0, 0.0, np.zeros(1))))
 
 @njit
 def _first_error(get_error: int) -> int:
-    """The first of the errors that the library has kept, which are taken; 0 if there is none."""
+    """Take up to `MOST_ERRORS` errors off the library's error stack; returns the first, 0 if there is none."""
     first = 0
     for _ in range(MOST_ERRORS):
         code = call_struct_head(get_error)
@@ -146,7 +147,7 @@ def _first_error(get_error: int) -> int:
 
 @njit
 def _raise_error(hd: HdMemory, code: int) -> None:
-    """Leave an error for the servo, unless it has not heard of the last one yet."""
+    """Store an error for the servo, unless the servo has not taken the previous one yet."""
     numbers, error, sample = hd.numbers, hd.error, hd.sample.written
     if numbers[N_RAISED] != numbers[N_HEARD]:
         return
@@ -163,7 +164,7 @@ def _raise_error(hd: HdMemory, code: int) -> None:
 
 @entry_point
 def serve_frame(memory: int) -> np.uint32:
-    """What the vendor's scheduler calls, with the address of an `HdMemory`: state in, force out."""
+    """The scheduler's callback, with the address of an `HdMemory`: read the state, command the force."""
     hd = _memory_at(memory)
     call, numbers, sample, command = hd.functions, hd.numbers, hd.sample.written, hd.command.read
     if numbers[N_CLOSING] != 0:
@@ -176,7 +177,7 @@ def serve_frame(memory: int) -> np.uint32:
     call_void(call[_GET_INTEGERS], (_BUTTONS, numbers.ctypes.data + 8 * N_PRESSED))
     sample[SAMPLE_BUTTONS] = int32_at(numbers.ctypes.data + 8 * N_PRESSED)
     sample[SAMPLE_CLOCK] = seconds(call[_CLOCK])
-    # A command that is being written is heard in the next frame: until then the last one, while it is young enough.
+    # While a command is being written, the previous one stays in use, until it is older than SILENCE.
     read_whole(hd.command.changes, hd.command.shared, hd.command.whole, command)
     enable = command[COMMAND_ENABLE] > 0.0
     alive = enable and sample[SAMPLE_CLOCK] - command[COMMAND_CLOCK] <= SILENCE
@@ -196,13 +197,13 @@ def serve_frame(memory: int) -> np.uint32:
 
 
 def frame_for_c() -> int:
-    """Address of `serve_frame`, an HDSchedulerCallback."""
+    """Address of `serve_frame` as a C function, an HDSchedulerCallback."""
     return address_for_c(serve_frame, types.uint32(types.intp))
 
 
 @entry_point
 def take_sample(hd: HdMemory) -> None:
-    """Make a reading of the newest sample, if there is a new one and no error of the library."""
+    """Convert the newest sample into a reading, if there is a new one and the library raised no error."""
     told, numbers, sample, reading = hd.told, hd.numbers, hd.sample.read, hd.reading
     told[TOLD_NEW] = told[TOLD_CODE] = told[TOLD_FAULT] = 0.0
     last = reading[READING_SEQUENCE]
@@ -214,7 +215,7 @@ def take_sample(hd: HdMemory) -> None:
         barrier()
         numbers[N_HEARD] += 1
         return
-    if sample[SAMPLE_NUMBER] == last:  # as of one that is half written
+    if sample[SAMPLE_NUMBER] == last:  # no new sample, or one that is half written
         return
     told[TOLD_NEW], reading[READING_SEQUENCE] = 1.0, sample[SAMPLE_NUMBER]
     # x_P → −y_H, y_P → z_H, z_P → −x_H, of rows and of columns.
@@ -232,7 +233,7 @@ def take_sample(hd: HdMemory) -> None:
 
 @entry_point
 def send_force(hd: HdMemory) -> None:
-    """Command the force that the torques stand for; none where the motors are off, or a torque is not finite."""
+    """Command the tip force equivalent to the torques; zero if the motors are off or a torque is not finite."""
     told, command, torque = hd.told, hd.command.written, hd.torque
     told[TOLD_VALUE] = first_not_finite(torque)
     told[TOLD_FAULT] = 0.0 if told[TOLD_VALUE] == 0.0 else _FORCE_NOT_FINITE

@@ -1,10 +1,10 @@
-r"""A Phantom that speaks the open HID protocol (`docs/reference/hid-protocol.md`), through hidapi.
+r"""Driver for a Phantom that speaks the open HID protocol (`docs/reference/hid-protocol.md`), through hidapi.
 
-Angles and torques of the joints come from the device's own calibration:
+Joint angles and motor torques follow from the calibration that the device stores:
 
 .. math:: \theta_i = 2\pi\,(n_i - z_i)/N_i, \qquad \tau_{motor,i} = \tau_i/\eta_i
 
-n the counts, z their zero, N counts a turn of the joint, η motor turns a turn of the joint.
+with n the encoder counts, z their zero, N counts per turn of the joint, η motor turns per turn of the joint.
 """
 
 import contextlib
@@ -42,12 +42,12 @@ from sim.devices.hid_reports import (
 from sim.devices.hidapi_node import Bytes, HidapiNode
 from sim.errors import SimError
 
-_DRAIN = 64  # reports that Linux keeps for a hidraw node
+_DRAIN = 64  # length of Linux's report queue of a hidraw node
 _RESET = float(Fault.DEVICE_RESET)
 
 
 class HidHandle(Protocol):
-    """What is used of `hidraw.device`: on unplug `read` raises OSError, and `write` returns −1."""
+    """The methods of `hidraw.device` that are used; on unplug `read` raises OSError, and `write` returns −1."""
 
     def read(self, max_length: int, timeout_ms: int = 0) -> list[int]: ...  # noqa: D102
     def write(self, buff: bytes) -> int: ...  # noqa: D102
@@ -65,16 +65,16 @@ class HidPhantom:
     handle : HidHandle or HidapiNode
         Open; owned from here on.
     transport : str
-        For people, such as ``/dev/hidraw3``.
+        Name of the transport for messages, such as ``/dev/hidraw3``.
     clock : callable
-        Seconds, for round trip, jitter and staleness; readings carry the device's own clock.
+        Host clock for round trip, jitter and staleness [s]; readings are timestamped by the device's own clock.
 
     Raises
     ------
     SimError
-        If the device does not answer as the protocol has it, or its calibration has no scale.
+        If the device does not answer by the protocol, or its calibration has a scale of 0.
     DriverFault
-        If it speaks another major version, or is gone.
+        If it speaks another major version of the protocol, or is gone.
     """
 
     def __init__(self, handle: HidHandle | HidapiNode, transport: str, clock: Callable[[], float] = time.perf_counter):
@@ -88,7 +88,7 @@ class HidPhantom:
         self._told, self._reading, self._off = items(self._hid.told), items(self._hid.reading), np.zeros(3)
         self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
-        incoming = incoming[: protocol.REPORT_SIZE + 1]  # a byte of room shows a report that is too long
+        incoming = incoming[: protocol.REPORT_SIZE + 1]  # one byte more, so that a report that is too long shows
         self._receive, self._send = _transfers(handle, incoming, outgoing)
 
     def _feature(self, number: int) -> Any:
@@ -130,13 +130,15 @@ class HidPhantom:
         )  # fmt: skip
 
     def calibrate(self, theta: Array, gimbal: Array) -> None:
-        """Store in the device that its joints are at these angles now [rad], shape (3,) each; motors off before.
+        """Set the encoder zeros in the device, given its present joint angles [rad], shape (3,) each.
+
+        The motors are switched off first.
 
         Raises
         ------
         SimError
-            If no reading came within a tenth of a second, a zero is none that fits into 32 bits, or the device did not
-            keep it.
+            If no reading came within a tenth of a second, a zero does not fit into 32 bits, or the device did not store
+            the calibration.
         """
         self.let_go()
         reading = np.zeros(READING_GIMBAL + 3)
@@ -146,7 +148,7 @@ class HidPhantom:
         wanted = protocol.blank(protocol.CALIBRATION)
         wanted["flags"] = protocol.CALIBRATED
         zero = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
-        if not np.all(np.abs(zero) < 2**31):  # which NaN is not
+        if not np.all(np.abs(zero) < 2**31):  # false for NaN too
             raise SimError(
                 f"{self._transport}: a zero at {zero.tolist()} counts cannot be kept; expected numbers of 32 bits"
             )
@@ -159,7 +161,7 @@ class HidPhantom:
             raise SimError(f"{self._transport} did not keep the calibration; expected its motors to be off")
 
     def read(self, reading: Array, timeout: float) -> bool:
-        """See `sim.devices.driver.Driver.read`; readings carry the device's time since its power-up."""
+        """See `sim.devices.driver.Driver.read`; readings are timestamped by the device's time since its power-up."""
         told, taken, new = self._told, 0, False
         try:
             size = self._receive(math.ceil(timeout * 1e3))
@@ -178,37 +180,38 @@ class HidPhantom:
         return new
 
     def _refuse(self) -> None:
-        """Raise what is wrong with a report."""
+        """Raise the fault of a report; after a reset of the device, its identity is read again first."""
         if self._told[TOLD_FAULT] == _RESET:
             self._judge_boot()
         raise DriverFault(Fault(int(self._told[TOLD_FAULT])), self._told[TOLD_VALUE])
 
     def _judge_boot(self) -> None:
-        """A device that began again is asked anew who it is: with its zero it has lost what it was armed by.
+        """Read identity and calibration again after a reset of the device, in which it may have lost its zero.
 
-        One that still knows its zero may be cleared and armed; any other stays a fault for as long as it is open.
+        A device that still has its zero may be cleared and armed again; for any other the old boot number is kept, so
+        that the fault recurs until it is closed.
         """
         numbers = self._hid.numbers
         before = int(numbers[N_BOOT])
         numbers[[N_LAST, N_ENABLED]] = -1
-        self._hid.clocks[0] = math.nan  # it has another clock
+        self._hid.clocks[0] = math.nan  # the device's clock began anew
         try:
             self._take_identity()
             self._take_calibration()
         except DriverFault:
             raise
-        except SimError:  # no sound answer
+        except SimError:  # no valid answer
             numbers[N_BOOT] = before
         if not self.identity.calibrated:
             numbers[N_BOOT] = before
 
     def write(self, torque: Array, enable: bool) -> None:
-        """See `sim.devices.driver.Driver.write`; a torque is cut at the peak torque that the device tells.
+        """See `sim.devices.driver.Driver.write`; torques are limited to the peak torque that the device reports.
 
         Raises
         ------
         DriverFault
-            If the device is gone, or a torque is not finite: then the motors are off.
+            If the device is gone, or a torque is not finite; the motors are then switched off.
         """
         told = self._told
         np.copyto(self._hid.torque, torque)
@@ -226,12 +229,12 @@ class HidPhantom:
             raise DriverFault(Fault.UNPLUGGED)
 
     def let_go(self) -> None:
-        """Motors off, at once; never raises."""
+        """Switch the motors off at once; never raises."""
         with contextlib.suppress(DriverFault):
             self.write(self._off, False)
 
     def close(self) -> None:
-        """Let go, and give the device back."""
+        """Switch the motors off and close the device."""
         self.let_go()
         self._handle.close()
 
@@ -239,7 +242,7 @@ class HidPhantom:
 def _transfers(
     handle: HidHandle | HidapiNode, incoming: Bytes, outgoing: Bytes
 ) -> tuple[Callable[[int], int], Callable[[], int]]:
-    """What receives a report, in so many milliseconds, and what sends one."""
+    """Functions that receive a report into `incoming` within a timeout [ms], and that send `outgoing`."""
     if isinstance(handle, HidapiNode):
         return handle.transfers(incoming, outgoing)
 

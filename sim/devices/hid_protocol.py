@@ -1,8 +1,8 @@
-"""The 64-byte reports of a Phantom that speaks USB HID: `docs/reference/hid-protocol.md`; in C `firmware/hvf_hid.h`.
+"""Layout of the 64-byte reports of the open HID protocol: `docs/reference/hid-protocol.md`; in C `firmware/hvf_hid.h`.
 
-All integers are little-endian. Byte 0 is the report's number, the last four are the CRC-32 of the 60 before them
-(CRC-32/ISO-HDLC, the one of Ethernet and zlib: at this length it finds every error of up to four bits, and every burst
-of up to 32).
+All integers are little-endian. Byte 0 is the report's number, the last four bytes are the CRC-32 of the 60 before them
+(CRC-32/ISO-HDLC, as in Ethernet and zlib: at this length it detects every error of up to four bits, and every burst of
+up to 32 bits).
 """
 
 import zlib
@@ -48,34 +48,34 @@ CALIBRATION_REPORT = np.dtype([
 LAYOUTS = {INPUT: INPUT_REPORT, OUTPUT: OUTPUT_REPORT, IDENTITY: IDENTITY_REPORT, CALIBRATION: CALIBRATION_REPORT}
 
 TORQUE_UNIT, PEAK_UNIT, TEMPERATURE_UNIT, COUNT_UNIT, TURN_UNIT = 1e-6, 1e-5, 0.01, 1e-3, 1e-3
-"""Of a torque [N m], a peak torque [N m], a temperature [°C], counts a turn, and motor turns a joint turn."""
+"""Units of a torque [N m], a peak torque [N m], a temperature [°C], counts per turn, and motor turns per joint turn."""
 
 
 def blank(report: int) -> npt.NDArray[Any]:
-    """A report of a number with all else zero: a record, shape ()."""
+    """A report with the given number, all else zero: a record, shape ()."""
     made = np.zeros((), LAYOUTS[report])
     made["report"] = report
     return made
 
 
 def sealed(report: npt.NDArray[Any]) -> bytes:
-    """A report's 64 bytes, with its checksum."""
+    """A report's 64 bytes, including its checksum."""
     head = report.tobytes()[:_CRC_AT]
     return head + zlib.crc32(head).to_bytes(4, "little")
 
 
 def is_sound(report: bytes) -> bool:
-    """Whether the checksum of 64 bytes is right."""
+    """Whether the checksum of a report's 64 bytes is right."""
     return zlib.crc32(report[:_CRC_AT]) == int.from_bytes(report[_CRC_AT:], "little")
 
 
 def unsealed(report: bytes, number: int) -> npt.NDArray[Any]:
-    """The record of a feature report.
+    """Decode a feature report into its record.
 
     Raises
     ------
     SimError
-        If it has another size or number, or a wrong checksum.
+        If it has the wrong size, number or checksum.
     """
     if len(report) != REPORT_SIZE or report[0] != number or not is_sound(report):
         raise SimError(

@@ -1,7 +1,7 @@
-"""Reports of the open HID protocol, judged and made by compiled code: the servo's tick takes no memory for them.
+"""Checking of input reports and encoding of output reports of the open HID protocol, compiled and allocation-free.
 
-The layouts are those of `sim.devices.hid_protocol`: every field is aligned, so a buffer is looked at as bytes and as
-whole numbers of each size. The host is little-endian, as the protocol is.
+The layouts are those of `sim.devices.hid_protocol`. Every field is aligned, so a buffer is viewed both as bytes and as
+integers of each size. The host must be little-endian, as the protocol is.
 """
 
 import math
@@ -19,23 +19,24 @@ from sim.devices.driver import BAD, LOST, READ, ROUND_TRIP, TEMPERATURE, note_ar
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 
 WATCHDOG = 0.01
-"""Time without a command after which the firmware switches the motors off [s]: twice the silence after which a command
-is no longer valid here, so that it acts when this process no longer can, and not before."""
+"""Watchdog period: time without a command after which the firmware switches the motors off [s]. Twice the age at which
+a command becomes invalid on the host, so that the firmware acts only where the host failed to."""
 HOTTEST = 100.0
 """Motor temperature that is a fault [°C]: 25 below what Maxon allows an RE 25's winding."""
-_BAD_IN_ROW = 3  # a disturbance spoils one report or two; a cable or a device that is broken goes on
-_SENT = 256  # commands whose time is kept, for the round trip
+_BAD_IN_ROW = 3  # wrong checksums in a row that are a fault: a disturbance spoils one or two, a broken cable goes on
+_SENT = 256  # commands for which the time of sending is kept, to measure the round trip
 _ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
 
 N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_AGAIN, N_BOOT, N_WATCHDOG, N_SIZE = range(9)
-"""Number of the last input report (−1: none), readings handed out, reports in a row whose checksum was wrong, commands
-sent, number of the command that switched the motors on (−1: off), 1 where they went off while nobody was there and are
-to be switched off, then on, the device's boot, and the watchdog's period [µs]."""
+"""Places in `HidMemory.numbers`: number of the last input report (−1: none); readings handed out; reports in a row with
+a wrong checksum; commands sent; number of the command that switched the motors on (−1: off); 1 if the watchdog switched
+them off during a gap, so that one command with motors off must precede the next with motors on; the device's boot
+number; and the watchdog's period [µs]."""
 TOLD_FAULT, TOLD_VALUE, TOLD_NEW, TOLD_SIZE, TOLD_NOW, TOLD_GIVEN, TOLD_ENABLE = range(7)
 TOLD_ASKED, TOLD_ASKED_MADE, TOLD_LENGTH = 7, 8, 9
-"""What is wrong with a report or a command, with its value; 1 where a report was a new reading; bytes of a report; the
-time by the host's clock, and the device's of the reading that was handed out last [s]; 1 to switch the motors on; both
-times as they were when the motors were told to switch on."""
+"""Places in `HidMemory.told`: fault of a report or a command, with its value; 1 if a report was a new reading; size of
+the report [bytes]; time by the host's clock; time of the last reading handed out by the device's clock [s]; 1 if the
+motors are to be on; both times when the motors were last commanded on."""
 
 _PLACES = {
     record: {name: field[1] for name, field in (layout.fields or {}).items()}
@@ -61,7 +62,7 @@ _MOTORS_OFF = int(Fault.MOTORS_OFF)
 
 
 def _remainders() -> IntArray:
-    """CRC-32/ISO-HDLC of each byte: remainders by the polynomial 0xEDB88320, lowest bit first."""
+    """Table of CRC-32/ISO-HDLC: remainder of each byte by the reflected polynomial 0xEDB88320."""
     rest = np.arange(256, dtype=np.int64)
     for _ in range(8):
         rest = np.where(rest & 1, (rest >> 1) ^ 0xEDB88320, rest >> 1)
@@ -73,7 +74,7 @@ _REMAINDERS = _remainders()
 
 @njit
 def checksum(report: npt.NDArray[np.uint8]) -> int:
-    """CRC-32 of all of a report that comes before it."""
+    """CRC-32 of all bytes of a report before its checksum field."""
     rest = 0xFFFFFFFF
     for k in range(_CRC_BYTES):
         rest = (rest >> 8) ^ _REMAINDERS[(rest ^ np.int64(report[k])) & 0xFF]
@@ -81,7 +82,7 @@ def checksum(report: npt.NDArray[np.uint8]) -> int:
 
 
 class Words(NamedTuple):
-    """A buffer as bytes, and as whole numbers of two, four and eight, each with and without sign as the layouts ask."""
+    """Views of one buffer as integers of one, two, four and eight bytes, with the signedness that the layouts use."""
 
     u8: npt.NDArray[Any]
     u16: npt.NDArray[Any]
@@ -92,14 +93,14 @@ class Words(NamedTuple):
 
     @classmethod
     def fresh(cls) -> "Words":
-        """A buffer of zeros, with room that shows a report that is too long."""
+        """A buffer of zeros, larger than a report so that one that is too long shows."""
         buffer = np.zeros(_SIZE + 8, np.uint8)
         kinds = (np.uint8, np.uint16, np.int16, np.uint32, np.int32, np.uint64)
         return cls(*(buffer.view(kind) for kind in kinds))
 
 
 class HidMemory(NamedTuple):
-    """A device as compiled code holds it.
+    """The state of a device in compiled code.
 
     Attributes
     ----------
@@ -108,17 +109,19 @@ class HidMemory(NamedTuple):
     numbers : IntArray
         See `N_LAST`.
     told : Array
-        See `TOLD_FAULT`.
+        Arguments and results of the kernels, see `TOLD_FAULT`.
     zero, angle : Array
-        Counts at angle zero, and the angle of a count [rad], shape (6,).
+        Encoder counts at angle zero, and the angle of a count [rad], shape (6,).
     turns, peak : Array
-        Motor turns a joint turn, and the motors' peak torque [N m], shape (3,).
+        Motor turns per joint turn, and the motors' peak torque [N m], shape (3,).
     torque : Array
-        Of the joints, that is commanded [N m], shape (3,).
+        Joint torques to be commanded [N m], shape (3,).
     sent_at : Array
-        When commands were sent [s], shape (256,).
-    reading, telemetry, clocks : Array
-        The last reading; of `sim.devices.driver`.
+        Times at which commands were sent [s], a ring by command number, shape (256,).
+    reading : Array
+        The last reading.
+    telemetry, clocks : Array
+        Those of `sim.devices.driver.note_arrival`.
     """
 
     incoming: Words
@@ -137,7 +140,7 @@ class HidMemory(NamedTuple):
 
     @classmethod
     def fresh(cls, telemetry: Array) -> "HidMemory":
-        """Before the first report, of a device whose identity and calibration are not read yet."""
+        """Memory before the first report; identity and calibration of the device are not read yet."""
         numbers, told = np.zeros(N_SIZE, np.int64), np.zeros(TOLD_LENGTH)
         numbers[[N_LAST, N_ENABLED]], told[TOLD_GIVEN] = -1, math.nan
         return cls(
@@ -154,7 +157,7 @@ def _fault(told: Array, code: int, value: float) -> None:
 
 @entry_point
 def judge_report(hid: HidMemory) -> None:
-    """Judge the input report that has come, and write the reading that it has; what it is is told."""
+    """Check the input report that was received; write its reading, and the result to `told`."""
     told, numbers, telemetry, words = hid.told, hid.numbers, hid.telemetry, hid.incoming
     told[TOLD_FAULT] = told[TOLD_NEW] = 0.0
     if told[TOLD_SIZE] != _SIZE or words.u8[0] != _INPUT:
@@ -173,7 +176,7 @@ def judge_report(hid: HidMemory) -> None:
         return
     answered, status = np.int64(words.u32[_ANSWERED]), np.int64(words.u16[_STATUS])
     if numbers[N_LAST] < 0:
-        # It goes on where another program stopped: with its numbers, and motors that its silence switched off.
+        # A device that another program left goes on with that program's numbers; its watchdog may have acted since.
         if answered > numbers[N_SENT]:
             numbers[N_SENT] = answered
         numbers[N_AGAIN] = 1 if status & _STATUS_WATCHDOG else 0
@@ -197,13 +200,13 @@ def judge_report(hid: HidMemory) -> None:
 
 @njit
 def _ahead(number: np.int64, of: np.int64) -> np.int64:
-    """How far a number of 32 bits, which wraps, is ahead of another."""
+    """Signed difference of two 32-bit sequence numbers, which wrap around."""
     return (number - of + 2**31) % 2**32 - 2**31
 
 
 @njit
 def _is_next(hid: HidMemory, number: np.int64) -> bool:
-    """Whether a report's number is ahead of the last one's; the same one again is refused, an older one a fault."""
+    """Whether a report's number is ahead of the last one's; the same number is refused, an older one is a fault."""
     last, telemetry = hid.numbers[N_LAST], hid.telemetry
     ahead = 1 if last < 0 else _ahead(number, last)
     if ahead <= 0:
@@ -219,7 +222,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
 
 @njit
 def _measure(hid: HidMemory, made: float, answered: np.int64) -> None:
-    """Note temperatures, round trip, jitter and staleness."""
+    """Update the telemetry: temperatures, round trip, jitter and staleness."""
     telemetry, now = hid.telemetry, hid.told[TOLD_NOW]
     for i in range(3):
         celsius = np.int64(hid.incoming.i16[_CELSIUS + i])
@@ -235,7 +238,7 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
     hottest = -np.inf
     for i in range(3):
         celsius = hid.telemetry[TEMPERATURE + i]
-        if celsius > hottest:  # what is not a number is left out
+        if celsius > hottest:  # false for NaN, a motor without a sensor
             hottest = celsius
     if status & _STATUS_HOT or hottest >= HOTTEST:
         _fault(hid.told, _HOT, hottest)
@@ -243,11 +246,12 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
 
 @njit
 def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
-    """The motors are off that were told to be on.
+    """Check motors that are off although they were commanded on.
 
-    The firmware's watchdog switched them off: a fault where commands went out and did not arrive, and else a gap, after
-    which who drives ramps the force in again, so they may be switched on again. Or they never came on: a fault once
-    that is so by both clocks, for either side may stand still between a reading and its command.
+    Either the firmware's watchdog switched them off: after a gap in the readings themselves they may be switched on
+    again, since the servo ramps the force in after a gap; without one, commands did not arrive, which is a fault. Or
+    they never came on: a fault once the waiting time has passed by both clocks, since either side may have been
+    suspended between a reading and its command.
     """
     told, since = hid.told, hid.numbers[N_ENABLED]
     if since < 0 or status & _STATUS_ENABLED:
@@ -265,7 +269,7 @@ def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.in
 
 @entry_point
 def make_command(hid: HidMemory) -> None:
-    """Write the next output report, with the torque cut at the motors' peak; none for one that is not finite."""
+    """Write the next output report, with torques limited to the motors' peak; none if a torque is not finite."""
     told, numbers, words = hid.told, hid.numbers, hid.outgoing
     told[TOLD_FAULT] = 0.0
     wrong = first_not_finite(hid.torque)

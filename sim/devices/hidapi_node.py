@@ -1,6 +1,6 @@
-"""A node by hidapi's own C functions, which its wheel exports: what passes through it takes no memory.
+"""A HID node through hidapi's own C functions, which its wheel exports, so that reports are passed without allocation.
 
-The wheel's Python binding takes a list of 64 numbers for every report that is read, and bytes for every one written.
+The wheel's Python binding allocates a list of 64 numbers for each report read, and bytes for each one written.
 """
 
 import ctypes
@@ -32,33 +32,33 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
 
 @entry_point
 def read_report(places: IntArray, incoming: Bytes, told: Array) -> None:
-    """hid_read_timeout: `places` are its address and the device's, `told` (2,) the timeout [ms] and what it returns."""
+    """Call hid_read_timeout: `places` are its address and the device handle, `told` (2,) timeout [ms] and result."""
     room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(told[0])
     told[1] = call_int(places[0], (places[1], room, size, timeout))
 
 
 @entry_point
 def write_report(places: IntArray, outgoing: Bytes, told: Array) -> None:
-    """hid_write: `places` are its address and the device's, `told` (1,) what it returns."""
+    """Call hid_write: `places` are its address and the device handle, `told` (1,) its result."""
     told[0] = call_int(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
 
 
 class HidapiNode:
-    """A node, as `sim.devices.hid.HidHandle` but for its reports, which compiled code takes and sends (`transfers`).
+    """An open HID node; like `sim.devices.hid.HidHandle`, but `transfers` takes the place of `read` and `write`.
 
     Parameters
     ----------
     library : ctypes.CDLL
-        That has hidapi's functions.
+        Library with hidapi's functions.
     path : str
-        Of the node.
+        Path of the node.
 
     Raises
     ------
     OSError
-        If it cannot be opened.
+        If the node cannot be opened.
     AttributeError
-        If the library has no such functions.
+        If the library lacks one of the functions.
     """
 
     def __init__(self, library: ctypes.CDLL, path: str):
@@ -75,7 +75,10 @@ class HidapiNode:
         return np.array([address_of(getattr(self._library, name)), self._device], np.int64)
 
     def transfers(self, incoming: Bytes, outgoing: Bytes) -> tuple[Callable[[int], int], Callable[[], int]]:
-        """What receives a report into `incoming`, in so many milliseconds, and what sends `outgoing`; kept calls."""
+        """Functions that receive a report into `incoming` within a timeout [ms], and that send `outgoing`.
+
+        Each returns the number of bytes; sending returns −1 on an error, receiving raises OSError.
+        """
         asked, answered = np.zeros(2), np.zeros(1)
         reads = KeptCall(read_report, (self._places("hid_read_timeout"), incoming, asked))
         writes = KeptCall(write_report, (self._places("hid_write"), outgoing, answered))
@@ -114,7 +117,7 @@ class HidapiNode:
         return self._library.hid_set_nonblocking(self._device, int(value))
 
     def close(self) -> None:
-        """Give the node back; what is asked for later is an error."""
+        """Close the node; all later transfers are errors."""
         if self._device:
             self._library.hid_close(self._device)
         self._device = 0

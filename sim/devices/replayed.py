@@ -1,4 +1,4 @@
-"""A recorded hand as a device: it moves as it did, whatever force it is given."""
+"""A recorded hand as a device: it repeats its recorded motion whatever force is commanded."""
 
 from typing import NamedTuple
 
@@ -18,18 +18,18 @@ _CHANNELS = ("t", "p", "quaternion", "v", "omega", "switch")
 
 
 class ReplayedHand(NamedTuple):
-    """A recorded hand as the loop holds it; force and torque are always zero, for it has no motors and no user.
+    """A recorded hand as a device; force and torque are always zero, since it has no motors and no user.
 
     Attributes
     ----------
     rows : Array
-        Hand vectors, one a tick, shape (n, 15).
+        Hand vectors, one per tick, shape (n, 15).
     period : float
-        Between two rows [s]; the loop's.
+        Time between two rows, the servo period [s].
     shown : ShownPhantom
-        The world's linkage, which goes where the hand was.
+        The linkage in the world, which is shown where the hand was.
     hand, torque, faults, force : Array
-        As of every device.
+        As for every device.
     """
 
     rows: Array
@@ -42,7 +42,7 @@ class ReplayedHand(NamedTuple):
 
     @property
     def user_torques(self) -> int:
-        """Columns of zeros where a simulated hand's torques are recorded."""
+        """Number of columns, here of zeros, in which a simulated hand's torques are recorded."""
         return 3
 
 
@@ -68,12 +68,12 @@ def replayed_hand(rows: Array, world: World, period: float | None = None) -> Rep
     world : World
         Must outlive the device. Its figure follows the hand.
     period : float, optional
-        At which the hand was recorded [s]; by default the world's servo period.
+        Period at which the hand was recorded [s]; by default the world's servo period.
 
     Raises
     ------
     SimError
-        If there are no rows, they are not hand vectors of finite numbers, or they are not a servo period apart.
+        If there are no rows, they are not hand vectors of finite numbers, or `period` is not the servo period.
     """
     wanted = world.config.servo_period
     if rows.ndim != 2 or rows.shape[1] != HAND_SIZE or len(rows) == 0:
@@ -94,7 +94,7 @@ def replayed_hand(rows: Array, world: World, period: float | None = None) -> Rep
 
 @njit
 def sense_replayed(device: ReplayedHand, t: float) -> None:
-    """Take the row of time t; one after the last, or not finite, is a fault, and the hand stays where it was."""
+    """Take the row of time t; past the last row, or if it is not finite, latch a fault and keep the last hand."""
     hand, tick = device.hand, round(t / device.period)
     if tick >= device.rows.shape[0]:
         latch(device.faults, READINGS_ENDED, t, device.rows.shape[0])
@@ -107,12 +107,12 @@ def sense_replayed(device: ReplayedHand, t: float) -> None:
 
 @njit
 def actuate_replayed(device: ReplayedHand, force: Array) -> None:
-    """Nothing: a recorded hand is not moved."""
+    """Do nothing: a recorded hand is not moved by a force."""
 
 
 @njit
 def advance_replayed(device: ReplayedHand, plant: Plant, t: float, replay: bool, applied: Array) -> None:
-    """Show the linkage where the hand is, and step the physics."""
+    """Show the linkage where the hand was, and step the physics."""
     hand = device.hand
     if not replay:
         applied[:] = 0.0

@@ -14,18 +14,18 @@ from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
 
 
 class SimulatedPhantom(NamedTuple):
-    """The Phantom of a world as the loop holds it, with its user.
+    """The simulated Phantom of a world, and its simulated user.
 
     Attributes
     ----------
     port : PhantomPort
         Its encoders and motors.
     user : Hand
-        On the stylus.
+        The hand on the stylus.
     hand, torque, faults : Array
-        The port's: measured hand (15,), joint torques (3,), and what was wrong.
+        Those of the port: measured hand (15,), joint torques (3,), and latched faults.
     force : Array
-        Of the user at the end of the tick [N], in H, shape (3,).
+        The user's force at the end of the tick [N], in H, shape (3,).
     """
 
     port: PhantomPort
@@ -36,26 +36,26 @@ class SimulatedPhantom(NamedTuple):
     force: Array
 
     def held_by(self, user: Arm | PersonState) -> "SimulatedPhantom":
-        """The same device in another hand."""
+        """The same device held by another user."""
         return simulated_phantom(self.port, user)
 
     def units(self) -> tuple[Unit, ...]:
-        """Units of compiled code that its user needs."""
+        """Compilation units that its user needs: that of a person, none for an arm."""
         return () if self.user.person.numbers.size == 0 else (person_unit(),)
 
     def link(self) -> None:
-        """Find the address of its user's code; compiles what is not kept."""
+        """Set the address of its user's code; compiles the unit if it is not in the cache."""
         if self.user.person.numbers.size > 0:
             link_person(self.user.person)
 
     @property
     def user_torques(self) -> int:
-        """How many joints the user has torques about."""
+        """Number of joints on which the user exerts torques."""
         return hand_torques(self.user)
 
 
 def simulated_phantom(port: PhantomPort, user: Arm | PersonState) -> SimulatedPhantom:
-    """The Phantom of a world (see `sim.world.phantom_port.phantom_port`) in a hand."""
+    """The Phantom of a world (see `sim.world.phantom_port.phantom_port`) held by a simulated user."""
     hand = make_hand(user)
     return SimulatedPhantom(port, hand, port.hand, port.torque, port.faults, hand.force)
 

@@ -1,10 +1,10 @@
-r"""A 3Dconnexion SpaceMouse as a stylus without motors: a push on its cap is a velocity of the tip.
+r"""Driver for a 3Dconnexion SpaceMouse, used as a stylus without motors: deflection of its cap sets the tip's velocity.
 
 .. math:: \dot p_H = v_{max}\,s(a_{xyz}), \qquad \omega_H = \omega_{max}\,s(a_{rot}), \qquad s(a) = a/350
 
-beyond a dead zone, within the Phantom's workspace: the tip stays where a step would leave it. Reports, as the
-`spacenav` projects have found them: number 1 with x, y, z or with all six, 2 with the three turns, each little-endian
-int16 of about ±350; 3 with a bit for each button. Axes: x right, y towards the user, z down.
+beyond a dead zone and within the Phantom's workspace; a step that would leave the workspace is not taken. Reports, as
+found by the `spacenav` projects: number 1 with x, y, z or with all six axes, 2 with the three rotations, each a
+little-endian int16 of about ±350; 3 with a bit for each button. Axes: x right, y towards the user, z down.
 """
 
 import time
@@ -24,11 +24,12 @@ from sim.devices.hid import HidHandle
 from sim.devices.virtual_arm import write_pose
 
 TOP_SPEED, TOP_TURN = 0.15, 1.5
-"""With the cap pushed all the way [m/s], [rad/s]: across the workspace of a river in about a second."""
+"""Speeds at full deflection of the cap [m/s], [rad/s]: across the workspace of a river in about a second."""
 FULL = 350.0
+"""Axis value at full deflection."""
 DEAD_ZONE = 0.03
-"""Share of the full push that a cap that nobody touches may show."""
-_LONGEST = 0.05  # s, over which a velocity is integrated: a page that froze must not fling the stylus
+"""Share of the full deflection below which it is taken as zero: a cap at rest may report so much."""
+_LONGEST = 0.05  # [s] longest integration step: after a page froze the stylus must not jump
 _TRANSLATION, _TURN, _BUTTONS = 1, 2, 3
 # From the cap's axes to H: right is −y, towards the user −x, down −z.
 _R_HC = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -42,11 +43,11 @@ class SpaceMouse:
     handle : HidHandle
         Open; owned from here on.
     name, transport : str
-        For people.
+        For display.
     clock : callable
-        Seconds, by which the velocity is integrated, and which the readings carry.
-    start : Array
-        Where the tip begins, in H [m], shape (3,).
+        Clock by which the velocity is integrated, and which timestamps the readings [s].
+    start : Array, optional
+        Initial position of the tip in H [m], shape (3,); by default the origin.
     """
 
     def __init__(
@@ -68,7 +69,7 @@ class SpaceMouse:
         self._taken = 0
 
     def read(self, reading: Array, timeout: float) -> bool:
-        """See `sim.devices.driver.Driver.read`; a cap at rest says nothing, so there is a new reading at every call.
+        """See `sim.devices.driver.Driver.read`; a cap at rest sends no reports, so every call gives a new reading.
 
         Raises
         ------
@@ -98,20 +99,20 @@ class SpaceMouse:
 
     @property
     def pushed(self) -> bool:
-        """Whether somebody pushes or turns the cap, or presses its first button."""
+        """Whether the cap is deflected beyond the dead zone, or its first button pressed."""
         return bool(np.any(self._push != 0.0) or self._buttons & 1)
 
     @property
     def tip(self) -> Array:
-        """Where the tip is, in H [m], shape (3,)."""
+        """Position of the tip in H [m], shape (3,)."""
         return self._p_H.copy()
 
     def start_at(self, p_H: Array) -> None:
-        """Let the tip go on from a place in H [m], shape (3,)."""
+        """Set the position of the tip in H [m], shape (3,)."""
         self._p_H = p_H.copy()
 
     def _take(self, raw: bytes) -> None:
-        """Take one report; other kinds, such as the battery's, are left out, and one that is too short is refused."""
+        """Take one report; other kinds, such as the battery's, are ignored, and one that is too short is refused."""
         number, axes = raw[0], np.frombuffer(raw[1 : 1 + 2 * ((len(raw) - 1) // 2)], "<i2")
         if number == _TRANSLATION and len(axes) >= 6:
             self._push = _shares(axes[:6])
@@ -141,24 +142,24 @@ class SpaceMouse:
     def _gimbal_can(self, r_HS: Array) -> bool:
         told = np.zeros(READING_SIZE)
         write_pose(told, np.array(R_HP).T @ self._p_H, r_HS)
-        # Near a pitch of 90° yaw and roll are one: a step there would throw the gimbal's angles about.
+        # Gimbal lock near a pitch of 90°: a small step there would make the gimbal's angles jump.
         return abs(told[READING_GIMBAL + 1]) < 1.4 and all(
             low <= angle <= high
             for angle, (low, high) in zip(told[READING_GIMBAL:], PREMIUM_1_5.gimbal_limit, strict=True)
         )
 
     def write(self, torque: Array, enable: bool) -> None:
-        """Nothing: it has no motors."""
+        """Do nothing: the device has no motors."""
 
     def let_go(self) -> None:
-        """Nothing: it has no motors."""
+        """Do nothing: the device has no motors."""
 
     def close(self) -> None:
-        """Give the device back."""
+        """Close the device."""
         self._handle.close()
 
 
 def _shares(axes: npt.NDArray[np.int16]) -> Array:
-    """Pushes as shares of the full one, −1 … 1, and 0 within the dead zone."""
+    """Deflections as shares of the full one, −1 … 1, and 0 within the dead zone."""
     share = np.clip(axes / FULL, -1.0, 1.0)
     return np.where(np.abs(share) < DEAD_ZONE, 0.0, share)

@@ -1,4 +1,4 @@
-"""Libraries of vendors, which are not ours to ship: found where they are installed, loaded with their signatures."""
+"""Vendors' C libraries, which may not be redistributed: found where they are installed, loaded with signatures."""
 
 import ctypes
 import ctypes.util
@@ -17,13 +17,13 @@ class VendorLibrary:
     Parameters
     ----------
     title : str
-        For people, such as ``OpenHaptics' HD library``.
+        Name for messages, such as ``OpenHaptics' HD library``.
     names : tuple of str
-        By which the system may know it, on Windows those that end in .dll.
+        Names under which the system may find it; those that end in .dll are for Windows.
     install : str
-        What to install where it is missing.
+        Hint on what to install if it is missing.
     signatures : mapping
-        Of its functions: type of the result, and of the arguments.
+        Result type and argument types of each function.
     """
 
     title: str
@@ -32,12 +32,12 @@ class VendorLibrary:
     signatures: Mapping[str, tuple[Any, list[Any]]]
 
     def find(self) -> str | None:
-        """Where it is; None if it is not installed."""
+        """Path of the library; None if it is not installed."""
         ours = [name for name in self.names if name.endswith(".dll") == (sys.platform == "win32")]
         return next((found for name in ours if (found := ctypes.util.find_library(name))), None)
 
     def path(self) -> str:
-        """Where it is.
+        """Path of the library.
 
         Raises
         ------
@@ -50,12 +50,12 @@ class VendorLibrary:
         return path
 
     def load(self, path: str | None = None) -> ctypes.CDLL:
-        """The library with its signatures, from a path or from where it is installed.
+        """Load the library and set its signatures, from a path or from where it is installed.
 
         Raises
         ------
         SimError
-            If it is not there, or is another library.
+            If it cannot be loaded, or lacks one of the functions.
         """
         path = path or self.path()
         try:

@@ -1,16 +1,16 @@
-r"""A device of another build, taken as a Phantom: joints that put the stylus where it is, and its force from torques.
+r"""A device with other kinematics as a virtual Phantom: joint angles from its pose, its tip force from joint torques.
 
-Libraries of vendors tell a pose and take a force at the tip. With the Phantom's own kinematics the angles are
-:math:`\theta = p^{-1}(p_P)`, and the torques :math:`\tau = J^T F + N` that the loop commands give back
+Vendors' libraries report a pose and take a force at the tip. By the Phantom's inverse kinematics the joint angles are
+:math:`\theta = p^{-1}(p_P)`. From the torques :math:`\tau = J^T F + N` that the loop commands follows the tip force
 
 .. math:: F_P = J(\theta)^{-T} (\tau - N(\theta)),
 
-exactly the force that the field asked for, as long as no torque was cut. N, the weight of the Phantom's linkage, is
-left out: such a device carries its own.
+which is exactly the force of the field as long as no torque saturated. N, the gravity torques of the Phantom's linkage,
+are subtracted, since such a device compensates for its own weight.
 
-The turret moves the tip sideways, by its distance ρ from the turret's axis; upper arm and forearm move it within their
-plane, at right angles to that. So J has the singular value \|ρ\| and those of the 2×2 matrix of both, whose
-determinant is :math:`l_1 l_2 \cos(\theta_3 - \theta_2)`.
+The turret moves the tip sideways, with the tip's distance ρ from the turret's axis as lever arm; upper arm and forearm
+move it in their plane, at right angles to that. So the singular values of J are \|ρ\| and those of the 2×2 matrix of
+the two links, whose determinant is :math:`l_1 l_2 \cos(\theta_3 - \theta_2)`.
 """
 
 import math
@@ -37,10 +37,10 @@ from sim.devices.driver import DriverFault
 from sim.devices.exchange import READING_GIMBAL, READING_THETA
 
 WEAKEST = 0.05
-"""Least singular value of J [m/rad] for which a torque is turned into a force: on the turret's axis, where it is zero,
-no torque gives one. The Phantom's is 0.17 at θ = 0."""
+"""Least singular value of J [m/rad] for which torques are converted into a force; it is zero on the turret's axis,
+where J is singular. At θ = 0 it is 0.17."""
 SKEWED = 1e-3
-"""Largest entry of R Rᵀ − 1 of an orientation, which is 0 of a rotation: what was rounded to four digits passes."""
+"""Largest entry of R Rᵀ − 1 that is accepted for an orientation; a matrix rounded to four digits passes."""
 
 _NOT_FINITE, _LEFT_WORKSPACE = int(Fault.READING_NOT_FINITE), int(Fault.LEFT_WORKSPACE)
 
@@ -51,7 +51,7 @@ def quaternion_of(rotation: Array) -> Quat:
     a, b, c = rotation[0, 0], rotation[1, 1], rotation[2, 2]
     x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
     xy, yz, zx = rotation[1, 0] + rotation[0, 1], rotation[2, 1] + rotation[1, 2], rotation[0, 2] + rotation[2, 0]
-    # In each, four times the component that is largest, times all four.
+    # Each is the quaternion times four times its largest component.
     if a + b + c >= max(a, b, c):
         q = 1.0 + a + b + c, x, y, z
     elif a >= max(b, c):
@@ -66,7 +66,7 @@ def quaternion_of(rotation: Array) -> Quat:
 
 @njit
 def skewness(matrix: Array) -> float:
-    """How far a matrix (3, 3) is from a rotation: the largest entry of R Rᵀ − 1, and 2 at least for a reflection."""
+    """Deviation of a matrix (3, 3) from a rotation: the largest entry of R Rᵀ − 1, at least 2 for a reflection."""
     largest = 0.0
     for i in range(3):
         for j in range(i + 1):
@@ -82,21 +82,21 @@ def skewness(matrix: Array) -> float:
 
 @njit
 def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
-    """Write θ and gimbal angles of a pose into a reading; nothing where that is a fault.
+    """Write θ and gimbal angles of a pose into a reading; on a fault nothing is written.
 
     Parameters
     ----------
     reading : Array
-        Of an `Exchange`, shape (9,).
+        A reading of an `Exchange`, shape (9,).
     p_P, r_HS
         Tip in the device frame [m], and the stylus's orientation in H, shape (3, 3).
 
     Returns
     -------
     fault : int
-        Why the Phantom cannot be there, of `Fault`; 0 where it can.
+        Code of `Fault` if the Phantom cannot take the pose, else 0.
     value : float
-        In the fault's unit.
+        The offending value, in the fault's unit.
     """
     total = p_P[0] + p_P[1] + p_P[2]
     for i in range(3):
@@ -120,7 +120,7 @@ def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
 
 @entry_point
 def place_by_numbers(reading: Array, p_P: Array, r_HS: Array, told: Array) -> None:
-    """`place_stylus`, whose result is written to `told`, shape (2,)."""
+    """`place_stylus` from Python; its result is written to `told`, shape (2,)."""
     told[0], told[1] = place_stylus(reading, (p_P[0], p_P[1], p_P[2]), r_HS)
 
 
@@ -130,7 +130,7 @@ def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
     Raises
     ------
     DriverFault
-        If the Phantom cannot be there, the pose is not finite, or the orientation no rotation.
+        If the Phantom cannot take the pose, the pose is not finite, or the orientation is no rotation.
     """
     told = np.zeros(2)
     place_by_numbers(reading, np.ascontiguousarray(p_P), np.ascontiguousarray(r_HS), told)
@@ -139,7 +139,7 @@ def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
 
 
 def pose_fault(fault: float, value: float) -> DriverFault:
-    """What `place_stylus` found, to be raised."""
+    """The exception for a fault that `place_stylus` returned."""
     skewed = fault == _NOT_FINITE and math.isfinite(value)
     return DriverFault(Fault(int(fault)), value, "an orientation that is no rotation" if skewed else "")
 
@@ -156,9 +156,9 @@ def least_gain(theta: Vec3) -> float:
 
 @njit
 def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
-    """Force at the tip in the device frame [N] for torques of the joints [N m], at most `largest`.
+    """Force at the tip in the device frame [N] equivalent to joint torques [N m], scaled to at most `largest`.
 
-    Zero where the Jacobian is nearly singular, or numbers become too large to be any.
+    Zero where the Jacobian is nearly singular, or the result is not finite.
     """
     if least_gain(theta) < WEAKEST:
         return 0.0, 0.0, 0.0

@@ -1,1 +1,1 @@
-"""A real device in the loop: the servo's process, what stands beside it, the twin, and what a device is found to be."""
+"""A real device in the loop: servo process, safety gate, recorder process, digital twin, and identification."""

@@ -1,6 +1,7 @@
-"""The end of a hardware run that a person holds: it starts the processes, arms, looks, and ends them.
+"""The control side of a hardware run: it starts the servo and recorder processes, arms, monitors and stops them.
 
-Its `poll` is its heartbeat: a servo that does not hear it lets go. It hears the servo's in turn.
+Each `poll` sends a heartbeat; a servo that misses it switches the motors off. In turn, `poll` checks that the servo
+ticks.
 """
 
 import multiprocessing
@@ -45,25 +46,25 @@ from sim.hardware.servo_process import (
 from sim.hardware.shared import Ring, SharedNumbers
 
 SILENT = 0.2
-"""Time without a tick after which a servo counts as gone [s]."""
-_START, _END = 600.0, 10.0  # [s] that are waited for a servo to begin, which may compile, and to end
+"""Time without a tick after which the servo counts as dead [s]."""
+_START, _END = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
 
 
 class Recorded(NamedTuple):
-    """What the recorder tells.
+    """Status of the recorder.
 
     Attributes
     ----------
     alive : bool
-        Whether it is there and writes.
+        Whether its process runs without an error.
     rows, dropped : int
-        Ticks written, and lost because it did not keep up.
+        Ticks written, and ticks lost because it did not keep up.
     error : int
-        errno of what stopped it, or 0.
+        errno of the error that stopped it, or 0.
     hand_force : Array
-        The twin's estimate [N], in H, shape (3,).
+        The twin's estimate of the hand's force [N], in H, shape (3,).
     apart : float
-        From the twin's prediction to the device [m].
+        Distance from the twin's predicted tip to the device's [m].
     """
 
     alive: bool
@@ -75,20 +76,22 @@ class Recorded(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What is seen of a hardware run.
+    """Status of a hardware run.
 
     Attributes
     ----------
     alive : bool
         Whether the servo ticks.
     state : State
+        State of the gate.
     fault : Fault
+        The latched fault, if any.
     value : float
-        Of the fault.
+        Value of the fault.
     row : dict
         The last tick, by `sim.hardware.gated_servo.CHANNELS`.
     recorded : Recorded, optional
-        None where nothing is recorded.
+        Status of the recorder; None if nothing is recorded.
     """
 
     alive: bool
@@ -100,29 +103,29 @@ class Look(NamedTuple):
 
 
 class HardwareRun:
-    """Servo and recorder in processes of their own, and the controls here; a context manager that ends them.
+    """Servo and recorder in processes of their own, controlled from here; a context manager that ends them.
 
     Parameters
     ----------
     make : callable
-        Opens the device and makes what is driven, in the servo's process; picklable.
+        Opens the device and makes the gated servo, in the servo's process; picklable.
     period : float
         Servo period [s].
     clock : ServoClock
-        Of the servo.
+        Timing limits of the servo.
     job : RecordingJob, optional
-        What is recorded.
+        What is recorded; by default nothing.
 
     Attributes
     ----------
     servo : BaseProcess
         The servo's process.
     recorder : BaseProcess or None
-        The recorder's.
+        The recorder's process.
     status : SharedNumbers
-        The servo's last row, for any other process that is to show it.
+        The servo's last row, also for other processes that display it.
     told : SharedNumbers
-        What the recorder tells, likewise.
+        The recorder's status, likewise.
     """
 
     def __init__(
@@ -157,7 +160,7 @@ class HardwareRun:
         Raises
         ------
         SimError
-            If the servo could not begin; the message says why.
+            If the servo could not start; the message says why.
         """
         if self.recorder is not None:
             self.recorder.start()
@@ -171,7 +174,7 @@ class HardwareRun:
         raise SimError(said.why if isinstance(said, Refused) else "the servo's process ended before it began")
 
     def _wait_for(self, recorder: BaseProcess) -> None:
-        """Wait until the recorder is ready, or could not begin, which a look at it tells."""
+        """Wait until the recorder is ready or has ended; `poll` then shows whether it could start."""
         told, end = np.zeros(TOLD_SIZE), time.monotonic() + _START
         while recorder.is_alive() and told[TOLD_READY] == 0.0 and time.monotonic() < end:
             time.sleep(0.01)
@@ -190,7 +193,7 @@ class HardwareRun:
         self._orders.write(self._order)
 
     def poll(self) -> Look:
-        """Tell the servo that somebody is there, and look at it."""
+        """Send a heartbeat to the servo, and return the status of the run."""
         self._order[ORDER_BEAT] += 1.0
         self._orders.write(self._order)
         self.status.read(self._row)
@@ -213,7 +216,7 @@ class HardwareRun:
         return Recorded(alive, int(told[TOLD_ROWS]), int(told[TOLD_DROPPED]), error, force, float(told[TOLD_APART]))
 
     def stop(self) -> Ended | None:
-        """End the servo, then the recorder once it has everything; what the servo said at its end, if it could."""
+        """End the servo, then the recorder once it has written all rows; returns the servo's final report, if any."""
         if self._ended is None and self.servo.pid is not None:
             self._order[ORDER_STOP], self._order[ORDER_REQUEST] = 1.0, NO_REQUEST
             self._orders.write(self._order)

@@ -1,7 +1,7 @@
-"""A device that is real to the software: the MuJoCo linkage behind a driver, with what a linkage's data sheet hides.
+"""An emulated device: the MuJoCo linkage behind a driver, with friction, added inertia, delay and encoder offsets.
 
-Its clock runs by its own steps, one a command, so that a run with it is the same again. Its hand holds the stylus where
-it is, with a tremor, until the motors have been on for a while, and then lets go.
+Its clock advances by one servo period per command, so a run with it is reproducible. A simulated hand holds the stylus
+in place, with a tremor, until the motors have been on for a while, and then lets go.
 """
 
 import math
@@ -23,36 +23,36 @@ from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
 from sim.world.world import World
 
 TREMOR, TREMOR_FREQUENCY = 1e-4, 10.0
-"""Physiological tremor of a hand at rest: some 0.1 mm [m] at 8 to 12 Hz."""
+"""Amplitude [m] and frequency [Hz] of the physiological tremor of a hand at rest: some 0.1 mm at 8 to 12 Hz."""
 
 
 @entry_point
 def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Array) -> None:
-    """Some physics steps of a Phantom whose motors somebody else has set, from time t [s] on."""
+    """Step the physics by the plant's period from time t [s] on; the caller has set the motor commands."""
     advance(plant, port, user, t, False, applied)
 
 
 def tremor(seconds: float, period: float) -> Array:
-    """Displacement of a hand at rest, shape (n, 3) [m], every so often [s]."""
+    """Tremor displacement of a hand at rest [m], shape (n, 3), sampled every `period` [s]."""
     t = np.arange(0.0, seconds, period)
     return TREMOR * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
 
 
 def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
-    """Who an emulated device is, however it is reached."""
+    """Identity of an emulated device that is reached by a given transport."""
     return DeviceIdentity("emulated Phantom", transport, "", "", forces=True, watchdog=True, calibrated=calibrated)
 
 
 def steps_late(scene: SceneConfig, delay: float) -> float:
-    """How many physics steps after a period's begin a torque acts that is late by so much [s].
+    """Number of physics steps from the start of a period until a torque with a given delay [s] acts.
 
     Raises
     ------
     SimError
-        If that is more than the period has.
+        If that is more than the steps in a period.
     """
     steps = scene.substeps()
-    # Positions of a semi-implicit step lead by half a step what the torques of a continuous time do.
+    # Semi-implicit integration moves positions half a step earlier than continuous time, hence the 0.5.
     late = delay / scene.servo_period * steps + 0.5
     if late > steps:
         raise SimError(
@@ -63,27 +63,28 @@ def steps_late(scene: SceneConfig, delay: float) -> float:
 
 
 class EmulatedPhantom:
-    """Driver of a linkage in MuJoCo; one servo period passes in it with every command.
+    """Driver of a linkage simulated in MuJoCo; every command advances it by one servo period.
 
     Parameters
     ----------
     scene : SceneConfig
-        Its servo period and physics step.
+        Gives servo period and physics step.
     start : Array
-        Where the stylus is at first, in H [m].
-    linkage : Linkage
-        What it is. Torques act after its delay, within a physics step by the share of the step.
+        Initial position of the stylus in H [m], shape (3,).
+    linkage : Linkage, optional
+        Parameters of the linkage; within the physics step in which a delayed torque begins, old and new torque are
+        averaged by their shares of the step.
     arm : Arm, optional
-        The hand, once it has let go; relaxed by default.
+        The user once the holding hand has let go; relaxed by default.
     holds : float
         How long the hand still holds the stylus after the motors came on [s].
     presses : bool
-        Whether it presses the switch.
+        Whether the switch is pressed.
 
     Raises
     ------
     SimError
-        If the start is out of reach, or as `steps_late`.
+        If the start is out of reach, or the delay too long (`steps_late`).
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class EmulatedPhantom:
 
     @property
     def clock(self) -> float:
-        """Its own time [s]."""
+        """The device's own time [s]."""
         return self._steps * self._plant.period
 
     def read(self, reading: Array, timeout: float) -> bool:
@@ -127,7 +128,7 @@ class EmulatedPhantom:
         return new
 
     def write(self, torque: Array, enable: bool) -> None:
-        """As `sim.devices.driver.Driver`; then a servo period passes."""
+        """As `sim.devices.driver.Driver`; advances the device by a servo period."""
         self.torque[:] = torque if enable else 0.0
         if self._on > 0.0 and not enable:
             self._take_hold()
@@ -144,7 +145,7 @@ class EmulatedPhantom:
         self._steps += 1
 
     def _take_hold(self) -> None:
-        """The hand holds the stylus where it is, so that it does not fall."""
+        """Let the hand hold the stylus at its present position, so that it does not fall."""
         if self._holding is not None:
             a, b, c = (float(self.port.qpos[place]) for place in self.port.arm_q)
             self._holding.arm.path[:] = vector_to_hand_frame(forward_kinematics((a, b, c))) + self._tremor

@@ -1,9 +1,9 @@
-"""The emulated Phantom in a process of its own, behind packets, with a watchdog: what the servo's end cannot spare it.
+"""The emulated Phantom in a process of its own, reached by packets, with a watchdog that survives the servo's death.
 
-Packets carry eight-byte numbers, one whole reading, with the time at which it was sent, or command each, as reports of
-USB HID do. Each command lets a servo
-period pass in the device, and is answered by a reading. When none comes for the watchdog's time, that time passes in
-the device under the last command, then its motors go off, and its time goes on by itself.
+Packets carry eight-byte numbers: one whole reading with the time at which it was sent, or one command, as reports of
+USB HID do. Each command advances the device by a servo period and is answered by a reading. If no command comes for the
+watchdog's time, the device is advanced by that time under the last command; then its motors are switched off, and it
+goes on by itself.
 """
 
 import os
@@ -29,15 +29,16 @@ from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
 
 WATCHDOG = 0.02
-"""Time without a command after which the device lets go [s]: twenty periods at 1 kHz."""
-_OFF = bytes(32)
-_SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # in a reading's packet: when it was sent, and how many numbers
+"""Time without a command after which the device switches its motors off [s]: twenty periods at 1 kHz."""
+_OFF = bytes(32)  # a command of zero torques with the motors off
+_SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # of a reading's packet: place of the sending time, and size
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
-"""What a bystander sees of the device: torques of its motors [N m], how often its watchdog let go, its clock [s]."""
+"""Places in the device's published status: motor torques (3) [N m], number of times its watchdog tripped, its clock
+[s]."""
 
 
 class EmulatedEnd(NamedTuple):
-    """The device's end: its socket, what bystanders see of it, and its servo period [s]."""
+    """The device's end of the connection: its socket, its published status, and its servo period [s]."""
 
     packets: socket.socket
     shown: SharedNumbers
@@ -45,7 +46,7 @@ class EmulatedEnd(NamedTuple):
 
 
 def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime: bool) -> None:
-    """Be the device, until the process that started this one is gone; the target of a process."""
+    """Run the device until the parent process is gone; the target of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     device, parent = make(), os.getppid()
     device.write(np.zeros(3), False)
@@ -74,11 +75,11 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
             end.packets.send(packet.data, socket.MSG_DONTWAIT)
         except OSError:
             if command is None:
-                time.sleep(end.period)  # nobody takes its readings, or is there
+                time.sleep(end.period)  # the servo takes no readings, or is gone
 
 
 def _command(packets: socket.socket, timeout: float) -> Array | None:
-    """The next command; None if there was none in time [s]."""
+    """The next command; None if there was none within the timeout [s]."""
     if not select.select([packets], [], [], timeout)[0]:
         return None
     try:
@@ -89,20 +90,20 @@ def _command(packets: socket.socket, timeout: float) -> Array | None:
 
 
 class Link(NamedTuple):
-    """The servo's end of the packets, as compiled code holds it.
+    """The servo's end of the connection, for compiled code.
 
     Attributes
     ----------
     descriptor : int
-        Of the socket.
+        File descriptor of the socket.
     packet, reading : Array
-        The last packet that came, with room for one number more, and the last reading, of `READING_SIZE`.
+        The last packet received, with room for one number more, and the last reading, of `READING_SIZE`.
     command : Array
-        Torques [N m], and 1 where the motors are to be on, shape (4,).
+        Torques [N m], and 1 if the motors are to be on, shape (4,).
     telemetry, clocks : Array
-        Of `sim.devices.driver`.
+        Those of `sim.devices.driver.note_arrival`.
     told : Array
-        See `TOLD_NEW`.
+        Arguments and results of the kernels, see `TOLD_NEW`.
     """
 
     descriptor: int
@@ -115,13 +116,13 @@ class Link(NamedTuple):
 
 
 TOLD_NEW, TOLD_SIZE, TOLD_WENT, TOLD_SENT, TOLD_SEQUENCE, TOLD_WAIT, TOLD_LENGTH = range(7)
-"""Readings taken; size of the packet that ended it, `NOTHING` where none did; what came of the last command, and when
-it was sent [s]; number of the last reading; how long one is waited for [s]."""
+"""Places in `Link.told`: readings taken; size of a wrong packet that ended the taking, or `NOTHING` or `BROKEN`; result
+of sending the last command, and when it was sent [s]; number of the last reading; timeout of a reading [s]."""
 
 
 @entry_point
 def take_readings(link: Link) -> None:
-    """Take all readings that are there, or the first that comes in time."""
+    """Take all readings that have arrived or, if there are none, wait for the next ones within the timeout."""
     told, telemetry = link.told, link.telemetry
     told[TOLD_NEW], told[TOLD_SIZE] = 0.0, NOTHING
     waited = False
@@ -149,7 +150,7 @@ def take_readings(link: Link) -> None:
 
 @entry_point
 def send_command(link: Link) -> None:
-    """Send the command, and note when."""
+    """Send the command, and store the time."""
     link.told[TOLD_SENT] = monotonic()
     link.told[TOLD_WENT] = transmit(link.descriptor, link.command)
 
@@ -160,9 +161,9 @@ class EmulatedDriver:
     Parameters
     ----------
     packets : socket.socket
-        The other end of `EmulatedEnd`.
+        The socket connected to that of `EmulatedEnd`.
     calibrated : bool
-        Whether its encoders know their zero.
+        Whether the zero of its encoders is known.
     """
 
     def __init__(self, packets: socket.socket, calibrated: bool = True):
@@ -197,7 +198,7 @@ class EmulatedDriver:
         self._send()
         if self._told[TOLD_WENT] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
-        # Where there was no room, the device does not keep up; its readings will be stale.
+        # If there was no room for the packet, the device does not keep up; its readings will then become stale.
 
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`."""

@@ -1,4 +1,4 @@
-"""A servo with a driver and a gate: one tick, whatever clock it is called by."""
+"""A servo with a driver and a safety gate: one tick and its log row, independent of the clock that calls it."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
 
 READ_SHARE = 0.3
-"""Share of a period that is waited for a reading: the rest is for the tick and the command."""
+"""Timeout of a reading as a share of the servo period; the rest is for the tick and the command."""
 
 CHANNELS: dict[str, tuple[int, ...]] = {
     "tick": (), "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
@@ -28,7 +28,8 @@ CHANNELS: dict[str, tuple[int, ...]] = {
     "heat": (), "missed": (), "lateness": (), "compute": (), "sequence": (), "clock": (), "theta": (3,),
     "gimbal": (3,), "round_trip": (), "jitter": (), "staleness": (), "lost": (), "refused": (), "temperature": (3,),
 }  # fmt: skip
-"""What a tick leaves behind: the loop's, the gate's (`asked` is before it, `force` after), clock's and device's."""
+"""Channels of a tick's row: of the loop, the gate (`asked` is the force before it, `force` after it), the clock and the
+device."""
 
 _PLACES: dict[str, slice] = {}
 for _name, _shape in CHANNELS.items():
@@ -36,7 +37,7 @@ for _name, _shape in CHANNELS.items():
     _PLACES[_name] = slice(_at, _at + (_shape[0] if _shape else 1))
 ROW_SIZE = _PLACES["temperature"].stop
 MISSED, LATENESS, COMPUTE = (_PLACES[_name].start for _name in ("missed", "lateness", "compute"))
-"""Places of a row that the clock fills."""
+"""Places in a row that are filled by the servo's clock (`Ticker.note_time`)."""
 
 
 def columns(rows: Array) -> dict[str, Array]:
@@ -45,20 +46,20 @@ def columns(rows: Array) -> dict[str, Array]:
 
 
 class GatedServo(NamedTuple):
-    """What is driven, and by what.
+    """A servo, the driver of its device, and the gate between them.
 
     Attributes
     ----------
     servo : Servo
-        Whose device is an `Exchange`.
+        The servo; its device must be an `Exchange`.
     world : World
-        Kept alive here.
+        Kept alive here, since the servo holds addresses of its memory.
     driver : Driver
-        Of the device.
+        Driver of the device.
     gate : Gate
-        Its limits.
+        Limits of the gate.
     offset : Array
-        Of the encoders, subtracted from the readings [rad], shape (3,).
+        Encoder offsets, subtracted from the readings [rad], shape (3,).
     """
 
     servo: Servo
@@ -69,22 +70,22 @@ class GatedServo(NamedTuple):
 
 
 class Ticker:
-    """Ticks of a gated servo, and the row that each leaves behind.
+    """Runs ticks of a gated servo, and holds the row of the last one.
 
     Parameters
     ----------
     parts : GatedServo
-        What is driven.
+        Servo, driver and gate.
 
     Attributes
     ----------
     row : Array
-        The last tick's, by `CHANNELS`, shape (`ROW_SIZE`,).
+        Row of the last tick, by `CHANNELS`, shape (`ROW_SIZE`,).
 
     Raises
     ------
     SimError
-        If the servo's device is no exchange.
+        If the servo's device is no `Exchange`.
     """
 
     def __init__(self, parts: GatedServo):
@@ -94,7 +95,7 @@ class Ticker:
         self.gated = GateMemory.of(parts.gate, parts.driver.identity.own_weight)
         self._ticks, frames = make_logs(parts.servo, 1)
         field = parts.servo.field
-        # All that a tick needs lies in arrays that are kept, and is reached by views that are: it makes no memory.
+        # All that a tick needs is in preallocated arrays, reached by views made here, so a tick allocates nothing.
         self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
         self._number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
@@ -106,7 +107,7 @@ class Ticker:
         self._keep_row = KeptCall(gather, (addresses_of(self._sources), self.row))
 
     def _row_sources(self) -> list[Array]:
-        """Where the numbers of a row come from, one after the other: views."""
+        """Views of the arrays from which a row is gathered, in the order of `CHANNELS`."""
         device, gated, told = self._device, self.gated, self.parts.driver.telemetry
         one = {
             "tick": (self._number, 0), "fault": (device.faults, FAULT_CODE),
@@ -125,26 +126,27 @@ class Ticker:
             "gimbal": device.reading[READING_GIMBAL : READING_GIMBAL + 3],
             "temperature": told[TEMPERATURE : TEMPERATURE + 3],
         }  # fmt: skip
-        return [sources.get(name, self.row[_PLACES[name]]) for name in CHANNELS]  # the clock's are told later
+        return [sources.get(name, self.row[_PLACES[name]]) for name in CHANNELS]  # those of the clock stay as they are
 
     @property
     def state(self) -> State:
-        """Of the gate."""
+        """State of the gate."""
         return State(int(self.gated.gate[GATE_STATE]))
 
     @property
     def fault(self) -> LatchedFault | None:
-        """That is latched."""
+        """The latched fault; None if there is none."""
         return latched(self._device.faults)
 
     def fail(self, fault: Fault, value: float) -> None:
-        """Latch a fault, from the next tick on."""
+        """Latch a fault, which takes effect from the next tick on."""
         latch(self._device.faults, int(fault), float(self._device.hand[HAND_TIME]), value)
 
     def tick(self, number: float, request: int = NO_REQUEST) -> None:
-        """Read, compute, write: tick `number`, a whole number, whose time is ``number T``.
+        """Read, compute and write for tick `number`, a whole number; its time is ``number T``.
 
-        A driver's fault is latched, and the motors are let go; nothing is raised.
+        `request` is `ARM`, `DISARM`, `CLEAR` or none (of `controllers.safety.arming`). A fault of the driver is latched
+        and the motors are switched off; nothing is raised.
         """
         parts, device = self.parts, self._device
         try:
@@ -167,6 +169,6 @@ class Ticker:
         self._keep_row()
 
     def note_time(self, missed: float, lateness: float, compute: float) -> None:
-        """Add to the row what the clock says: deadlines missed so far, lateness and computing time of this tick [s]."""
+        """Add the clock's channels to the row: deadlines missed so far, lateness and computing time of the tick [s]."""
         row = self.row
         row[MISSED], row[LATENESS], row[COMPUTE] = missed, lateness, compute

@@ -1,4 +1,4 @@
-"""What comes between the loop's tick and the motors of a real device, compiled: gate, torques, heat."""
+"""The compiled step between the loop's tick and the motors of a real device: gate, torques, thermal limit."""
 
 import math
 from typing import NamedTuple
@@ -20,31 +20,31 @@ from sim.world.encoders import PEAK_TORQUE, motor_torques
 
 CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
 THERMAL_TIME = 10.0
-"""Time constant of a motor's winding [s]: the RE 25's is of this order."""
+"""Thermal time constant of a motor's winding [s]: the RE 25's is of this order."""
 HOT = 0.98
-"""Share of what a motor can dissipate from which on a demand that stays is a fault."""
+"""Share of a motor's heat capacity above which a fault is latched."""
 
 MOTORS_HOT = int(Fault.MOTORS_HOT)
 TOLD_HEAT, TOLD_PUSHES = 0, 1
 
 
 class GateMemory(NamedTuple):
-    """A gate as the compiled tick holds it.
+    """Parameters and state of a gate for the compiled tick.
 
     Attributes
     ----------
     params, shaking, gate, shaken : Array
-        Of `controllers.safety.gate.pass_gate`.
+        Arguments of `controllers.safety.gate.pass_gate`.
     heat : Array
-        Of the motors (`controllers.safety.thermal`), shape (3,).
+        Thermal state of the motors (`controllers.safety.thermal`), shape (3,).
     told : Array
-        [share of a motor's heat that is used, 1 while the motors are on], shape (2,).
+        [largest share of a motor's heat capacity that is used, 1 while the motors are on], shape (2,).
     force, torque : Array
-        What gets through [N], and is commanded to the motors [N m], shape (3,).
+        Force that the gate lets through [N], and torques commanded to the motors [N m], shape (3,).
     cooling : float
         ``1 − exp(−T/τ)`` of the winding.
     own_weight : bool
-        Of the device (`sim.devices.driver.DeviceIdentity`).
+        Whether the device compensates for its own weight (`sim.devices.driver.DeviceIdentity`).
     """
 
     params: Array
@@ -60,7 +60,7 @@ class GateMemory(NamedTuple):
 
     @classmethod
     def of(cls, gate: Gate, own_weight: bool = False) -> "GateMemory":
-        """Memory of a gate before its first tick; its motors are cold."""
+        """Memory of a gate before its first tick, with cold motors."""
         return cls(
             gate.params(), gate.detector.params(), gate.fresh_memory(), gate.detector.fresh_memory(), np.zeros(3),
             np.zeros(2), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME), own_weight,
@@ -69,30 +69,31 @@ class GateMemory(NamedTuple):
 
 @entry_point
 def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array, asked: Array, request: int) -> None:
-    """From the force that the loop commands to the torques of the motors; zero in every state without force.
+    """Compute the motor torques for the force that the loop commands; zero in every gate state without force.
 
-    Limiter and tank are told what force the hand really gets. The linkage's weight is balanced in the share in which
-    the force is ramped in; that of a device which carries its own is added last, for its driver to take off again.
+    Limiter and tank are updated with the force that the hand really gets. Gravity compensation is ramped in together
+    with the force. If the device compensates for its own weight, the Phantom's gravity torques are added only at the
+    end, outside of all limits, because the driver subtracts them again.
 
     Parameters
     ----------
     device : Exchange
-        Whose `command` is written again.
+        Its `command` is overwritten.
     gated : GateMemory
         `force` and `torque` are written.
     limiter, tank : Array
-        Memory of both, of the loop's field.
+        Memory of limiter and energy tank of the loop's field.
     asked : Array
-        What the loop commands [N], shape (3,).
+        Force that the loop commands [N], in H, shape (3,).
     request : int
-        Of `controllers.safety.gate.pass_gate`.
+        Request to `controllers.safety.gate.pass_gate`.
     """
     force, torque, faults = gated.force, gated.torque, device.faults
     force[:] = asked
     pass_gate(gated.params, gated.shaking, gated.gate, gated.shaken, faults, device.hand, request, force)
     memory, held_back = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
     motor_torques(faults, memory, device.hand[HAND_TIME], force, torque)
-    # J(θ)ᵀF is ramped in with F, the weight is not yet.
+    # J(θ)ᵀF is already ramped in with F, the gravity torques are not yet.
     weight = gravity_torques((memory[0], memory[1], memory[2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))

@@ -1,32 +1,33 @@
-r"""What a linkage is, from a recording of it with no hand on the stylus: friction, inertia, delay, encoder offset.
+r"""Identification of a linkage from a recording without a hand on the stylus: friction, inertia, delay, offsets.
 
-With θ = reading − o, and J what the rotors and the handle add to the published inertia,
+With θ = reading − o, and J the inertia that rotors and handle add to the published one,
 
 .. math:: \frac{d}{dt}\left[(M(\theta) + J)\,\dot\theta\right] - C^T\dot\theta + N(\theta) + b\,\dot\theta
           + f_c\,\mathrm{sign}\,\dot\theta = \tau(t - d)
 
-is multiplied by smooth functions ψ of compact support and integrated (Shinbrot 1954; Preisig & Rippin, Comput. Chem.
-Eng. 17, 1993: modulating functions). By parts, the derivative falls on ψ:
+is multiplied by modulating functions ψ, smooth and of compact support, and integrated (Shinbrot 1954; Preisig & Rippin,
+Comput. Chem. Eng. 17, 1993). Integration by parts moves the derivative to ψ:
 
 .. math:: \int \psi\,\tau(t-d) + \int \dot\psi\,(M + J)\,\dot\theta + \int \psi\,(C^T\dot\theta - N - b\,\dot\theta
           - f_c\,\mathrm{sign}\,\dot\theta) = 0
 
-so no acceleration is needed, and no filter: the rate between two readings is exactly their difference, and the torque
-between two commands is constant. What is left is linear in J, b, f_c, and nearly so in d and o: Gauss–Newton.
+so neither accelerations nor filters are needed: the mean rate between two readings is exactly their difference over the
+period, and the torque between two commands is constant. The residual is linear in J, b, f_c, and nearly so in d and o,
+so Gauss–Newton is used.
 
-A window in which a joint comes to rest tells nothing of its friction's direction, and is left out for that joint. The
-offset of θ1 changes neither weight nor inertia, so no motion tells it: it is found at the joint's stop.
+In a window in which a joint comes to rest the direction of its friction is not known; the window is left out for that
+joint. The offset of θ1 affects neither gravity nor inertia, so it cannot be found from motion, only at the joint stop.
 
-The weights' torques W₂ cos θ₂ and W₃ sin θ₃ are found as well, for they are small differences of large masses: one
-percent of a published mass would else be an offset of a degree. All are in units of the commanded torque: a wrong
-torque constant scales them.
+The amplitudes of the gravity torques W₂ cos θ₂ and W₃ sin θ₃ are estimated as well, since they are small differences of
+large masses: an error of one percent in a published mass would otherwise appear as an offset of a degree. All
+parameters are in units of the commanded torque, so a wrong torque constant scales them.
 
-Intervals have two parts. One is for noise, from the estimating equations themselves (Huber 1967; Newey & West,
-Econometrica 55, 1987, for windows that overlap), wide enough for all parameters at once (Bonferroni). The other is for
-what the equations leave out, a torque ripple or a friction that changes from place to place, which is the same again in
-every lap, so that no average takes it out: what is left beyond the encoders' noise may be a torque in the shape in time
-that moves a parameter most. How noisy the encoders are is told by the readings' sixth differences, to which no motion
-of a hand's or a device's bandwidth contributes.
+Confidence intervals are the sum of two parts. The first covers noise, from the estimating equations themselves (Huber
+1967; Newey & West, Econometrica 55, 1987, for windows that overlap), simultaneously for all parameters (Bonferroni).
+The second covers unmodelled torques, such as torque ripple or position-dependent friction, which repeat in every lap
+and thus do not average out: the residual beyond the encoders' noise is taken as a torque with the time course that
+moves a parameter most. The encoders' noise is estimated from sixth differences of the readings, to which motion within
+the bandwidth of a hand or a device does not contribute.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,35 +47,37 @@ NAMES = (
     *(f"coulomb{i}" for i in (1, 2, 3)), *(f"viscous{i}" for i in (1, 2, 3)), *(f"inertia{i}" for i in (1, 2, 3)),
     "delay", "offset2", "offset3", "weight2", "weight3",
 )  # fmt: skip
-"""Of the parameters: [N m], [N m s/rad], added [kg m²], [s], [rad], W₂ and W₃ [N m]."""
+"""Names of the parameters: Coulomb friction [N m], viscous friction [N m s/rad], added inertia [kg m²], delay [s],
+encoder offsets [rad], and amplitudes of the gravity torques, W₂ and W₃ [N m]."""
 _DELAY, _OFFSET, _WEIGHT = 9, 10, 12
 
 WINDOW = 0.2
-"""Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below the encoders' noise. With 0.12 s the
-noise of the rates, which are regressors, moves frictions by two standard errors towards each other."""
-_HOP = 0.25  # of a window, from one to the next
-_SMOOTH = 4  # readings on either side, over which the rate is taken that tells friction's direction
-_SLOWEST = 0.1  # [rad/s] below which that direction is not sure
-_STEPS = 12  # of Gauss–Newton
-_LONGEST = 1.999  # periods of delay for which there are torques in the equations
-_LAGS = 4  # windows that share noise with one: they overlap, and noise of readings is white
+"""Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below that of the encoders' noise. With 0.12 s
+the noise of the rates, which are regressors, moves Coulomb and viscous friction by two standard errors towards each
+other."""
+_HOP = 0.25  # offset of successive windows, as a share of their length
+_SMOOTH = 4  # readings on either side over which the rate that gives the direction of friction is averaged
+_SLOWEST = 0.1  # [rad/s] rate below which that direction is uncertain
+_STEPS = 12  # Gauss–Newton steps
+_LONGEST = 1.999  # longest delay, in periods, for which the equations hold torques
+_LAGS = 4  # number of following windows that share noise with one, since windows overlap
 CONFIDENCE = 0.95
-"""Of all intervals together."""
-_DIFFERENCES, _GAIN = 6, 924  # and by how much that many of them amplify white noise's variance: binomial 12 over 6
-_SURE = 1.5  # times the variance that the encoders explain: one of white noise is taken for no more
+"""Joint confidence level of all intervals."""
+_DIFFERENCES, _GAIN = 6, 924  # order of the differences, and their gain on the variance of white noise: 12 over 6
+_SURE = 1.5  # factor on the variance explained by the encoders, up to which a residual counts as noise
 
 
 class Motion(NamedTuple):
-    """Consecutive readings of a device, and what it was commanded after each.
+    """Consecutive readings of a device, and the torque commanded after each.
 
     Attributes
     ----------
     clock : Array
-        The device's own [s], shape (n,).
+        Times by the device's own clock [s], shape (n,).
     theta : Array
-        Readings [rad], shape (n, 3).
+        Joint angles as read [rad], shape (n, 3).
     torque : Array
-        [N m], shape (n, 3).
+        Commanded joint torques [N m], shape (n, 3).
     """
 
     clock: Array
@@ -84,16 +87,16 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What was found.
+    """Result of an identification.
 
     Attributes
     ----------
     values, margins : Array
-        Of the parameters, by `NAMES`, and half of their intervals, shape (14,).
+        Parameters, by `NAMES`, and half-widths of their confidence intervals, shape (14,).
     windows : int
-        That were used, all joints together.
+        Number of windows used, summed over the joints.
     unexplained : float
-        RMS of the torque that is left over the RMS of the torque of motion and friction.
+        RMS of the residual torque over the RMS of the commanded torque.
     """
 
     values: Array
@@ -103,16 +106,16 @@ class Identified:
 
 
 def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: npt.NDArray[np.bool_]) -> list[Motion]:
-    """Stretches of consecutive ticks that are used, each at least three windows long.
+    """Split a recording into stretches of consecutive usable ticks, each longer than three windows.
 
     Parameters
     ----------
     tick, clock : Array
         Number of the tick, and the device's clock [s], shape (n,).
     theta, torque : Array
-        Shape (n, 3).
+        Joint angles [rad] and torques [N m], shape (n, 3).
     used : array of bool
-        Whether motors were on and nobody held the stylus, shape (n,).
+        Whether the motors were on and no hand held the stylus, shape (n,).
     """
     new = np.diff(clock) > 0.0
     joined = used[1:] & used[:-1] & (np.diff(tick) == 1.0) & new
@@ -124,32 +127,32 @@ def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: npt
 
 
 class _Equations(NamedTuple):
-    """Windows of all motions: what does not depend on the nonlinear parameters, and what it takes for the rest."""
+    """Data of the windows of all motions, from which the residuals are computed for given parameters."""
 
-    weights: Array  # ψ at the midpoints, times the interval (windows, length)
+    weights: Array  # ψ at the midpoints of the intervals, times the interval's length, shape (length,)
     slopes: Array  # ψ̇, likewise
-    rates: Array  # (windows, length, 3)
-    smooth: Array  # the same over 2 _SMOOTH + 1 readings, for what is not linear in them
-    middles: Array  # θ as read, likewise
-    torque: Array
-    period: float
+    rates: Array  # joint rates of the intervals [rad/s], shape (windows, length, 3)
+    smooth: Array  # the same averaged over 2 _SMOOTH + 1 intervals, for terms that are not linear in the rates
+    middles: Array  # θ as read at the midpoints [rad], shape (windows, length, 3)
+    torque: Array  # torques of the intervals at shifts of −2 … 1 periods [N m], shape (windows, length, 4, 3)
+    period: float  # [s]
     grain: Array  # standard deviation of the readings' noise [rad], shape (3,)
-    usable: npt.NDArray[np.bool_]  # (windows, 3)
-    breaks: npt.NDArray[np.bool_]  # whether a window begins a motion
+    usable: npt.NDArray[np.bool_]  # whether a joint moved throughout a window, shape (windows, 3)
+    breaks: npt.NDArray[np.bool_]  # whether a window is the first of a motion, shape (windows,)
 
 
 def identify_linkage(motions: Sequence[Motion]) -> Identified:
-    """Find what a linkage is.
+    """Estimate the parameters of a linkage.
 
     Parameters
     ----------
     motions : sequence of Motion
-        With no hand on the stylus; together they should move every joint both slowly and fast.
+        Motions without a hand on the stylus; together they should move every joint both slowly and fast.
 
     Raises
     ------
     SimError
-        If there is too little motion to tell.
+        If there is too little motion, or the delay is at the end of the searched interval.
     """
     if not motions:
         raise SimError(f"no motion of {3.0 * WINDOW:g} s or more under force and without a gap; expected a longer run")
@@ -184,9 +187,9 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
 
 
 def _left_out(equations: _Equations, left: Array, inertia: Array) -> Array:
-    """RMS of the torque that is left beyond what the encoders' noise explains, shape (3,) [N m].
+    """RMS of the residual torque beyond what the encoders' noise explains [N m], shape (3,).
 
-    In a window the noise n of a reading is Σ (ψ̇ₖ₋₁ − ψ̇ₖ) M nₖ, for momentum is M times a difference of readings.
+    Noise n of the readings enters a window as Σ (ψ̇ₖ₋₁ − ψ̇ₖ) M nₖ, since momentum is M times a difference of readings.
     """
     angles = tuple(np.moveaxis(equations.middles[:, len(equations.weights) // 2], -1, 0))
     rows = mass_matrix.py_func(angles)
@@ -201,9 +204,9 @@ def _left_out(equations: _Equations, left: Array, inertia: Array) -> Array:
 
 
 def _moved_most(equations: _Equations, sensitivity: Array, scale: Array, torque: Array) -> Array:
-    """How far torques of an RMS, shape (3,) [N m], move each parameter in the worst shape in time.
+    """Largest change of each parameter by torques of a given RMS [N m], shape (3,), with the worst time course.
 
-    By Cauchy and Schwarz the norm of the parameter's row of the pseudo-inverse, times √n.
+    By the Cauchy–Schwarz inequality it is the norm of the parameter's row of the pseudo-inverse, times √n.
     """
     rows, sizes = _stacked(equations, sensitivity, np.broadcast_to(torque, equations.usable.shape), scale)
     return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows) * sizes, axis=1)
@@ -217,13 +220,13 @@ def _first_guess() -> Array:
 
 
 def _equations(motions: Sequence[Motion]) -> _Equations:
-    """Windows over all motions; the period is taken from the clock."""
+    """Cut all motions into windows; the period is the median difference of the clock."""
     period = float(np.median(np.concatenate([np.diff(motion.clock) for motion in motions])))
     length, hop = round(WINDOW / period), max(1, round(_HOP * WINDOW / period))
     wiggles = np.concatenate([np.diff(motion.theta, _DIFFERENCES, axis=0) for motion in motions])
     grain = np.sqrt(np.mean(wiggles**2, axis=0) / _GAIN)
     s = (np.arange(length) + 0.5) / length
-    # ψ = (8/3) sin⁴(π s)/W has a mean of 1/W, and three derivatives that end at zero.
+    # ψ = (8/3) sin⁴(π s)/W has a mean of 1/W, and ψ and three derivatives are zero at both ends.
     weights = 8.0 / 3.0 * np.sin(np.pi * s) ** 4 / length
     slopes = 8.0 / 3.0 * 4.0 * np.pi * np.sin(np.pi * s) ** 3 * np.cos(np.pi * s) / length / WINDOW
     found: list[tuple[npt.NDArray[Any], ...]] = []
@@ -235,7 +238,7 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
         smooth = np.stack([np.convolve(rate, box, mode="same") for rate in rates.T], axis=1)
         starts = np.arange(_SMOOTH + 2, n - length - _SMOOTH, hop)
         at = starts[:, None] + np.arange(length)
-        # The torque of the interval and of those around it, for delays of up to two periods either way.
+        # The torque of the interval and of its neighbours, for delays from −1 to 2 periods.
         commands = np.stack([motion.torque[at + shift] for shift in (-2, -1, 0, 1)], axis=2)
         usable = np.min(np.abs(smooth[at]), axis=1) > _SLOWEST
         new = np.zeros(len(starts), dtype=bool)
@@ -246,7 +249,7 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
 
 
 def _mean_torque(equations: _Equations, delay: float) -> Array:
-    """∫ψ τ(t − d): in each interval the torque before lasts for d; with the derivative by d, shape (windows, 2, 3)."""
+    """∫ψ τ(t − d) and its derivative by d, shape (windows, 2, 3); in each interval the previous torque acts for d."""
     whole = int(np.floor(delay / equations.period))
     share = delay / equations.period - whole
     now, before = np.clip(2 - whole, 0, 3), np.clip(1 - whole, 0, 3)
@@ -257,7 +260,7 @@ def _mean_torque(equations: _Equations, delay: float) -> Array:
 
 
 def _mechanics(equations: _Equations, values: Array) -> Array:
-    """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) with the offset and the weights of `values`, shape (windows, 3)."""
+    """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) with the offsets and gravity amplitudes of `values`, shape (windows, 3)."""
     offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
     theta1, theta2, theta3 = angles = tuple(np.moveaxis(equations.middles - offset, -1, 0))
     smooth = tuple(np.moveaxis(equations.smooth, -1, 0))
@@ -273,7 +276,7 @@ def _times(rows: Iterable[Any], vector: Sequence[Array] | Array) -> list[Array]:
 
 
 def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
-    """What is left of the equations, shape (windows, 3), and its derivatives, shape (windows, 3, 14)."""
+    """Residuals of the equations, shape (windows, 3), and their derivatives, shape (windows, 3, 14)."""
     coulomb, viscous, inertia = values[:3], values[3:6], values[6:9]
     torque = _mean_torque(equations, float(values[_DELAY]))
     base, step = _mechanics(equations, values), 1e-5
@@ -294,13 +297,13 @@ def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
 
 
 def _stacked(equations: _Equations, sensitivity: Array, left: Array, scale: Array) -> tuple[Array, Array]:
-    """Rows of the usable equations in units of each joint's noise."""
+    """Derivatives and residuals of the usable equations, in units of each joint's noise `scale`."""
     rows = (sensitivity / scale[:, None])[equations.usable]
     return rows, (left / scale)[equations.usable]
 
 
 def _covariance(equations: _Equations, sensitivity: Array, left: Array, scale: Array) -> Array:
-    """H⁻¹ S H⁻¹ with the long-run covariance S of the scores, Bartlett's weights over `_LAGS` windows."""
+    """Sandwich covariance H⁻¹ S H⁻¹, S the long-run covariance of the scores by Bartlett weights over `_LAGS` lags."""
     usable = equations.usable
     scores = np.einsum("wi,wip->wp", np.where(usable, left / scale, 0.0), sensitivity / scale[:, None])
     rows, _ = _stacked(equations, sensitivity, left, scale)

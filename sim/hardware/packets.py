@@ -1,6 +1,6 @@
-"""Packets of numbers through a local socket, by libc's own calls from compiled code: nothing is taken from the heap.
+"""Packets of numbers through a local socket, by libc calls from compiled code, without heap allocation.
 
-Linux's `ppoll` and errno; `socket.SOCK_SEQPACKET` between processes is Linux's as well.
+For Linux only: `ppoll`, `__errno_location`, and `socket.SOCK_SEQPACKET` between processes.
 """
 
 import errno
@@ -22,9 +22,9 @@ _NOW, _AGAIN = int(socket.MSG_DONTWAIT), int(errno.EAGAIN)
 _READABLE = 1 << 32  # POLLIN in `struct pollfd`, after the descriptor
 _CLOCK_MONOTONIC = 1
 NOTHING = -1
-"""No packet is there, or no room for one."""
+"""Result: there is no packet to receive, or no room to send one."""
 BROKEN = 0
-"""Nobody is at the other end."""
+"""Result: the other end is closed."""
 
 
 @njit
@@ -37,7 +37,7 @@ def monotonic() -> float:
 
 @njit
 def receive(descriptor: int, packet: Array) -> int:
-    """Take the next packet; its size in bytes, or `NOTHING`, or `BROKEN`."""
+    """Receive the next packet without waiting; returns its size in bytes, `NOTHING` or `BROKEN`."""
     size = _receive(descriptor, packet.ctypes.data, 8 * len(packet), _NOW)
     if size >= 0:
         return size
@@ -46,7 +46,7 @@ def receive(descriptor: int, packet: Array) -> int:
 
 @njit
 def transmit(descriptor: int, packet: Array) -> int:
-    """Send a packet; its size in bytes, or `NOTHING`, or `BROKEN`."""
+    """Send a packet without waiting; returns its size in bytes, `NOTHING` or `BROKEN`."""
     size = _transmit(descriptor, packet.ctypes.data, 8 * len(packet), _NOW)
     if size >= 0:
         return size
@@ -55,7 +55,7 @@ def transmit(descriptor: int, packet: Array) -> int:
 
 @njit
 def wait_for_packet(descriptor: int, seconds: float) -> None:
-    """Wait until there is a packet, or until a time of less than a second has passed [s]."""
+    """Wait until there is a packet, at most for a time of less than a second [s]."""
     polled, time = work_integers(1), work_integers(2)
     polled[0], time[0], time[1] = descriptor + _READABLE, 0, int(seconds * 1e9)
     _ppoll(polled.ctypes.data, 1, time.ctypes.data, 0)

@@ -1,4 +1,4 @@
-"""What Linux gives a process that must not be late, and waiting for a moment."""
+"""Real-time scheduling and memory locking on Linux, and waiting for an absolute deadline."""
 
 import ctypes
 import gc
@@ -6,20 +6,20 @@ import os
 import time
 
 PRIORITY = 80
-"""Of SCHED_FIFO, above the threads of interrupts (50)."""
+"""Priority under SCHED_FIFO, above interrupt threads (50)."""
 SPIN = 150e-6
-"""How long before a deadline a process wakes and looks at the clock instead of sleeping [s]."""
+"""Time before a deadline from which a process busy-waits instead of sleeping [s]."""
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 
 def become_realtime() -> list[str]:
-    """Ask for SCHED_FIFO and for memory that stays, turn the garbage collector off; says what was got and what not.
+    """Request SCHED_FIFO and locked memory, and turn the garbage collector off.
 
     Returns
     -------
     list of str
-        One sentence each.
+        One sentence for each request: whether it was granted, and if not, why.
     """
     gc.collect()
     gc.freeze()
@@ -34,7 +34,7 @@ def become_realtime() -> list[str]:
             f"({error}); expected CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf."
         )
     libc = ctypes.CDLL(None, use_errno=True)
-    # Both at once: on its own a lock of what is to come would make later allocations fail at the limit.
+    # Both flags in one call: if only future pages were locked, later allocations would fail at the memlock limit.
     if hasattr(libc, "mlockall") and libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0:
         said.append("Its memory stays in RAM (mlockall).")
     else:
@@ -44,7 +44,7 @@ def become_realtime() -> list[str]:
 
 
 def wait_until(deadline: float) -> float:
-    """Wait until `time.monotonic` is at a deadline [s], the last `SPIN` awake; returns by how much it is past it [s].
+    """Wait until `time.monotonic` reaches a deadline [s], busy-waiting for the last `SPIN`; returns the lateness [s].
 
     `time.sleep` is clock_nanosleep with an absolute time on Linux.
     """

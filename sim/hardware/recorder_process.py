@@ -1,6 +1,7 @@
-"""The recorder's process: takes the servo's rows, shows them to the twin, and writes them; it may die or freeze.
+"""The recorder's process: takes the servo's rows from a ring, runs the twin on them, and writes them.
 
-What it did not take in time is gone, and the recording says how much: the channel `tick` jumps, and `dropped` counts.
+It may die or freeze without effect on the servo. Rows that it does not take in time are lost, which the recording
+shows: the channel `tick` jumps, and `dropped` counts them.
 """
 
 import errno
@@ -22,13 +23,14 @@ from sim.recording.recorder import DiskFull, Group, Recorder
 from sim.recording.recording import RecordingError
 
 TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_READY, TOLD_SIZE = 0, 1, 2, 3, 6, 7, 8
-"""What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m], and
-whether it is ready, which takes longer than rows are kept where the twin is to be compiled."""
+"""Places in the recorder's status: rows written and dropped, errno of the error that stopped it, the hand's force (3)
+[N], distance from twin to device [m], and 1 once it is ready: compiling the twin may take longer than the ring holds
+rows, so the servo starts only then."""
 
 RING_SECONDS = 5.0
-"""How long a recorder may stand still before rows are lost."""
+"""Time for which the ring holds rows, so that a recorder may stall for so long without loss [s]."""
 
-_REST = 0.02  # [s] between two looks at the ring
+_REST = 0.02  # [s] polling interval of the ring
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,13 @@ class RecordingJob:
     Parameters
     ----------
     path : Path
-        File to make.
+        File to create.
     config, static : mapping
-        Of `sim.recording.recorder.Recorder`.
+        Those of `sim.recording.recorder.Recorder`.
     seed : int
         Likewise.
     scene : SceneConfig
-        Of the twin's world; its servo period is the servo's.
+        Parameters of the twin's world, including the servo's period.
     """
 
     path: Path
@@ -55,15 +57,14 @@ class RecordingJob:
 
 
 def hardware_groups(period: float) -> dict[str, Group]:
-    """What is recorded of a servo of a period [s]: its rows, how many were dropped before each, and the twin's."""
+    """The channels recorded for a servo of a given period [s]: its rows, how many were dropped so far, the twin's."""
     return {"ticks": Group(1.0 / period, CHANNELS | {"dropped": ()} | TWIN_CHANNELS)}
 
 
 def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: SharedNumbers) -> None:
-    """Record until `orders` has a 1 and nothing is left; the target of a process.
+    """Record until `orders` holds a 1, or the parent process is gone, and no row is left; the target of a process.
 
-    A disk that is full, or any other error of writing, ends the recording where it is, and is told; the servo never
-    hears of it.
+    A full disk, or any other error of writing, ends the recording and is reported in `told`; the servo is not affected.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     status, order, parent = np.zeros(TOLD_SIZE), np.zeros(1), os.getppid()
@@ -95,4 +96,4 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: Shar
         full = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
         status[TOLD_ERROR] = float(getattr(error, "errno", None) or full)
         told.write(status)
-        os._exit(1)  # HDF5 would write again on its way out
+        os._exit(1)  # a normal exit would let HDF5 write again

@@ -1,8 +1,7 @@
-"""The servo's own process: absolute deadlines, a heartbeat each way, and nobody who can make it wait.
+"""The servo's process: absolute deadlines, a heartbeat in each direction, and no blocking on other processes.
 
-It writes each tick's row into shared memory and goes on: who reads them, how late, or whether at all, is not its
-affair. A deadline that was missed is counted and left out, so the time of a tick is the time that it is, and no burst
-of ticks follows a stop.
+Each tick's row is written to shared memory without waiting for any reader. A missed deadline is counted and skipped, so
+the number of a tick always gives its time, and no burst of ticks follows a stall.
 """
 
 import os
@@ -35,24 +34,25 @@ from sim.hardware.shared import Ring, SharedNumbers, append_row
 from sim.hardware.spread import Quantiles, Spread, count_time
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
-"""What controls tell the servo: a number that changes, the number of a request, the request, 1 to end."""
+"""Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end
+the servo."""
 
 _getppid = types.ExternalFunction("getppid", types.int32())
 
 
 @dataclass(frozen=True)
 class ServoClock:
-    """How exactly a servo keeps its time.
+    """Timing limits of a servo.
 
     Parameters
     ----------
     late : float
-        Lateness of a tick that is a fault [s]; below it, missed deadlines are counted, and a device whose firmware let
-        go meanwhile is ramped in again.
+        Lateness of a tick from which it is a fault [s]; below, missed deadlines are counted, and if the firmware's
+        watchdog switched the motors off meanwhile, the force is ramped in again.
     heartbeat : float
-        Time without a sign of the controls that is a fault [s].
+        Time without a heartbeat of the controls from which it is a fault [s].
     realtime : bool
-        Whether to ask the system for precedence.
+        Whether to request real-time scheduling.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class ServoClock:
 
 
 class Ready(NamedTuple):
-    """A servo that has begun: its device, its period [s], and what the system gave it."""
+    """Report of a servo that has started: its device, its period [s], and the results of `become_realtime`."""
 
     identity: DeviceIdentity
     period: float
@@ -79,26 +79,26 @@ class Ready(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """A servo that could not begin, and why."""
+    """Report of a servo that could not start, with the reason."""
 
     why: str
 
 
 class Ended(NamedTuple):
-    """A servo that has ended.
+    """Final report of a servo.
 
     Attributes
     ----------
     ticks, missed : int
-        Run, and deadlines missed.
+        Ticks run, and deadlines missed.
     compute, lateness : Quantiles
-        Of a tick.
+        Computing time and lateness of a tick.
     memory_growth : float
-        Of the resident memory since the first tick [MB].
+        Growth of the resident memory since the first tick [MB].
     descriptors : int
-        Open files more than at the first tick.
+        Growth of the number of open files since the first tick.
     broken : str
-        The program's own failure, if that was the end.
+        Traceback of an internal error that ended the servo; empty if there was none.
     """
 
     ticks: int
@@ -111,7 +111,7 @@ class Ended(NamedTuple):
 
 
 class Channels(NamedTuple):
-    """What the servo's process shares with others: orders in; the last row, all rows, and `Ready` and `Ended` out."""
+    """Connections of the servo's process: orders in; out the last row, a ring of rows, and its reports."""
 
     orders: SharedNumbers
     status: SharedNumbers
@@ -120,18 +120,18 @@ class Channels(NamedTuple):
 
 
 def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock) -> None:
-    """Run a servo until it is told to end, or nobody is there to tell; the target of a process.
+    """Run a servo until it is ordered to end or its parent process is gone; the target of a process.
 
     Parameters
     ----------
     make : callable
-        Opens the device, and makes what is driven; called here, so it has to be picklable.
+        Opens the device and makes the gated servo, in this process; picklable.
     channels : Channels
-        Shared.
+        Connections to the controls and the recorder.
     clock : ServoClock
-        See there.
+        Timing limits.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the controls' to deal with
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the controls
     signal.signal(signal.SIGTERM, _leave)
     try:
         parts = make()
@@ -143,7 +143,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
     try:
         process.begin()
         process.run()
-    except Exception:  # whatever it is: the motors go off, and who controls is told
+    except Exception:  # on any error the motors are switched off, and the controls get the traceback
         broken = traceback.format_exc()
     finally:
         parts.driver.let_go()
@@ -158,7 +158,7 @@ def _leave(number: int, frame: object) -> None:
 
 @entry_point
 def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
-    """Read what the controls order (as `read_whole`), and whose child this process is, (1,)."""
+    """Read the controls' order (as `read_whole`), and the id of the parent process, shape (1,)."""
     read_whole(count, shared, whole, order)
     parent[0] = _getppid()
 
@@ -167,7 +167,7 @@ def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, pare
 def leave_row(
     row: Array, status_count: IntArray, status: Array, count: IntArray, rows: Array, compute: Spread, lateness: Spread
 ) -> None:
-    """Show a tick's row to the others, and count its times."""
+    """Publish a tick's row in status and ring, and count its computing time and lateness."""
     write_whole(status_count, status, row)
     append_row(count, rows, row)
     count_time(compute, float(row[COMPUTE]))
@@ -175,17 +175,17 @@ def leave_row(
 
 
 class ServoProcess:
-    """A servo against the clock: what `serve` runs.
+    """A servo that ticks in real time, as run by `serve`.
 
-    A tick takes nothing from the heap: compiled code works on arrays that are kept, and what Python counts and
-    compares are floating-point numbers, which it takes from a list of its own; whole numbers above 256 it makes anew.
+    A tick allocates nothing on the heap: compiled code works on preallocated arrays, and Python counts and compares
+    only floats, which CPython takes from a free list, whereas integers above 256 would be allocated.
 
     Parameters
     ----------
     ticker : Ticker
-        What is driven.
+        Runs the ticks.
     channels, clock
-        Of `serve`.
+        Those of `serve`.
     """
 
     def __init__(self, ticker: Ticker, channels: Channels, clock: ServoClock):
@@ -203,18 +203,18 @@ class ServoProcess:
         self._resources = _resources()
 
     def begin(self) -> None:
-        """Compile and warm up with the motors off, and take precedence."""
+        """Compile and warm up with the motors off, then request real-time scheduling and report `Ready`."""
         for _ in range(3):
             self._ticker.tick(0)
         said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._ticker.tick(0)
-        self._rows.sum()  # what is touched for the first time takes a page from the system
-        self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # what came while nobody was there to read
+        self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
+        self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # losses before the start do not count
         self._resources = _resources()
         self._told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:
-        """Tick at absolute deadlines, until there is an order to end, or nobody who could give one."""
+        """Tick at absolute deadlines, until there is an order to end or the parent process is gone."""
         period, parent = self._period, float(os.getppid())
         begin = self._heard = time.monotonic()
         number = 1.0
@@ -228,7 +228,7 @@ class ServoProcess:
             number += 1.0
 
     def turn(self, number: float, late: float) -> bool:
-        """Do tick `number`, which begins late by so much [s]; False, and none, if there is an order to end."""
+        """Run tick `number`, `late` [s] after its deadline; returns False, without running it, on an order to end."""
         now, order, ticker = time.monotonic(), self._order, self._ticker
         self._hear()
         if order[ORDER_STOP] > 0.0:
@@ -247,11 +247,11 @@ class ServoProcess:
         return True
 
     def close(self) -> None:
-        """Let go of the memory that is shared, before it is closed."""
+        """Drop all views of the shared memory, so that it can be closed."""
         del self._hear, self._leave, self._rows
 
     def ended(self, broken: str) -> Ended:
-        """What to say at the end."""
+        """The final report."""
         memory, descriptors = (now - then for now, then in zip(_resources(), self._resources, strict=True))
         return Ended(
             int(self._ticks), int(self._missed), self._compute.quantiles(), self._lateness.quantiles(), memory,
@@ -260,7 +260,7 @@ class ServoProcess:
 
 
 def _resources() -> tuple[float, int]:
-    """Resident memory [MB] and open files of this process; zeros where the system does not tell."""
+    """Resident memory [MB] and number of open files of this process; zeros where ``/proc`` is missing."""
     status = Path("/proc/self/statm")
     if not status.exists():
         return 0.0, 0

@@ -1,4 +1,4 @@
-"""Memory that processes share: numbers behind a sequence lock, and a ring of rows. Neither makes its writer wait."""
+"""Shared memory between processes: numbers under a sequence lock, and a ring of rows; the writer never waits."""
 
 import math
 from multiprocessing.shared_memory import SharedMemory
@@ -13,7 +13,7 @@ from sim.compilation.sequence_lock import barrier, read_whole, write_whole
 
 @entry_point
 def append_row(count: IntArray, rows: Array, row: Array) -> None:
-    """`Ring.append`."""
+    """Compiled `Ring.append`."""
     place = count[0] % len(rows)
     for i in range(len(row)):
         rows[place, i] = row[i]
@@ -22,16 +22,16 @@ def append_row(count: IntArray, rows: Array, row: Array) -> None:
 
 
 class _Shared:
-    """Memory of a whole number and an array; a process may end without closing it.
+    """Shared memory of an integer, `count`, and an array, `numbers`; a process may end without closing it.
 
-    `count` and `numbers` are those, for compiled code; who keeps them lets them go before the memory is closed.
+    Other references to `count` and `numbers` must be dropped before the memory is closed.
 
     Parameters
     ----------
     shape : tuple of int
-        Of the array.
+        Shape of the array.
     name : str, optional
-        Of memory that is there; by default it is made.
+        Name of existing shared memory; by default new memory is created.
     """
 
     def __init__(self, shape: tuple[int, ...], name: str | None):
@@ -44,7 +44,7 @@ class _Shared:
             self.numbers[:] = 0.0
 
     def close(self) -> None:
-        """Let the memory go; who made it removes it."""
+        """Unmap the memory; the object that created it also removes it."""
         self._unmap()
         if self._owner:
             self._memory.unlink()
@@ -54,23 +54,24 @@ class _Shared:
             self._unmap()
 
     def _unmap(self) -> None:
-        # Memory cannot be given back while there are views into it.
+        # Shared memory cannot be closed while there are views of it.
         del self.count, self.numbers
         self._memory.close()
 
 
 class SharedNumbers(_Shared):
-    """Numbers that one process writes and others read, never half of one writing and half of the next.
+    """Numbers that one process writes and others read, always consistently.
 
-    By a sequence lock: the writer counts up to an odd number, writes, and counts up to an even one; a reader that sees
-    an odd number, or another one after than before, reads again. May be sent to another process as an argument of it.
+    By a sequence lock: the writer increments the count to an odd number, writes, and increments it to an even one; a
+    reader that sees an odd count, or a count that changed while it read, reads again. May be passed to another process
+    as an argument.
 
     Parameters
     ----------
     size : int
-        How many.
+        Number of numbers.
     name : str, optional
-        Of memory that is there; by default it is made.
+        Name of existing shared memory; by default new memory is created.
     """
 
     def __init__(self, size: int, name: str | None = None):
@@ -85,17 +86,17 @@ class SharedNumbers(_Shared):
         write_whole(self.count, self.numbers, numbers)
 
     def read(self, into: Array) -> bool:
-        """Read all of them, shape (size,); False, and nothing, if a writer was stopped in the middle of them."""
+        """Read all of them, shape (size,); False, with `into` unchanged, if a writer stopped while writing."""
         return read_whole(self.count, self.numbers, self.whole, into)
 
 
 class Ring(_Shared):
-    """Rows that one process appends and another takes; a reader that does not keep up loses the oldest.
+    """A ring buffer of rows that one process appends and another takes; a slow reader loses the oldest rows.
 
     Parameters
     ----------
     rows, width : int
-        How many rows there is room for, and numbers in each.
+        Capacity in rows, and numbers per row.
     name : str, optional
         As in `SharedNumbers`.
     """
@@ -108,23 +109,23 @@ class Ring(_Shared):
         return type(self), (*self._shape, self._memory.name)
 
     def append(self, row: Array) -> None:
-        """Append a row, shape (width,), and count it only then."""
+        """Append a row, shape (width,); the count is raised after the row is written."""
         append_row(self.count, self.numbers, row)
 
     def take(self) -> tuple[Array, int]:
-        """What has been appended since the last call.
+        """Take the rows appended since the last call.
 
         Returns
         -------
         rows : Array
             Shape (n, width).
         lost : int
-            Rows before them that were overwritten.
+            Number of rows before them that were overwritten.
         """
         rows, first, count = self._shape[0], self._taken, int(self.count[0])
         begin = max(first, count - rows + 1)
         taken = self.numbers[np.arange(begin, count) % rows]
-        # What was written over meanwhile: the row that is being written, and those before it.
+        # Drop rows overwritten during the copy, including the one being written now.
         sound = max(begin, int(self.count[0]) - rows + 1)
         self._taken = count
         return taken[min(sound, count) - begin :], min(sound, count) - first

@@ -1,4 +1,4 @@
-"""How long something took, over any number of times, in memory that does not grow."""
+"""A histogram of durations with quantiles, in constant memory."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,12 @@ from numba import njit
 
 from controllers.state import Array, IntArray
 
-BIN = 1e-6  # [s]
-_BINS = 100_000  # so up to 0.1 s; what is longer is counted in the last
+BIN = 1e-6  # [s] width of a bin
+_BINS = 100_000  # up to 0.1 s; longer times are counted in the last bin
 
 
 class Quantiles(NamedTuple):
-    """Of a time [s]: middle, 99 and 99.9 of 100, the longest, and how often it was taken."""
+    """Quantiles of a duration [s]: median, 99 %, 99.9 %, the longest, and the number of samples."""
 
     p50: float
     p99: float
@@ -22,18 +22,18 @@ class Quantiles(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Times counted by the microsecond: how many in each, shape (`_BINS`,), and the longest [s], shape (1,)."""
+    """A histogram of durations: samples in each bin, shape (`_BINS`,), and the longest duration [s], shape (1,)."""
 
     counts: IntArray
     longest: Array
 
     @classmethod
     def empty(cls) -> "Spread":
-        """Nothing is counted."""
+        """An empty histogram."""
         return cls(np.zeros(_BINS, np.int64), np.zeros(1))
 
     def quantiles(self) -> Quantiles:
-        """What has been counted; zeros where nothing was."""
+        """Quantiles of the samples; zeros if there are none."""
         total = np.cumsum(self.counts)
         count = int(total[-1])
         p50, p99, p999 = (float(np.searchsorted(total, share * count) + 1) * BIN for share in (0.5, 0.99, 0.999))
@@ -43,6 +43,6 @@ class Spread(NamedTuple):
 
 @njit
 def count_time(spread: Spread, seconds: float) -> None:
-    """Count a time [s]."""
+    """Add a duration [s] to the histogram."""
     spread.counts[min(_BINS - 1, int(seconds / BIN))] += 1
     spread.longest[0] = max(spread.longest[0], seconds)

@@ -1,20 +1,20 @@
-r"""The twin: a MuJoCo Phantom that goes where the device goes, and what the difference says of the hand.
+r"""The digital twin: a MuJoCo Phantom that tracks the device, and an estimate of the hand's force on the stylus.
 
-A prediction is one period of the model from the twin's state, under the torques that were commanded and the hand's last
-estimated ones; the encoders then correct it as a Luenberger observer with a double pole z₀ = e^(−ω T):
+The twin's state is predicted by one period of the model under the commanded torques and the hand's last estimated
+torques; the encoders then correct it, as in a Luenberger observer with a double pole z₀ = e^(−ω T):
 
 .. math:: \hat\theta = \theta^- + (1 - z_0^2)\,e, \quad \hat\omega = \omega^- + (1 - z_0)^2 e/T,
           \quad e = \theta - \theta^-
 
-The hand's torques are the residual of the generalised momentum (De Luca & Mattone, ICRA 2005; De Luca et al., IROS
-2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f_c \tanh(\dot\theta/\epsilon) +
-\tau_h`,
+The hand's torques τ_h are estimated by a generalised-momentum observer (De Luca & Mattone, ICRA 2005; De Luca et al.,
+IROS 2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f_c
+\tanh(\dot\theta/\epsilon) + \tau_h`,
 
 .. math:: r = K \left(p(t) - p(0) - \int (\tau + C^T\dot\theta - N - D\dot\theta - f + r)\,dt\right),
           \qquad \dot r = K (\tau_h - r)
 
-which needs no acceleration and is the hand's torque through a first-order filter of K. The force is F = J⁻ᵀ r. What the
-model does not know, friction above all, is in it: at rest up to the Coulomb friction, 0.04 N at the tip.
+which needs no acceleration and is the hand's torque filtered by a first-order low-pass of rate K. The force is
+F = J⁻ᵀ r. It includes all model errors, above all of friction: at rest up to the Coulomb friction, 0.04 N at the tip.
 """
 
 import math
@@ -41,12 +41,12 @@ IntArray = npt.NDArray[np.int64]
 BANDWIDTH = 2.0 * math.pi * 30.0
 """ω of the observer [rad/s]: above a hand's motion, below the noise of the encoders' differences."""
 RESIDUAL_GAIN = 2.0 * math.pi * 10.0
-"""K of the hand's torque [1/s]."""
+"""K of the momentum observer [1/s]."""
 SLOW = 0.05
-"""ε, below which the direction of friction is not known [rad/s]."""
+"""ε, joint rate below which the direction of friction is uncertain [rad/s]."""
 TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "hand_force": (3,)}
-"""Position of the tip that was predicted for the tick [m], its distance from the measured one [m], the hand's force in
-H [N]."""
+"""Tip position predicted for the tick, in H [m], its distance from the measured one [m], and the hand's force in H
+[N]."""
 
 _VISCOUS, _COULOMB = PREMIUM_1_5.viscous_friction, PREMIUM_1_5.coulomb_friction
 
@@ -56,16 +56,16 @@ def momentum_residual(
     memory: Array, theta: tuple[float, float, float], rate: tuple[float, float, float], torque: Array, period: float,
     gain: float,
 ) -> None:  # fmt: skip
-    """One step of the residual r, a backward difference in r.
+    """Advance the residual r by one period (backward Euler in r).
 
     Parameters
     ----------
     memory : Array
-        [r (3), ∫ (3), started], written.
+        [r (3), the integral plus p(0) (3), started], updated.
     theta, rate : three floats each
-        [rad], [rad/s]
+        Joint angles [rad] and rates [rad/s].
     torque : Array
-        That acted during the period before [N m], shape (3,).
+        Torques during the previous period [N m], shape (3,).
     period, gain : float
         T [s], K [1/s].
     """
@@ -84,24 +84,24 @@ def momentum_residual(
 
 
 class TwinMemory(NamedTuple):
-    """The twin as compiled code holds it.
+    """State of the twin for compiled code.
 
     Attributes
     ----------
     plant : Plant
-        The model's world, which is stepped.
+        The twin's world.
     qvel : Array
         View of its velocities.
     places, rates : IntArray
-        Of θ1, θ2, θ3 and the two closing joints in position and velocity, shape (5,).
+        Indices of θ1, θ2, θ3 and the two loop-closing joints in positions and velocities, shape (5,).
     motors : tuple of three ints
-        Of the motors in its controls.
+        Indices of the motors in its controls.
     of_angle, of_rate : float
-        Shares in which an error corrects angle and rate.
+        Observer gains on angle [1] and rate [1/s].
     theta, rate, torque : Array
-        State [rad], [rad/s], and the torques since the last tick [N m], shape (3,).
+        Joint angles [rad], rates [rad/s], and the torques since the last tick [N m], shape (3,).
     residual : Array
-        Of `momentum_residual`, shape (7,).
+        Memory of `momentum_residual`, shape (7,).
     last : Array
         Number of the last tick, shape (1,).
     """
@@ -122,7 +122,7 @@ class TwinMemory(NamedTuple):
 
 @njit
 def _predict(twin: TwinMemory, predicted: Array) -> None:
-    """Where the joints are after a period of the model (3,); leaves their rates there in the state."""
+    """Write the joint angles after a period of the model to `predicted` (3,), and the rates to the twin's state."""
     q, w, plant = twin.theta, twin.rate, twin.plant
     angles = (q[0], q[1], q[2], q[2] - q[1], q[1] - q[2])
     speeds = (w[0], w[1], w[2], w[2] - w[1], w[1] - w[2])
@@ -138,7 +138,7 @@ def _predict(twin: TwinMemory, predicted: Array) -> None:
 
 @njit
 def tip_force(theta: tuple[float, float, float], torque: Array, force: Array) -> None:
-    """F_H = J⁻ᵀ τ [N], shape (3,), by cofactors; zero where the arm is straight: a force along it cannot be told."""
+    """Write F_H = J⁻ᵀ τ [N], shape (3,), by cofactors; zero near a singularity, where it cannot be determined."""
     j = jacobian(theta)
     ax = j[1][1] * j[2][2] - j[1][2] * j[2][1]
     ay = j[1][2] * j[2][0] - j[1][0] * j[2][2]
@@ -163,7 +163,7 @@ def tip_force(theta: tuple[float, float, float], torque: Array, force: Array) ->
 def follow_rows(
     twin: TwinMemory, numbers: Array, theta: Array, torque: Array, predicted: Array, apart: Array, force: Array
 ) -> None:
-    """Follow n ticks; `predicted` (n, 3), `apart` (n,) and `force` (n, 3) are written (`TWIN_CHANNELS`)."""
+    """Advance the twin by n ticks; writes `predicted` (n, 3), `apart` (n,) and `force` (n, 3) (`TWIN_CHANNELS`)."""
     ahead = np.zeros(3)
     for k in range(len(numbers)):
         if numbers[k] == twin.last[0] + 1.0:
@@ -189,12 +189,12 @@ def follow_rows(
 
 
 class Twin:
-    """The model beside a device.
+    """A simulated Phantom that runs in parallel to a device.
 
     Parameters
     ----------
     scene : SceneConfig
-        Its servo period is the device's.
+        Parameters of its world; the servo period must be the device's.
     """
 
     def __init__(self, scene: SceneConfig):
@@ -212,17 +212,17 @@ class Twin:
         )  # fmt: skip
 
     def follow(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """Follow some ticks, one after the other.
+        """Advance the twin by consecutive ticks; where ticks are missing it is re-initialised.
 
         Parameters
         ----------
         rows : mapping
-            Of `sim.hardware.gated_servo.columns`: tick, theta, torque.
+            Channels tick, theta and torque of `sim.hardware.gated_servo.columns`.
 
         Returns
         -------
         dict
-            By `TWIN_CHANNELS`. Where ticks are missing the twin begins again.
+            Arrays by `TWIN_CHANNELS`.
         """
         n = len(rows["tick"])
         found = {name: np.zeros((n, *shape)) for name, shape in TWIN_CHANNELS.items()}

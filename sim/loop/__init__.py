@@ -1,1 +1,1 @@
-"""The servo, run block by block."""
+"""The servo loop, run in blocks of ticks."""

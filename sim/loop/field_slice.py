@@ -1,4 +1,4 @@
-"""The field at many points at once, for display: its memory stays as it is."""
+"""The force field sampled at many points, for display; the field's memory is left unchanged."""
 
 import numpy as np
 from numba import njit
@@ -17,18 +17,18 @@ def _wrench_at(field: Field, scratch: Array, hand: Array, wrench: Array) -> None
 
 @entry_point
 def field_slice(field: Field, hand: Array, points: Array, scratch: Array, forces: Array) -> None:
-    """Force of a field on a hand that is at other points, and lets go of the switch.
+    """Force of a field on the hand if it were at given points, with the switch released.
 
     Parameters
     ----------
     field : Field
-        Whose memory stays as it is.
+        Its memory is copied for each point and left unchanged.
     hand : Array
-        The hand vector (15,), changed.
+        The hand vector (15,); its position and switch are overwritten.
     points : Array
-        In H [m], shape (n, 3).
+        Positions in H [m], shape (n, 3).
     scratch : Array
-        Like the field's memory.
+        Work space of the same shape as the field's memory.
     forces : Array
         Written [N], shape (n, 3).
     """

@@ -1,4 +1,4 @@
-"""A run: the servo's compiled blocks one after the other, streamed to a recorder, in memory that does not grow."""
+"""A run: compiled blocks of servo ticks one after the other, streamed to a recorder in constant memory."""
 
 import time
 from collections.abc import Callable, Collection, Sequence
@@ -30,7 +30,7 @@ from sim.recording.recorder import Group, Recorder
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
-BLOCK_SECONDS = 0.2  # of simulated time between two looks at the clock and the recorder
+BLOCK_SECONDS = 0.2  # simulated time of a block [s]: the clock and the recorder are served once per block
 
 
 class RunTimes(NamedTuple):
@@ -39,7 +39,7 @@ class RunTimes(NamedTuple):
     Attributes
     ----------
     simulated, wall : float
-        Seconds of simulated time, and what they took.
+        Simulated time, and the wall-clock time it took [s].
     """
 
     simulated: float
@@ -47,7 +47,7 @@ class RunTimes(NamedTuple):
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated time over the time it took."""
+        """Simulated time divided by wall-clock time."""
         return self.simulated / self.wall if self.wall > 0.0 else float("inf")
 
 
@@ -72,23 +72,23 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
 
 
 def configuration_size(servo: Servo) -> int:
-    """Numbers in a recorded configuration: the world's, and the pose of a figure that is shown but not in it."""
+    """Length of a recorded configuration: the world's qpos, plus the pose of a figure that is only shown."""
     shown = len(servo.reference.pose) if isinstance(servo.figure, KinematicFigure) else 0
     return len(servo.plant.qpos) + shown
 
 
 def shown_configuration(servo: Servo) -> Array:
-    """Configuration of the world now, and the pose of a figure that is shown but not in it."""
+    """The current configuration: the world's qpos, plus the pose of a figure that is only shown."""
     if isinstance(servo.figure, KinematicFigure):
         return np.concatenate([servo.plant.qpos, servo.reference.pose])
     return servo.plant.qpos
 
 
 def groups(servo: Servo) -> dict[str, Group]:
-    """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's.
+    """The channels that a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's.
 
-    ``frames`` has what there is: of a figure that is only shown no errors, forces and torques, and without one no
-    reference.
+    ``frames`` holds tracking errors, residual and ground force only for a body in the physics, and the reference only
+    if there is a figure.
     """
     plant = servo.plant
     ticks = Group(
@@ -113,7 +113,7 @@ def groups(servo: Servo) -> dict[str, Group]:
 
 
 Observer = Callable[[TickLog, FrameLog, int], None]
-"""Called after each block with its logs and the number of ticks in them; the logs are used again."""
+"""Called after each block with its logs and the number of ticks in them; the logs are reused for the next block."""
 
 
 class Loop:
@@ -123,27 +123,27 @@ class Loop:
     ----------
     servo : Servo
         See `sim.loop.servo`.
-    world : World
-        Whose addresses the servo holds; kept alive here.
+    world : World or RobotWorld
+        Kept alive here, since the servo holds addresses of its memory.
     observe : Observer, optional
-        What is done with each block, such as `record_into`.
+        Called with each block; `record_into` makes one that records.
     block_seconds : float
         Simulated time of a block [s], rounded to whole figure updates.
     python_laws : sequence of callable
-        `Program.python_laws` of the servo's field: from the measured hand to six numbers. With any, blocks go tick by
-        tick: the hand is sensed, the laws are called, and the compiled loop does the rest of the tick.
+        `Program.python_laws` of the servo's field: each maps the measured hand to a wrench of six numbers. If there are
+        any, blocks run tick by tick: the hand is sensed, the laws are called, the compiled loop does the rest.
 
     before_tick : callable, optional
-        Called with the number of each tick before it, as a driver in Python is that writes the readings of an
-        `Exchange` and takes its commands; it may wait for the time of the tick. Blocks then go tick by tick.
+        Called with the number of each tick before it runs, for example by a driver in Python that writes the readings
+        of an `Exchange` and takes its commands; it may wait for the time of the tick. Blocks then run tick by tick.
     ask : callable, optional
-        Called with the time [s] every `ask_seconds`, rounded up to whole figure updates, before the tick: what a person
-        of the device wants (see `sim.users.intents.own`). Blocks end where it is called.
+        Called with the time [s] every `ask_seconds`, rounded up to whole figure updates, before the tick: it sets what
+        a simulated person at the device intends (see `sim.users.intents.own`). A block ends before each call.
 
     Raises
     ------
     SimError
-        If the laws are not as many as the field has slots for them.
+        If the number of laws differs from the number of slots that the field has for them.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ class Loop:
         return self._tick * self.servo.plant.period
 
     def run(self, seconds: float, progress: Callable[[float], None] = lambda _: None) -> RunTimes:
-        """Run on for some time.
+        """Continue the run for some simulated time.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Loop:
         Raises
         ------
         SimError
-            If the device has fewer ticks in it: a replayed hand ends.
+            If the device cannot deliver that many ticks: a replayed hand ends.
         """
         plant, every = self.servo.plant, self.servo.figure_ticks
         wanted = every * round(seconds / (plant.period * every))
@@ -218,7 +218,7 @@ class Loop:
         return RunTimes(wanted * plant.period, time.perf_counter() - begin)
 
     def step(self) -> tuple[TickLog, FrameLog]:
-        """Run one tick; the logs have its one row, and one of the figure's last update."""
+        """Run one tick; its logs have one row each: this tick, and the figure's last update."""
         if self._one is None:
             self._one = make_logs(self.servo, 1)
         ticks, frames = self._one
@@ -277,7 +277,10 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
 
 
 def shown_channels(frames: FrameLog, m: int, names: Collection[str], root: int) -> dict[str, Array]:
-    """Those of the first m figure updates' channels that are recorded: all only of a figure in the physics."""
+    """The recorded channels, `names`, of the first m figure updates of a block.
+
+    `root` is the index of the figure's pose in qpos; it is needed only for a body in the physics.
+    """
     channels = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
     if "joint_error" in names:
         channels = frame_channels(frames, m, root)
@@ -285,7 +288,7 @@ def shown_channels(frames: FrameLog, m: int, names: Collection[str], root: int) 
 
 
 def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
-    """The first m figure updates of a block by channel; `root` is where the figure's pose stands in qpos."""
+    """The first m figure updates of a block by channel; `root` is the index of the figure's pose in qpos."""
     reference, report = frames.reference[:m], frames.report[:m]
     joint_error, root_error = pose_errors(frames.qpos[:m, root : root + N_POSE], reference)
     return {
@@ -297,7 +300,7 @@ def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
 
 
 def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
-    """How far poses are from others: RMS over the joints of the angle between rotations [rad], and root distance [m].
+    """Pose errors: RMS over the joints of the angle between their rotations [rad], and distance of the roots [m].
 
     Parameters
     ----------

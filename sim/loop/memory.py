@@ -1,4 +1,4 @@
-"""How much memory this process has taken at most."""
+"""Peak memory of this process."""
 
 import resource
 import sys
@@ -10,8 +10,8 @@ _STATUS = Path("/proc/self/status")
 def peak_memory_mb() -> float:
     """Largest resident memory of this process so far [MB].
 
-    Linux tells it in ``/proc/self/status`` (VmHWM, man 5 proc). Its ``getrusage`` would hand on what the parent had
-    taken when it started this process.
+    Linux reports it in ``/proc/self/status`` (VmHWM, man 5 proc). Its ``getrusage`` would include the peak that the
+    parent had reached when it started this process.
     """
     if _STATUS.exists():
         line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))

@@ -1,4 +1,4 @@
-"""Which units of compiled code a servo's loop needs: said before any of them is compiled."""
+"""The compilation units that a servo loop needs, listed before any of them is compiled."""
 
 from numba import typeof, types
 
@@ -13,14 +13,14 @@ from sim.reference.reference import NO_MAP, poses_unit
 
 
 def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
-    """Units of the loop over a servo, of what it calls, and of poses along a path, by which runs begin and end.
+    """Units of the loop over a servo, of all kernels it calls, and of `poses_along`, used at start and end of a run.
 
     Parameters
     ----------
     servo : Servo
-        With all arrays that it will have, but no address need be there (see `Servo.linked`).
+        With all arrays that it will have; addresses of kernels may still be missing (see `Servo.linked`).
     program : Program
-        Of its field.
+        The program of its field.
     """
     ticks, frames = make_logs(servo, servo.figure_ticks)
     number, flag, reference = types.int64, types.boolean, servo.reference

@@ -1,18 +1,19 @@
-"""The servo: one compiled loop over device, law of force, limiter, hand, haptic map, figure and physics.
+"""The servo: one compiled loop over device, force field, limiter, user's hand, haptic map, figure and physics.
 
 Each tick of period T:
 
-1. `sense`: the device → hand vector in H; what cannot be a reading is latched as a fault.
-2. `evaluate`: the field's program → wrench, and where on the curve the hand is.
-3. `command_force`: what of it the device is commanded, within ceiling, energy tank and slew; nothing after a fault.
-4. `actuate`: the device's motors, τ = Jᵀ F + N.
-5. Every `figure_ticks` ticks: `follow`: h and its derivatives along the hand's motion, and what of a body follows it.
-6. `advance`: the world, with the hand's force on a simulated device.
+1. `sense`: device → hand vector in H; an implausible reading is latched as a fault.
+2. `evaluate`: the field's program → wrench, and the hand's phase on the curve.
+3. `command_force`: the wrench's force, limited by force ceiling, energy tank and slew rate; zero after a fault.
+4. `actuate`: motor torques of the device, τ = Jᵀ F + N.
+5. Every `figure_ticks` ticks, `follow`: h and its derivatives along the hand's motion, and the control of the body
+   that tracks them.
+6. `advance`: the physics; on a simulated device the user's hand acts on the stylus.
 
 Device and body are chosen by type when the loop is compiled (`sim.devices.device`, `sim.body.drive`).
 
-The loop holds no Python object and not the GIL. The same loop replays recorded controls: steps 1–5 and the hand are
-then replaced by what they gave, so a run is repeated bit for bit.
+The loop touches no Python object and does not hold the GIL. The same loop replays recorded controls: the results of
+steps 1–5 and of the user's hand are then taken from the recording, so a run is repeated bit for bit.
 """
 
 from typing import NamedTuple
@@ -43,11 +44,11 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Field(NamedTuple):
-    """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench.
+    """A compiled field, its limiter and its energy tank: program, parameters, memory, and the last wrench and force.
 
-    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), none before they are linked;
-    `slots` the places in the memory of what laws in Python give, `maps` what its laws are told of the haptic map (see
-    `controllers.fields.map_feed`).
+    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
+    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` says which laws are given values
+    of the haptic map (see `controllers.fields.map_feed`).
     """
 
     units: IntArray
@@ -64,12 +65,12 @@ class Field(NamedTuple):
     force: Array
 
     def of(self, program: Program) -> "Field":
-        """The same limits and budget about another program, with a fresh memory; its laws are compiled if needed."""
+        """The same limiter and energy tank with another program and fresh memory; compiles its laws if needed."""
         return Field(*_program_parts(program), *self[6:])._replace(units=law_units(program))
 
 
 def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:
-    """A field for a new run, without the addresses of its laws: nothing has to be compiled for it."""
+    """A field for a new run, without the addresses of its laws, so that nothing need be compiled yet."""
     return Field(
         *_program_parts(program), limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(),
         tank=tank.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
@@ -77,18 +78,19 @@ def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) ->
 
 
 def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray]:
-    """The first of the attributes of a `Field`."""
+    """The first six attributes of a `Field`, those that depend on the program."""
     slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
     memory, maps = program.fresh_memory(), feed_rows(program.map_feeds)
     return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps
 
 
 class Servo(NamedTuple):
-    """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
+    """The whole state of the loop; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
-    `argument` (7,) is what the haptic map is evaluated at: a view of the device's hand, where the stylus is, or that of
-    a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the
-    reference and of what drives the body: a change in one of them is not one of the loop.
+    `argument` (7,) is the pose (position in H, quaternion wxyz) at which the haptic map is evaluated: a view of the
+    device's hand vector, or of the pose of a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are
+    the addresses of the kernels that update the reference and drive the body; they are called by address, so that a
+    change in one of them does not recompile the loop.
     """
 
     plant: Plant
@@ -101,7 +103,7 @@ class Servo(NamedTuple):
     units: IntArray = np.zeros(2, dtype=np.int64)
 
     def linked(self, program: Program) -> "Servo":
-        """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
+        """The same servo with the addresses of all kernels it calls; compiles those that are not in the cache."""
         link_device(self.device)
         reference = self.reference
         if reference.kind != NO_MAP:
@@ -113,16 +115,16 @@ class Servo(NamedTuple):
 
 
 class TickLog(NamedTuple):
-    """What a block of ticks leaves behind: one row a tick. A replay reads `ctrl`, `applied` and `residual` instead.
+    """The log of a block of ticks, one row per tick. A replay reads `hand`, `ctrl`, `applied` and `residual` from it.
 
     Attributes
     ----------
     hand : Array
         The hand vector as measured, shape (n, 15).
     field, force, user : Array
-        Wrench of the field (6), force after limiter and tank (3), force of the hand at the end of the tick (3), in H.
+        Wrench of the field (6), force after limiter and tank (3), user's force at the end of the tick (3), in H.
     tank : Array
-        Energy [J] that the tank holds, and the share of the force that it let through, shape (n, 2).
+        Energy in the tank [J], and the share of the force that it let through, shape (n, 2).
     torque : Array
         Torques at the Phantom's joints [N m], shape (n, 3).
     trace : Array
@@ -130,11 +132,12 @@ class TickLog(NamedTuple):
     ctrl : Array
         All motor commands, shape (n, nu).
     applied : Array
-        The hand's torques at each physics step, shape (n, substeps, 3), or 6 (see `sim.world.plant.advance`).
+        The user's joint torques at each physics step, shape (n, substeps, 3), or (n, substeps, 6) if the hand also
+        turns the stylus (see `sim.world.plant.advance`).
     residual : Array
         Residual wrench at the figure's root, shape (n, 6).
     fault : Array
-        Of the device: code of the fault that is latched, its value, and the number of gaps so far, shape (n, 3).
+        Code of the device's latched fault, its value, and the number of gaps so far, shape (n, 3).
     """
 
     hand: Array
@@ -151,20 +154,20 @@ class TickLog(NamedTuple):
 
 
 class FrameLog(NamedTuple):
-    """What a block of figure updates leaves behind: one row each.
+    """The log of a block of figure updates, one row per update.
 
     Attributes
     ----------
     t : Array
         Time [s], shape (m,).
     qpos : Array
-        Configuration of the world, shape (m, nq); of a figure that is not in it the reference pose comes after that.
+        Configuration of the world, shape (m, nq); for a figure that is only shown, its pose is appended.
     reference : Array
-        The animation's pose, shape (m, 75); nothing where there is no figure.
+        The reference pose, shape (m, 75); no columns where there is no figure.
     report : Array
-        What the figure's control tells (see `sim.body.figure`), shape (m, 8).
+        Report of the body's control, shape (m, 10) (see `sim.body.figure_state.REPORT_SUPPORT`), of a robot (m, 8).
     ground : Array
-        Force of the ground on the figure [N], in the world, shape (m, 3).
+        Ground reaction force on the figure [N], in W, shape (m, 3).
     """
 
     t: Array
@@ -174,9 +177,9 @@ class FrameLog(NamedTuple):
     ground: Array
 
 
-@njit(inline="always")  # a call would hand over all of the servo's arrays, number by number
+@njit(inline="always")  # a call would pass every pointer, shape and stride of the servo's arrays as an argument
 def field_force(servo: Servo) -> None:
-    """Evaluate the field at the measured hand, and command what of it is safe."""
+    """Evaluate the field at the measured hand, and command its force within the safety limits."""
     field, device = servo.field, servo.device
     feed_maps(servo.reference.units, field.maps, field.params, field.memory, device.hand)
     evaluate(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
@@ -188,7 +191,7 @@ def field_force(servo: Servo) -> None:
 
 @njit(forceinline=True)
 def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
-    """`run_block`, over arrays that it borrows."""
+    """`run_block` on borrowed arrays, without reference counting."""
     plant, device, every = servo.plant, servo.device, servo.figure_ticks
     followed = lend_followed(servo.figure, servo.reference, servo.argument, servo.field.memory[:TRACE_SIZE])
     for k in range(n):
@@ -234,11 +237,11 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     Parameters
     ----------
     servo : Servo
-        Everything in it is updated.
+        All its state is updated.
     first, n : int
-        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
+        Number of the first tick, a multiple of `figure_ticks` unless n = 1, and the number of ticks to run.
     replay : bool
-        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
+        Take `hand`, `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
     ticks, frames : TickLog, FrameLog
         Written (or read, see `replay`) row by row.
     """
@@ -246,9 +249,9 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
 
 
 def rearm_servo(servo: Servo) -> None:
-    """Forget a latched fault, on purpose and by name: the force is ramped in from zero, from the next tick on.
+    """Clear a latched fault; only ever called explicitly. The force is ramped in from zero from the next tick on.
 
-    Memory of limiter and energy tank that was lost is taken for the worst: a hot device, an empty tank.
+    State of limiter or energy tank that became invalid is set to the worst case: hot motors, an empty tank.
     """
     rearm(servo.device.faults)
     renew_limiter(servo.field.limits, servo.field.limiter)

@@ -1,4 +1,4 @@
-"""A running servo's whole state, kept and put back: from there it goes on bit for bit as it did."""
+"""Snapshots of a running servo: its whole state saved and restored, so that a run continues bit for bit."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
@@ -14,7 +14,7 @@ from sim.world.world import World
 Array = npt.NDArray[Any]
 
 _NOT_STATE = {"params", "ops", "units", "maps", "slots", "limits", "budget"}
-"""Fields of a servo's parts that a run does not change by itself."""
+"""Fields of a servo's parts that are constant during a run."""
 
 
 class KeptState(NamedTuple):
@@ -23,11 +23,11 @@ class KeptState(NamedTuple):
     Attributes
     ----------
     tick : int
-        The next one.
+        Number of the next tick.
     data : MjData
-        Of the world.
+        Copy of the world's state.
     arrays : tuple of Array
-        Memory of device, field, reference and figure, in the order of `state_arrays`.
+        Copies of the arrays of device, field, reference and figure, in the order of `state_arrays`.
     """
 
     tick: int
@@ -36,7 +36,7 @@ class KeptState(NamedTuple):
 
 
 def state_arrays(part: object) -> Iterator[Array]:
-    """All arrays of a servo that a run changes, or of a part of one, in their order."""
+    """All arrays of a servo, or of a part of one, that a run changes, in a fixed order."""
     if not isinstance(part, tuple):
         return
     names = getattr(part, "_fields", ("",) * len(cast(tuple[object, ...], part)))
@@ -50,14 +50,14 @@ def state_arrays(part: object) -> Iterator[Array]:
 
 
 def kept_state(servo: Servo, world: World | RobotWorld, tick: int) -> KeptState:
-    """The state before a tick."""
+    """Save the state before tick number `tick`."""
     data = mujoco.MjData(world.model)
     mujoco.mj_copyData(data, world.model, world.data)
     return KeptState(tick, data, tuple(array.copy() for array in state_arrays(servo)))
 
 
 def put_back(servo: Servo, world: World | RobotWorld, state: KeptState) -> None:
-    """Give servo and world a state that was kept of them."""
+    """Restore a saved state of servo and world."""
     for array, kept in zip(state_arrays(servo), state.arrays, strict=True):
         array[...] = kept
     mujoco.mj_copyData(world.data, world.model, state.data)

@@ -1,1 +1,1 @@
-"""Recordings: written tick by tick, and read."""
+"""Recordings of runs: writing while a run goes on, and reading."""

@@ -1,9 +1,9 @@
-"""Recording a run: streamed to HDF5, so that a killed run loses at most its last half second.
+"""Recording of a run, streamed to HDF5, so that a killed run loses at most its last half second.
 
-The file is written in HDF5's single-writer mode (SWMR), in which every flush leaves a file that can be opened. What
-counts is counted last: ``<group>/rows`` is raised only after the rows have been flushed, so a reader never sees rows
-that were still on their way. A file is born whole under another name and then renamed, so it is never half a header.
-The layout is that of `sim.recording.recording`, which reads it.
+The file is written in HDF5's single-writer mode (SWMR), in which every flush leaves a file that can be opened. The row
+count ``<group>/rows`` is raised only after the rows have been flushed, so a reader never sees rows that are not yet
+written. A file is created completely under another name and then renamed, so its header is never incomplete. The layout
+is described in `sim.recording.recording`, which reads it.
 """
 
 import json
@@ -27,11 +27,11 @@ from controllers.state import Array
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
 from sim.recording.unclosed import held
 
-CHUNK_SECONDS = 0.5  # what a killed run can lose, beside what was not yet appended
-# The system copies a page of a write at once, and between two pages a kill can end it: what crosses a page can be torn.
-# HDF5's own structures stay within pages of this size (up to 8176 chunks, more than an hour), rows need not.
+CHUNK_SECONDS = 0.5  # [s] of rows that a killed run can lose, besides rows not yet appended
+# A write is copied page by page, and a kill between two pages tears whatever crosses them. With this page size HDF5's
+# own structures stay within a page (up to 8176 chunks, more than an hour); rows need not.
 PAGE = 4096
-MARGIN = 4_000_000  # [bytes] left on a disk, for structures and summary of the file
+MARGIN = 4_000_000  # [bytes] kept free on the disk, for structures and summary of the file
 _KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
 
@@ -64,23 +64,23 @@ class Group:
 
     @property
     def chunk(self) -> int:
-        """Rows that are written at once."""
+        """Number of rows that are written at once."""
         return max(1, round(self.rate * CHUNK_SECONDS))
 
 
 class DiskFull(RecordingError):
-    """No room for what a run goes on to record; what was recorded until then is kept."""
+    """The disk is full; what was recorded until then is kept."""
 
 
 def _check_room(path: Path, size: int) -> None:
-    """Refuse to write so much [bytes] where the disk would then have no room for what closes the file."""
+    """Check that after writing `size` [bytes] the disk has room to close the file; raises `DiskFull` otherwise."""
     free = shutil.disk_usage(path.parent).free
     if free < size + MARGIN:
         raise DiskFull(f"{path}: the disk is full ({free / 1e6:.0f} MB free); {_KEPT}")
 
 
 class _Stream:
-    """A group on its way to the file: one buffer of fixed size per channel, written when full."""
+    """Buffered writing of a group: one buffer of fixed size per channel, written when full."""
 
     def __init__(self, group: Group, node: h5py.Group, path: Path):
         self._name, self._path = node.name, path
@@ -110,13 +110,13 @@ class _Stream:
                 self.flush()
 
     def flush(self) -> None:
-        """Write the buffered rows, and only then count them."""
+        """Write the buffered rows, and then raise the row count."""
         if self._filled == 0:
             return
         _check_room(self._path, sum(buffer.nbytes for buffer in self._buffers.values()))
         try:
             self._write()
-        except (OSError, RuntimeError) as error:  # such as a quota, which does not say what it leaves
+        except (OSError, RuntimeError) as error:  # such as a quota, which `_check_room` cannot see
             said = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error).split("\n")[0]
             raise DiskFull(f"{self._path}: cannot be written any further ({said}); {_KEPT}") from None
 
@@ -125,7 +125,7 @@ class _Stream:
         for name, buffer in self._buffers.items():
             dataset = self._datasets[name]
             dataset.id.set_extent((total, *buffer.shape[1:]))
-            # Whole chunks go straight to the file: five times faster, and no cache that grows.
+            # Whole chunks are written directly: five times faster, and HDF5's cache does not grow.
             if self._filled == self._chunk and self._written % self._chunk == 0:
                 dataset.id.write_direct_chunk((self._written, *[0] * (buffer.ndim - 1)), buffer)
             else:
@@ -160,23 +160,23 @@ def _write_group(node: h5py.Group, group: Group) -> None:
 
 
 class Recorder:
-    """Writes a run to a new file, in memory that does not grow with the run.
+    """Writes a run to a new file, in constant memory.
 
-    Use as a context manager; leaving it before `close` was given a summary (because of an exception, say) keeps all
-    rows and leaves the recording marked as incomplete.
+    Use as a context manager. If it is left before `close` was given a summary, for example by an exception, all rows
+    are kept and the recording stays marked as incomplete.
 
     Parameters
     ----------
     path : Path
-        File to make.
+        File to create.
     config : Mapping
-        The resolved configuration of the run: with the seed, all that is needed to repeat it. Stored as JSON.
+        The resolved configuration of the run; with the seed, all that is needed to repeat it. Stored as JSON.
     seed : int
         Seed of the run's random generator.
     groups : Mapping[str, Group]
-        What will be appended.
+        Groups of channels to be appended to.
     static : Mapping[str, array or str]
-        What does not change during the run: points of the curve, the model's XML, names of clips.
+        Data that is constant during the run: points of the curve, the model's XML, names of clips.
 
     Raises
     ------
@@ -205,8 +205,8 @@ class Recorder:
             draft.rename(path)
         finally:
             draft.unlink(missing_ok=True)
-        # Opened in single-writer mode at once: opening first and switching then leaves a moment in which a kill
-        # would mark the file as unreadable.
+        # Opened in single-writer mode directly: if it were opened first and switched then, a kill in between would
+        # leave the file marked as unreadable.
         access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
@@ -227,7 +227,7 @@ class Recorder:
         Raises
         ------
         RecordingError
-            If the group, a channel or a shape is not what was announced.
+            If the group, a channel or a shape differs from those given at construction.
         """
         if group not in self._streams:
             raise RecordingError(f"{group}: no such group; there are {sorted(self._streams)}")
@@ -265,7 +265,7 @@ class Recorder:
             self.close()
 
     def _end(self) -> None:
-        """Close the file without what is still buffered, as far as the disk lets it."""
+        """Close the file without writing the buffers, as far as a full disk permits."""
         with suppress(OSError, RuntimeError):
             self._file.close()
         os.close(self._held)

@@ -1,12 +1,12 @@
-"""Recordings, read: of a run that ended, was killed, or is still going on.
+"""Reading of recordings: of a run that ended, was killed, or is still going on.
 
-Layout of the file, which `sim.recording.recorder` writes::
+Layout of the file, as written by `sim.recording.recorder`::
 
     config, versions      JSON texts          seed     integer
     static/<name>         arrays and texts    summary  JSON as bytes, of which ``summary_bytes`` count; 0 until the end
     <group>/<channel>     float64 (n, *shape), of which ``<group>/rows`` count, at ``<group>/rate`` [Hz]
 
-Other programs open the file of a killed run with ``h5py.File(path, "r", swmr=True)``, or after ``h5clear -s``.
+Other programs can open the file of a killed run with ``h5py.File(path, "r", swmr=True)``, or after ``h5clear -s``.
 """
 
 import json
@@ -54,7 +54,7 @@ def _names(node: h5py.Group) -> list[str]:
 
 
 def _opened(path: Path) -> h5py.File:
-    """The file as it is, beside its writer while that lives, or as the writer left it: `sim.recording.unclosed`."""
+    """Open the file: in SWMR mode while its writer lives, else as the writer left it (`sim.recording.unclosed`)."""
     head = superblock(path)
     if head is None:
         raise OSError("no HDF5 file of this program")
@@ -66,7 +66,7 @@ def _opened(path: Path) -> h5py.File:
 
 
 def _missing(path: Path) -> str:
-    """What a file lacks at its end, in words; nothing if it lacks nothing."""
+    """Text for a message that says how many bytes a file lacks at its end; empty if it is complete."""
     head = superblock(path)
     return "" if head is None or head.size >= head.end else f", cut short: {head.size} bytes of {head.end}"
 
@@ -75,7 +75,7 @@ class Channel:
     """Rows of a channel, read from the file when they are sliced.
 
     ``channel[i]``, ``channel[a:b]`` and ``channel[::k]`` give float64 arrays; ``len(channel)`` is the number of
-    rows that count when the recording was opened.
+    valid rows when the recording was opened.
     """
 
     def __init__(self, dataset: h5py.Dataset, rows: int, path: Path):
@@ -114,12 +114,13 @@ class Recording:
     config : dict
         Configuration of the run.
     seed : int
+        Seed of the run's random generator.
     versions : dict
-        Versions of Python and of the packages that decide what a run does.
+        Versions of Python and of the packages on which a run depends, and the processor.
     summary : dict or None
-        What `Recorder.close` was given; None if the run did not get there.
+        The summary given to `Recorder.close`; None if the run did not end normally.
     arrays, texts : dict
-        What does not change during the run (`static` of the `Recorder`), by kind.
+        Data that is constant during the run (`static` of the `Recorder`), numeric and text.
     groups : dict
         For each group its channels by name.
     rates : dict
@@ -167,7 +168,7 @@ class Recording:
         rows = {name: int(dataset_of(node, "rows")[0]) for name, node in nodes.items()}
         if summary:
             last = np.inf
-        else:  # what was stopped between the writing of two groups ends with the shorter
+        else:  # a run stopped between the writing of two groups is cut to the shorter one
             last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
         for name, node in nodes.items():
             n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
@@ -176,7 +177,7 @@ class Recording:
             }
 
     def channel(self, group: str, name: str) -> Channel:
-        """A channel that has rows.
+        """A channel that must have rows.
 
         Raises
         ------
@@ -193,12 +194,12 @@ class Recording:
         return channels[name]
 
     def array(self, name: str) -> Array:
-        """An array that does not change during the run.
+        """An array of `static`, constant during the run.
 
         Raises
         ------
         RecordingError
-            If there is none of that name.
+            If there is no array of that name.
         """
         if name not in self.arrays:
             raise RecordingError(f"{self._path}: no array {name}; there are {sorted(self.arrays)}")
@@ -206,7 +207,7 @@ class Recording:
 
     @property
     def complete(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run ended normally, with a summary."""
         return self.summary is not None
 
     def close(self) -> None:

@@ -1,9 +1,9 @@
-"""Files that their writer did not close: told apart from damaged ones, and read without waiting for a writer.
+"""HDF5 files that were not closed by their writer: distinguished from damaged ones, and read without waiting.
 
-HDF5 reads a file that is marked as being written with up to 100 attempts at every structure, each after twice the time
-of the last: on one that is torn it waits for ever. So a file is opened that way only while its writer lives, which
-holds a shared lock on it. One whose writer is gone, or that is shorter than it says, is read as if it had been closed
-where it ends: what is missing is then an error of the reading, at once.
+HDF5 reads a file that is marked as being written with up to 100 attempts at every structure, with a waiting time that
+doubles each time: on a torn structure it waits for ever. So a file is opened in that mode only while its writer lives,
+which holds a shared lock on it. A file whose writer is gone, or that is shorter than its header says, is read as if it
+had been closed at its present end: missing data then gives a read error at once.
 
 Superblock of versions 2 and 3 (HDF5 File Format Specification 3.0, II.A), little-endian::
 
@@ -19,21 +19,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_SIZE, _WRITING, _CHECKED = 48, 0b101, 44  # flags: opened for writing, and as a single writer beside readers
+_SIZE, _WRITING, _CHECKED = 48, 0b101, 44  # _WRITING: flags for opened for writing (bit 0) and in SWMR mode (bit 2)
 _END = 28
 
 
 class Superblock(NamedTuple):
-    """The head of a file.
+    """The superblock of an HDF5 file.
 
     Attributes
     ----------
     head : bytes
         Its 48 bytes.
     end : int
-        Where the file says that it ends [bytes].
+        Size of the file according to the superblock [bytes].
     size : int
-        Where it ends [bytes].
+        True size of the file [bytes].
     """
 
     head: bytes
@@ -52,12 +52,12 @@ class Superblock(NamedTuple):
 
     @property
     def sound(self) -> bool:
-        """Whether the head is whole."""
+        """Whether the superblock's checksum is right."""
         return lookup3(self.head[:_CHECKED]) == int.from_bytes(self.head[_CHECKED:], "little")
 
     @property
     def closed(self) -> bytes:
-        """The head of the same file, closed as it is."""
+        """The superblock that the file would have if it had been closed at its true size."""
         head = bytearray(self.head)
         head[11] &= ~_WRITING
         struct.pack_into("<Q", head, _END, self.size)
@@ -65,7 +65,7 @@ class Superblock(NamedTuple):
 
 
 def superblock(path: Path) -> Superblock | None:
-    """The head of a file; None if it is no HDF5 file of these versions. Raises OSError if it cannot be read."""
+    """Read the superblock of a file; None if it is no HDF5 file of these versions. OSError if it cannot be read."""
     with path.open("rb") as file:
         head, size = file.read(_SIZE), os.fstat(file.fileno()).st_size
     if len(head) < _SIZE or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):
@@ -74,14 +74,14 @@ def superblock(path: Path) -> Superblock | None:
 
 
 def held(path: Path) -> int:
-    """Mark a file as one that a living process writes; gives a descriptor that holds the mark until it is closed."""
+    """Mark a file as being written, by a shared lock; returns the descriptor, which holds the lock until closed."""
     descriptor = os.open(path, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_SH)
     return descriptor
 
 
 def has_writer(path: Path) -> bool:
-    """Whether a living process writes a file."""
+    """Whether a living process is writing a file, that is, holds its lock."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -93,29 +93,29 @@ def has_writer(path: Path) -> bool:
 
 
 class AsClosed(io.RawIOBase):
-    """A file with another head, for reading: HDF5 takes it as a Python file."""
+    """A file-like object, for h5py, that reads a file with its first bytes replaced by another superblock."""
 
     def __init__(self, path: Path, head: bytes):
         self._file, self._head = path.open("rb"), head
 
     def readable(self) -> bool:
-        """It is."""
+        """See `io.IOBase`: True."""
         return True
 
     def seekable(self) -> bool:
-        """It is."""
+        """See `io.IOBase`: True."""
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """As of any file."""
+        """See `io.IOBase`."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """As of any file."""
+        """See `io.IOBase`."""
         return self._file.tell()
 
     def readinto(self, buffer: bytearray) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """As of any file, but for the head."""
+        """See `io.RawIOBase`; the first 48 bytes are those of the given superblock."""
         at = self._file.tell()
         n = self._file.readinto(buffer)
         if at < _SIZE:
@@ -124,13 +124,13 @@ class AsClosed(io.RawIOBase):
         return n
 
     def close(self) -> None:
-        """As of any file."""
+        """See `io.IOBase`."""
         self._file.close()
         super().close()
 
 
 def lookup3(data: bytes) -> int:
-    """Bob Jenkins' hash lookup3 (``hashlittle``, 2006, public domain) with the initial value 0, as HDF5 takes it."""
+    """Bob Jenkins' hash lookup3 (``hashlittle``, 2006, public domain) with initial value 0, as used by HDF5."""
 
     def rotated(x: int, k: int) -> int:
         return ((x << k) | (x >> (32 - k))) & _WORD

@@ -1,1 +1,1 @@
-"""From the stylus to the pose, velocity and acceleration that the body is to follow."""
+"""The reference: desired pose, velocity and acceleration of the body, from the motion of the stylus."""

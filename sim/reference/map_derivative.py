@@ -1,4 +1,4 @@
-"""The derivative of a haptic map at one stylus pose, from Python, by the kernels that the servo calls."""
+"""The derivative of a haptic map at one stylus pose, from Python, with the same compiled kernels as the servo."""
 
 import numpy as np
 import numpy.typing as npt
@@ -23,13 +23,13 @@ def _derivative(
 
 
 def derivative_unit() -> Unit:
-    """The unit of `map_derivative`, but for the map's kernels."""
+    """The compilation unit of `map_derivative`, without the map's kernels."""
     matrix, units = types.Array(types.float64, 2, "C"), types.Array(types.int64, 1, "C")
     return Unit.of(_derivative, units, types.int64, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
 
 
 def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
-    """`HapticMap.jacobian` at a stylus pose (7,), to the last bit; its kernels are found compiled.
+    """`HapticMap.jacobian` at a stylus pose (7,), bit for bit the same, by kernels from the compilation cache.
 
     Returns
     -------

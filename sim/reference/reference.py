@@ -1,6 +1,7 @@
-"""From the stylus to what the figure should do: pose, velocity and acceleration of h along the hand's motion.
+"""The reference of the figure: pose, velocity and acceleration of the haptic map h along the hand's motion.
 
-Where rivers play clips of their own, a change of river is a change of motion: the figure goes on from where it is.
+Where each river plays its own clip, a change of river is a change of motion: it begins at the pose and place that the
+figure is shown in (`sim.reference.river_changes`).
 """
 
 import math
@@ -43,12 +44,12 @@ IntArray = npt.NDArray[np.int64]
 
 
 _MATRIX = types.Array(types.float64, 2, "C")
-_ROUNDS = 8  # in which what comes before a motion is found: each gains three digits at the least
+_ROUNDS = 8  # fixed-point iterations of `begin_in_motion`; each gains at least three digits
 
 
 @njit(forceinline=True)
 def _settle(reference: CompiledReference) -> None:
-    """Let the three poses down to the floor, by the share of a hand that is slow."""
+    """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
     s, period, transition = reference.settled, reference.period, reference.transition
     for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
         share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
@@ -66,9 +67,10 @@ def update_reference(place: Any) -> None:
     Parameters
     ----------
     place
-        Where is lent (`controllers.kernel_call.lend`): the reference, updated (the stylus's motion, memory, pose (75),
-        velocity (57), acceleration (57)); the stylus's measured position in H and orientation wxyz, shape (7,); and the
-        trace of the field (see `controllers.fields.instructions`), which river has the hand, and where on it that is.
+        Address (`controllers.kernel_call.lend`) of a tuple of: the reference, which is updated (the stylus's motion,
+        memory, pose (75), velocity (57), acceleration (57)); the stylus's measured position in H and orientation wxyz,
+        shape (7,); and the trace of the field, which holds the active river and the hand's phase on it (see
+        `controllers.fields.instructions`).
     """
     reference, stylus, trace = lent(place)
     _advance(reference, stylus, trace)
@@ -91,7 +93,7 @@ def _advance(reference: CompiledReference, stylus: Array, trace: Array) -> None:
     reference.transition.since[0] += period
     follow_trail(reference)
     kind, params = base_of(reference.kind, reference.params)
-    # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
+    # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
     plays, river = kind == RIVER_CLIPS, trace[TRACE_RIVER]
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
     taken = plays and takes_over(params, reference.memory, river)
@@ -135,18 +137,18 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
     points : Array
         Positions in H and orientations wxyz, shape (n, 7).
     poses : Array
-        Set, shape (n, 75).
+        Written, shape (n, 75).
     """
     _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
 
 
 def poses_unit() -> Unit:
-    """The unit of `poses_along`, but for the map's kernels."""
+    """The compilation unit of `poses_along`, without the map's kernels."""
     return Unit.of(_poses_along, types.Array(types.int64, 1, "C"), types.int64, VECTOR, VECTOR, _MATRIX, _MATRIX)
 
 
 def update_unit(reference: CompiledReference) -> Unit:
-    """The unit of `update_reference`, which is called by its address."""
+    """The compilation unit of `update_reference`, which is called by its address."""
     return Unit.of(update_reference, types.CPointer(types.Tuple((typeof(reference), VECTOR, VECTOR))))
 
 
@@ -158,31 +160,32 @@ def _reference_along(update: int, reference: CompiledReference, points: Array, t
 
 
 def reference_along(reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
-    """Let a reference go along a path of the stylus, period by period.
+    """Advance a reference along a path of the stylus, period by period.
 
     Parameters
     ----------
     reference : CompiledReference
         Updated.
     points, traces : Array
-        What `update_reference` takes, row by row, shapes (n, 7) and (n, 8).
+        Stylus poses and field traces that `update_reference` takes, one row per period, shapes (n, 7) and (n, 8).
     poses : Array
-        Set, shape (n, 75).
+        Written, shape (n, 75).
     """
-    # Rows of what is not contiguous are of another type, and nothing checks that.
+    # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
     points, traces = np.ascontiguousarray(points), np.ascontiguousarray(traces)
     _reference_along(update_unit(reference).address(), reference, points, traces, poses)
 
 
 def along_unit(reference: CompiledReference) -> Unit:
-    """The unit of `reference_along`, but for what that calls."""
+    """The compilation unit of `reference_along`, without the kernels that it calls by address."""
     return Unit.of(_reference_along, types.int64, typeof(reference), _MATRIX, _MATRIX, _MATRIX)
 
 
 def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
-    """Let a reference begin with the stylus in motion: position, velocity and acceleration in H, shape (3, 3).
+    """Start a reference with the stylus in motion: position, velocity and acceleration in H, shape (3, 3).
 
-    They are those of the first update, so the filter begins a period before, from where it predicts them.
+    `motion` is the state at the first update. The filter is set to the state one period earlier from which it predicts
+    `motion`; this is found by fixed-point iteration, since the predicted jerk depends on that earlier state.
     """
     p, v, a = motion
     period = reference.period
@@ -199,7 +202,7 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
 
 
 def check_reference(period: float, bandwidth: float, blend: float) -> None:
-    """Refuse numbers that `make_reference` could not take.
+    """Refuse numbers that are invalid for `make_reference`.
 
     Raises
     ------
@@ -229,19 +232,20 @@ def make_reference(
     Parameters
     ----------
     figure_model
-        The figure alone; must outlive the reference.
+        The model of the figure alone; must outlive the reference.
     compiled : CompiledMap
         The haptic map.
     period : float
-        T, between two updates [s].
+        Time T between two updates [s].
     bandwidth : float
-        Of the tracking filter, ω/2π [Hz].
+        Bandwidth ω/2π of the tracking filter [Hz].
     blend : float
-        In which one clip goes over into another [s]; 0: the figure jumps.
+        Least blend time of a transition from one clip to another [s]; 0: the figure jumps.
     limbs : Array, optional
-        Legs that step meanwhile, `packed_steppers`; without them the feet slide.
+        Legs that step during a transition (`packed_steppers`); without them the feet slide.
     clip_seconds : float
-        Time of the clips [s], where flights that are held are to be let down to the floor.
+        Duration of the clips [s] if a figure that is held in flight is to be lowered to the floor
+        (`sim.reference.settling`); 0 if not.
 
     Raises
     ------
@@ -261,7 +265,7 @@ def unlinked_reference(
     limbs: Array | None = None,
     clip_seconds: float = 0.0,
 ) -> CompiledReference:
-    """`make_reference` without the addresses of the map's kernels: nothing is compiled for it."""
+    """`make_reference` without the addresses of the map's kernels, so that nothing need be compiled yet."""
     check_reference(period, bandwidth, blend)
     kind, params, memory = compiled
     legs = np.zeros((0, LIMB)) if limbs is None else limbs
@@ -278,11 +282,11 @@ def unlinked_reference(
 
 
 NO_MAP = -1
-"""Kind of the map of a reference that has none."""
+"""Kind of map of a reference without a map."""
 
 
 def no_reference(compiled: CompiledMap | None = None) -> CompiledReference:
-    """What a servo without a figure has for a reference, empty; `compiled` is a map that its field is told of."""
+    """The empty reference of a servo without a figure; `compiled` is a haptic map that its field uses, if any."""
     kind, params, memory = compiled or CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
     return CompiledReference(
         figure_model=0, smoothing=0.0, period=1.0, units=np.zeros(0, dtype=np.int64), kind=kind, params=params,

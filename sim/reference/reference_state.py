@@ -1,4 +1,4 @@
-"""What the reference of the figure holds, and the poses of its map along the motion of the stylus."""
+"""State of the figure's reference, and the poses of its map along the motion of the stylus."""
 
 from typing import NamedTuple
 
@@ -20,34 +20,38 @@ class CompiledReference(NamedTuple):
     Attributes
     ----------
     figure_model : int
-        Address of the model of the figure alone, whose tangent space the reference lives in.
+        Address of the model of the figure alone; velocity and acceleration are in its tangent space (qvel).
     smoothing : float
-        θ = exp(−ω T) of the tracking filter, for the period T at which it runs.
+        θ = exp(−ω T) of the tracking filter, for its period T.
     period : float
         T [s].
     units : IntArray
         Addresses of the map's kernels (see `sim.compilation.kernel_units`).
     kind, params, memory
-        The haptic map and its state (the lap).
+        The haptic map and its state (such as the frame of the lap).
     hand : Array
         Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
     trail : Array
         Smoothed position one period ago, and two, shape (2, 3).
     going : Array
-        Scratch: the hand with the rates at which its smoothed position goes, shape (3, 3).
+        Scratch: the smoothed position with velocity and acceleration by backward differences, shape (3, 3).
     orientation, turning : Array
-        Smoothed orientation R_H of the stylus (wxyz), shape (4,), and in its own frame ω and α, shape (2, 3).
+        Smoothed orientation R_H of the stylus (wxyz), shape (4,), and ω and α in the stylus's frame, shape (2, 3).
     started : Array
-        0 until the hand has been seen, shape (1,).
+        0 before the first update, shape (1,).
     pose, velocity, acceleration : Array
-        What the figure should do, shapes (75,), (57,), (57,).
+        The reference that the figure is to track, shapes (75,), (57,), (57,).
     transition : Transition
-        From clip to clip, where rivers play clips of their own.
+        Transition from clip to clip, where each river plays its own clip.
     clip_seconds : float
-        Time of the clips [s] where flights that are held are let down to the floor (`sim.reference.settling`); 0:
-        they are not.
+        Duration of the clips [s] if a figure that is held in flight is lowered to the floor
+        (`sim.reference.settling`); 0 if not.
     settled : Array
-        Share by which they are, and its rates, shape (3,).
+        Share s of that lowering, with its first and second derivative, shape (3,).
+    scratch_memory, scratch_x : Array
+        Scratch: a copy of `memory`, and the stylus pose (7,) at which the map is evaluated.
+    before, after, to_before, to_after : Array
+        Scratch: poses one period before and after (75,), and the tangents to them from `pose` (57,).
     """
 
     figure_model: int
@@ -79,7 +83,7 @@ class CompiledReference(NamedTuple):
 
 @njit(forceinline=True)
 def look_around(reference: CompiledReference, hand: Array) -> None:
-    """Poses of the map along a motion of the stylus: now, a period before and a period after; the memory is now's."""
+    """Poses of the map along a motion of the stylus: now, one period before and after; `memory` is that of now."""
     period, x = reference.period, reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
     evaluate_map(reference.units, reference.kind, reference.params, x, reference.memory, reference.pose)
@@ -93,7 +97,10 @@ def look_around(reference: CompiledReference, hand: Array) -> None:
 
 @njit(forceinline=True)
 def follow_trail(reference: CompiledReference) -> None:
-    """Rates of the smoothed hand by its own last positions: the filter's come after, where a hand is thrown."""
+    """Backward differences of the smoothed hand's last positions, into `going`.
+
+    The filter's own velocity and acceleration lag behind these where a hand is thrown.
+    """
     now, trail, going, period = reference.hand[0], reference.trail, reference.going, reference.period
     for i in range(3):
         going[0, i] = now[i]
@@ -103,7 +110,7 @@ def follow_trail(reference: CompiledReference) -> None:
 
 @njit
 def carry(reference: CompiledReference) -> None:
-    """Move the three poses to what a transition shows."""
+    """Apply the transition in progress to the poses now, before and after."""
     if reference.transition.since[0] >= reference.transition.lasts[0]:
         return
     carry_on(reference.transition, 0.0, reference.pose)

@@ -1,4 +1,8 @@
-"""When another river has the hand, or none has it any more: one motion of the figure goes over into another."""
+"""Changes of the active river: the transition of the figure's motion to another river's clip, or to rest.
+
+A change goes by inertialisation (`sim.reference.transition`), or through a precomputed change that begins at a gate, a
+phase of the lap (`controllers.haptic_map.clip_change`).
+"""
 
 import math
 
@@ -32,7 +36,7 @@ from sim.reference.waiting import leaps, stands, waits_no_longer
 
 @njit
 def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pose: Array) -> None:
-    """Pose of the clip that plays, some time from now, if it goes on at the pace of its river."""
+    """Pose of the playing clip `seconds` from now, if it goes on at its river's own pace."""
     memory = reference.scratch_memory
     memory[:] = reference.memory
     ahead_in_clip(params, memory, seconds)
@@ -41,7 +45,7 @@ def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pos
 
 @njit
 def _show_on(reference: CompiledReference) -> None:
-    """Note what is shown: now, a period before and a period after."""
+    """Store the poses that are shown now, one period before and one period after."""
     look_around(reference, reference.going)
     carry(reference)
     shown = reference.transition.shown
@@ -50,9 +54,10 @@ def _show_on(reference: CompiledReference) -> None:
 
 @njit
 def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, float]:
-    """Place the motion where it has the foot that stands before and after; which it is, −1 for none, and how far [m].
+    """Place the new motion such that the pivot foot, in stance before and after the change, stays where it is.
 
-    A figure that stands on it alone turns with it.
+    If the figure stands on that foot alone, the motion is turned to match its heading as well. Returns the foot, −1 if
+    there is none, and the horizontal distance by which the motion was moved [m].
     """
     transition, old, new = reference.transition, np.empty(7), np.empty(7)
     _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
@@ -70,10 +75,10 @@ def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, f
 
 @njit
 def _go_over(reference: CompiledReference, params: Array) -> None:
-    """Let the motion that the memory now has go on from what was shown, with an offset that decays.
+    """Begin the transition from the shown motion to that of the memory, with an offset that decays.
 
-    It begins ahead of the figure by the way on which its speed over the ground, and about the vertical, comes to
-    that of the new motion, so it neither turns back nor is pulled there; or where a foot of it stands already.
+    The new motion is placed ahead of the figure by the stopping distance of the difference of their horizontal and yaw
+    velocities, so that the figure is neither turned back nor pulled; or, if there is a pivot foot, where that stands.
     """
     transition, memory, period = reference.transition, reference.memory, reference.period
     shown, change = transition.shown, transition.change
@@ -92,7 +97,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
     _, moved = _stand_on_pivot(reference, params)
     set_duration(transition, moved, period)
-    # Where the motion stands when a longer change ends.
+    # A longer change ends at another pose: place the motion again by where it stands then.
     foot, _ = _stand_on_pivot(reference, params)
     look_around(reference, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
@@ -103,7 +108,11 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
 
 @njit(forceinline=False)
 def may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
-    """Whether the figure stands, and another river's clip does not leap before it is shown; or has waited for that."""
+    """Whether a change to another river's clip may begin now.
+
+    The figure must stand and the new clip must not be in flight during the transition; see `sim.reference.waiting`. A
+    river that has waited long enough is let through regardless.
+    """
     transition, memory = reference.transition, reference.scratch_memory
     if waits_no_longer(transition):
         return True
@@ -112,7 +121,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     for k in range(3):
         memory[:] = reference.memory
         change_clip(memory, river, phase)
-        # By its place: a field may lead along the curve at other times than the clip has.
+        # Evaluated first to get the phase from the hand's position: the field may time the curve unlike the clip.
         evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
         ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
         evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
@@ -123,7 +132,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
 
 @njit(forceinline=False)
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
-    """Let another river's clip go on from what is shown."""
+    """Change to another river's clip, at a phase [s], by a transition from what is shown."""
     _show_on(reference)
     change_clip(reference.memory, river, phase)
     _go_over(reference, params)
@@ -131,7 +140,7 @@ def change_river(reference: CompiledReference, params: Array, river: float, phas
 
 @njit(forceinline=False)
 def go_along(reference: CompiledReference, params: Array, river: float) -> None:
-    """Let another river's curve time the hand, and the clip that plays go on to a gate of a known change."""
+    """Time the hand by another river's curve, while the playing clip goes on to a gate of a precomputed change."""
     scratch, x = reference.scratch_memory, reference.scratch_x
     x[:3], x[3:] = reference.hand[0], reference.orientation
     scratch[:] = reference.memory
@@ -141,7 +150,7 @@ def go_along(reference: CompiledReference, params: Array, river: float) -> None:
 
 @njit(forceinline=False)
 def go_through(reference: CompiledReference, params: Array, change: int, river: float, gate: float) -> None:
-    """Let a known change to another river's clip begin at a gate that has been passed, from where the old one was."""
+    """Begin a precomputed change to another river's clip at a gate [s] just passed, where the old clip was then."""
     memory, scratch, x = reference.memory, reference.scratch_memory, reference.scratch_x
     old, new, phase, ahead = reference.before, reference.after, memory[PHASE], memory[AHEAD]
     scratch[:] = memory
@@ -156,10 +165,10 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
 
 @njit(forceinline=False)
 def stop(reference: CompiledReference, params: Array) -> None:
-    """Let the clip that plays come to rest: at the phase of rest nearest to where it would."""
+    """Bring the playing clip to rest, at the rest phase nearest to where it would come to a stop."""
     memory, period = reference.memory, reference.period
     _show_on(reference)
-    # Of the clip's own pace, not of a hand that is thrown along the curve or against it.
+    # Clamped to the clip's own pace: a hand that is thrown along the curve, or against it, would overshoot.
     pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
     stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))
     _go_over(reference, params)

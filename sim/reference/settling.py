@@ -1,15 +1,15 @@
-r"""An animation that is held, or goes slowly, comes down to the floor: no body hovers in the middle of a flight.
+r"""Lowering of the reference to the floor when the hand is slow, so that no figure hovers in the middle of a flight.
 
-A flight takes as long as gravity lets it. Played at σ times its pace it asks for σ² g, and a hand that stops in one
-asks for a figure that hangs in the air. So what the figure is asked for is lowered by the share s of the clearance c of
-its feet, which is 1 for a hand that is slow and 0 at the clips' own pace:
+Gravity sets the duration of a flight phase. Played at σ times its pace it would need a gravity of σ² g, and a hand that
+stops during a flight would ask for a figure that hangs in the air. So the reference is lowered by a share s of its
+feet's clearance c; s is 1 for a slow hand and 0 at the clips' own pace:
 
 .. math:: z \leftarrow z - s\,u\,S(c), \qquad s \to S_{01}\Bigl(\frac{\sigma_1 - \sigma}{\sigma_1 - \sigma_0}\Bigr),
           \qquad \sigma = |\dot\theta|\,T_c / 2\pi,
 
-with θ the stylus's angle about the vertical axis of H, on which the phase of these maps is, T_c the time of the clips,
-S(x) = x³/(x² + r²) for x > 0 and u from 0 to 1 as the figure is upright: one that turns over has no feet to be put on.
-s follows its goal critically damped, so pose, velocity and acceleration are continuous.
+with θ the stylus's angle about the vertical axis of H, which is the phase of these maps, T_c the duration of the clips,
+S_01 the smooth step, S(x) = x³/(x² + r²) for x > 0, and u from 0 to 1 as the figure is upright: one that is upside down
+cannot be put on its feet. s follows its goal with critical damping, so pose, velocity and acceleration are continuous.
 """
 
 import math
@@ -24,22 +24,22 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 
-_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: below the first all of a flight is let down, from the second on none
-_RATE = 10.0  # of the approach to the goal [1/s]: a body falls as far as a jump is high in 0.3 s
-_SOFTNESS = 2e-3  # [m] of the minimum of the soles' heights
-_ROUND = 4e-3  # r [m]
+_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: below σ₀ a flight is lowered fully, from σ₁ on not at all
+_RATE = 10.0  # natural frequency of the approach to the goal [1/s]; a free fall from a jump's height takes 0.3 s
+_SOFTNESS = 2e-3  # softness of the soft minimum over the soles' heights [m]
+_ROUND = 4e-3  # r [m], rounds the onset of S
 
 
 @njit
 def _smooth(x: float) -> float:
-    """3x² − 2x³, from 0 to 1."""
+    """The smooth step 3x² − 2x³, with x clamped to 0 … 1."""
     x = min(max(x, 0.0), 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 
 @njit(forceinline=False)
 def slowness(p: Array, v: Array, seconds: float) -> float:
-    """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips of so many seconds."""
+    """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips that last `seconds`."""
     square = p[0] * p[0] + p[1] * p[1]
     if square == 0.0:
         return 1.0
@@ -49,7 +49,7 @@ def slowness(p: Array, v: Array, seconds: float) -> float:
 
 @njit
 def approach(state: Array, goal: float, period: float) -> None:
-    """Advance the share and its rates (3,) by one period towards its goal."""
+    """Advance the share with its two derivatives, `state` (3,), by one period towards its goal."""
     state[0] += period * state[1] + 0.5 * period**2 * state[2]
     state[1] += period * state[2]
     state[2] = _RATE**2 * (goal - state[0]) - 2.0 * _RATE * state[1]
@@ -57,13 +57,13 @@ def approach(state: Array, goal: float, period: float) -> None:
 
 @njit
 def _height(limb: Array, end: Array, k: int) -> float:
-    """Height over the floor [m] of the sphere of a limb's sole that is at column k, the limb's end at `end` (7,)."""
+    """Height over the floor [m] of the contact sphere in column k of a limb's row, its end being at `end` (7,)."""
     return end[2] + lever(limb, k, end)[2] - CONTACT_RADIUS
 
 
 @njit
 def clearance(limbs: Array, ends: Array, pose: Array) -> float:
-    """Height of the lowest point of all soles over the floor [m], by a soft minimum; `ends` (n, 7) is scratch."""
+    """Height over the floor of the lowest point of all soles [m], by a soft minimum; `ends` (n, 7) is scratch."""
     least = math.inf
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
@@ -78,7 +78,7 @@ def clearance(limbs: Array, ends: Array, pose: Array) -> float:
 
 @njit(forceinline=False)
 def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
-    """Lower a pose (75,) by a share of the clearance of its feet, over limbs of `packed_steppers`."""
+    """Lower a pose (75,) by a share of its feet's clearance; `limbs` are `packed_steppers`, `ends` (n, 7) scratch."""
     if share <= 0.0 or limbs.shape[0] == 0:
         return
     above = clearance(limbs, ends, pose)
@@ -89,10 +89,10 @@ def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
 
 @entry_point
 def stood(limbs: Array, pose: Array) -> None:
-    """Let a pose (75,) down to the floor, where a run begins with it; see `let_down`."""
+    """Lower the initial pose (75,) of a run fully to the floor; see `let_down`."""
     let_down(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)
 
 
 def stood_unit() -> Unit:
-    """The unit of `stood`."""
+    """The compilation unit of `stood`."""
     return Unit.of(stood, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"))

@@ -1,18 +1,17 @@
 r"""The tracking filter between stylus and figure: critically damped, of second degree, for position and orientation.
 
-A fading memory (Morrison 1969, *Introduction to Sequential Smoothing and Prediction*): predict with constant
-acceleration over the period T, then correct by the residual r with 1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and (1 − θ)³/T².
-What moves, or turns about a fixed axis, with constant acceleration is followed without lag.
+A fading-memory filter (Morrison 1969, *Introduction to Sequential Smoothing and Prediction*): predict with constant
+acceleration over the period T, then correct by the residual r with the gains 1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and
+(1 − θ)³/T². Constant acceleration, of a translation or of a rotation about a fixed axis, is tracked without lag.
 
-A hand on a lap does neither: its acceleration turns with it. Along a circle at the rate Ω that has the jerk −Ω² ṗ,
-which a filter without it pays for with a velocity that is 1.6 % short on the default circle in 2.2 s, and a figure
-with a reference that does not move as fast as its velocity says. So the prediction is that of a coordinated turn
-(Bar-Shalom, Li and Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order
-in T:
+On a lap the hand's acceleration is not constant but turns with the hand: along a circle at the rate Ω the jerk is
+−Ω² ṗ. A filter that neglects this jerk gives a velocity 1.6 % too small on the default circle at 2.2 s a lap, so that
+the reference moves faster than its velocity says. So the prediction is that of a coordinated turn (Bar-Shalom, Li and
+Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order in T:
 
 .. math:: j = -\Omega^2 \dot p, \qquad \Omega = \min(|\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2),\ 2\pi)
 
-Without the bound a slow hand's noise turns the prediction: the run that is led falls at 7.9 s.
+Without the bound 2π the noise of a slow hand turns the prediction: the run in LEADING then falls at 7.9 s.
 """
 
 import numpy as np
@@ -21,13 +20,13 @@ from numba import njit
 from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array
 
-_SLOW = 0.02  # v₀ [m/s], below which encoder noise has no direction to turn
-_FASTEST = 2.0 * np.pi  # [rad/s]: no lap takes less than a second, and a slow hand that seems to turn faster is noise
+_SLOW = 0.02  # v₀ [m/s]: below this speed the direction of motion is encoder noise
+_FASTEST = 2.0 * np.pi  # [rad/s]: no lap takes less than a second; a slow hand that seems to turn faster is noise
 
 
 @njit
 def filter_gains(smoothing: float, period: float) -> tuple[float, float, float]:
-    """What of a residual corrects the value, its rate [1/s] and its second derivative [1/s²]."""
+    """Gains of the residual on the value [1], its rate [1/s] and its second derivative [1/s²]."""
     rest = 1.0 - smoothing
     return 1.0 - smoothing**3, 1.5 * rest**2 * (1.0 + smoothing) / period, rest**3 / period**2
 
@@ -49,7 +48,7 @@ def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -
 
 @njit
 def turn_rate(v: Array, a: Array) -> float:
-    """Ω [rad/s] at which a hand with a velocity and an acceleration (3,) turns."""
+    """Rate Ω [rad/s] at which the velocity of a hand turns, from its velocity and acceleration, shape (3,) each."""
     x, y, z = v[1] * a[2] - v[2] * a[1], v[2] * a[0] - v[0] * a[2], v[0] * a[1] - v[1] * a[0]
     rate = np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _SLOW**2)
     return min(rate, _FASTEST)
@@ -73,7 +72,7 @@ def smooth_turn(q: Array, turning: Array, measured: Array, smoothing: float, per
 
     .. math:: r = \log(\hat R^{-1} R_{measured}), \qquad R = \hat R \exp(g\,r)
 
-    A stylus that keeps its orientation is told to the last bit, for its residual is exactly zero.
+    The residual of a stylus that keeps its orientation is exactly zero, so its orientation is passed on bit for bit.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def smooth_turn(q: Array, turning: Array, measured: Array, smoothing: float, per
     g, h, k = filter_gains(smoothing, period)
     w, x, y, z = turned_on(q, turning, period)
     sign = 1.0 if w * measured[0] + x * measured[1] + y * measured[2] + z * measured[3] >= 0.0 else -1.0
-    # The small difference first, not the product of two like quaternions: it is zero exactly, and loses no digits.
+    # Difference first, then product: for nearly equal quaternions this loses no digits, for equal ones it is exactly 0.
     rest = (sign * measured[0] - w, sign * measured[1] - x, sign * measured[2] - y, sign * measured[3] - z)
     scalar, a, b, c = relative(w, x, y, z, rest[0], rest[1], rest[2], rest[3])
     r = logarithm(1.0 + scalar, a, b, c)

@@ -1,4 +1,9 @@
-"""Changes from one motion of the figure to another: what was shown goes on, what it is ahead by decays, feet step."""
+"""Transitions from one motion of the figure to another, by inertialisation with foot steps.
+
+Only the new motion is evaluated. The offset of the shown motion from it at the change, with its rates, is added and
+decays within T; meanwhile the feet step to their new places one after the other, without sliding, and the root is
+lowered where a leg would be too short.
+"""
 
 from typing import NamedTuple
 
@@ -12,17 +17,17 @@ from controllers.motion.inertialization import add_offset, offset_left
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 
-DWELL = 0.04  # [s] for which a river must have the hand before its clip plays: noise gives a hand away for less
-_ROOT = 6  # components of a tangent that are the root's
-_PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that stand on one foot bear little more
-_ASIDE = 5.0  # [m/s²] and over the ground, where it goes on besides
-_THROW = 20.0  # [m/s²] of the root that a change goes on with at most: a hand that is thrown off races its clip
+DWELL = 0.04  # [s] dwell time: a river must be active for so long before its clip plays; noise lasts less
+_ROOT = 6  # components of a tangent that belong to the root
+_PULL = 6.0  # [m/s²] largest vertical acceleration of the root by the offset: a leg in single support bears little more
+_ASIDE = 5.0  # [m/s²] the same horizontally, where the root moves on besides
+_THROW = 20.0  # [m/s²] largest linear acceleration of the offset at the change: a thrown hand races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
-_LONGER = 1.9  # times the least blend time that a way aside makes a change last at most
-_GIVING = 0.1  # [s] in which legs begin to give way, and cease to
-_FALLS = 0.58  # [m/s²] of depth over T² at which the root, going down by the arc, falls with g
-_STRIDES = 1.2  # [m] two steps, for which a way aside may make a change last
-_SWING = 0.3  # [rad] by which a joint swings on at most
+_LONGER = 1.9  # largest factor on the least blend time by which a horizontal offset prolongs a change
+_GIVING = 0.1  # [s] within which the legs' giving way is faded in, and out again
+_FALLS = 0.58  # [m/s²] depth over T² at which the root, lowered along the arc, falls with g
+_STRIDES = 1.2  # [m] two steps: a horizontal offset prolongs a change to at most the time of so much travel
+_SWING = 0.3  # [rad] largest overshoot of a joint's offset
 
 
 class Transition(NamedTuple):
@@ -33,25 +38,25 @@ class Transition(NamedTuple):
     seconds : float
         Least blend time [s]; 0: the figure jumps.
     lasts : Array
-        T of the last change [s], longer where the root has far to go, shape (1,).
+        Duration T of the last change [s], longer where the root has far to go, shape (1,).
     since : Array
         Time since the last change [s], infinite before the first, shape (1,).
     depth : Array
-        By which the root goes down meanwhile [m], shape (1,).
+        Depth by which the root is lowered during the change [m], shape (1,).
     change : Array
-        Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
+        Offset of the shown motion from the new one at the change, and its two derivatives, shape (3, 57).
     limbs, steps : Array
-        Legs (`packed_steppers`), and how they step, shape (n, 28).
+        Legs (`packed_steppers`), and their steps (`controllers.legs.footsteps`), shape (n, 28).
     ends : Array
-        Scratch: where the feet of the new motion are, shape (n, 7).
+        Scratch: poses of the new motion's feet, shape (n, 7).
     rival : Array
-        The river that would take over, and for how long it has had the hand [s], shape (2,).
+        The river that would take over, and for how long it has been active [s], shape (2,).
     shown : Array
-        Scratch: what was shown, and one period before and after, shape (3, 75).
+        Scratch: the shown pose now, and one period before and after, shape (3, 75).
     ahead : Array
-        Scratch: poses of the new motion when the first step ends, and when the second does, shape (2, 75).
+        Scratch: poses of the new motion at the end of the first step and of the second, shape (2, 75).
     stands : Array
-        Scratch: on which legs the new motion stands, shape (n,).
+        Scratch: 1 for legs on which the new motion stands, shape (n,).
     offset, before, after : Array
         Scratch, shape (57,).
     """
@@ -74,7 +79,7 @@ class Transition(NamedTuple):
 
 
 def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transition:
-    """A transition before the first change, of poses of nq and tangents of nv numbers, with `packed_steppers`."""
+    """A transition before its first change, for poses of nq and tangents of nv numbers; limbs are `packed_steppers`."""
     n = len(limbs)
     return Transition(
         seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), depth=np.zeros(1),
@@ -86,7 +91,7 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
 
 @njit(forceinline=False)
 def dwells(transition: Transition, river: float, period: float) -> bool:
-    """Whether a river that would take over, −1 for none, has had the hand for long enough; called every period."""
+    """Whether the river that would take over (−1: none) has been active for the dwell time; call it every period."""
     rival = transition.rival
     rival[1] = rival[1] + period if river == rival[0] else 0.0
     rival[0] = river
@@ -95,17 +100,17 @@ def dwells(transition: Transition, river: float, period: float) -> bool:
 
 @njit
 def pivot_of(transition: Transition) -> tuple[int, int]:
-    """The leg on which the figure stands before and after a change, −1 for none, and when; see `footsteps.pivot`."""
+    """The leg in stance both before and after a change (−1: none), and the row of `ahead`; see `footsteps.pivot`."""
     return pivot(transition.limbs, transition.shown[0], transition.ahead, transition.stands)
 
 
 @njit
 def set_duration(transition: Transition, aside: float, period: float) -> None:
-    """Let a change last long enough for the root's way: up or down, as `note_change` found it, and aside [m]."""
+    """Set the duration of a change from the root's offset: vertical, as `note_change` found it, and `aside` [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
         up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
-        # Not longer: a figure in flight would fly on, and one that runs would leave both feet behind.
+        # Bounded, since a figure in flight would fly on, and a running one would leave both feet behind.
         then, next_ = transition.shown[1], transition.shown[2]
         pace = 0.5 * np.hypot(next_[0] - then[0], next_[1] - then[1]) / period
         over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds, _STRIDES / max(pace, 1e-9))
@@ -114,7 +119,7 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
 
 @njit
 def _carry(transition: Transition, at: float, pose: Array) -> None:
-    """Where the ends of the limbs are `at` seconds into it, to `ends`; and the offset that is left, onto the pose."""
+    """Write the limbs' ends `at` seconds into the change to `ends`, and add the offset that is left to the pose."""
     lasts, ends = transition.lasts[0], transition.ends
     for n in range(transition.limbs.shape[0]):
         limb_end(transition.limbs[n], pose, ends[n])
@@ -126,7 +131,7 @@ def _carry(transition: Transition, at: float, pose: Array) -> None:
 
 @njit(forceinline=False)
 def carry_on(transition: Transition, s: float, pose: Array) -> None:
-    """Move a pose of the new motion, s seconds from now, to what is shown: the offset that is left, and the steps."""
+    """Turn a pose of the new motion, s seconds from now, into the shown pose: add offset, root depth and steps."""
     since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends
     if since >= lasts:
         return
@@ -141,9 +146,9 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
 
 @njit
 def plan_depth(transition: Transition) -> None:
-    """Let the root go down by what legs are too short when one has stepped and the other is about to; `ahead` is then.
+    """Set the root's depth to what the legs are too short by at mid-change, between the two steps.
 
-    Deeper than it would fall by its own weight it does not go.
+    `ahead[0]` holds the new motion's pose at that time. The root goes no deeper than it would fall by its own weight.
     """
     limbs, ends, lasts, pose = transition.limbs, transition.ends, transition.lasts[0], transition.ahead[0]
     transition.depth[0] = 0.0
@@ -160,10 +165,11 @@ def plan_depth(transition: Transition) -> None:
 def note_change(
     transition: Transition, figure_model: int, period: float, pose: Array, before: Array, after: Array, second: int
 ) -> None:
-    """Offset of what was shown over poses that are asked for now, a period earlier and a period later; its rates too.
+    """Store the offset of the shown motion from the new one with its derivatives, and plan the steps.
 
-    `transition.shown` holds the first, in that order; `transition.change` is set: o, ȯ, ö by central differences; and
-    the steps are planned, with the leg that steps second (−1 for any).
+    `pose`, `before` and `after` are poses of the new motion now, one period before and one period after;
+    `transition.shown` holds those of the shown motion in the same order. `transition.change` is set to o, ȯ, ö by
+    central differences. `second` is the leg that must step second (−1: any).
     """
     now, then, next_ = transition.offset, transition.before, transition.after
     mj_differentiate_pos(figure_model, now.ctypes, 1.0, pose.ctypes, transition.shown[0].ctypes)

@@ -1,7 +1,7 @@
-"""When a change of clip begins: a figure that takes off lands before it does something else.
+"""When a change of clip may begin: not while the figure takes off or flies.
 
-A leap that goes over into another motion ends in the air: what the old motion rises by is no longer caught by its own
-landing. So a change waits for a figure that stands, and for a new motion that does not leap before it is shown.
+If a transition began during a leap, the landing of the old motion, which catches its rise, would be missing. So a
+change waits until the figure stands and the new motion has no flight within the transition, for at most a second.
 """
 
 from numba import njit
@@ -10,24 +10,24 @@ from controllers.state import Array
 from sim.reference.settling import clearance
 from sim.reference.transition import DWELL, Transition
 
-_STANDS, _LEAPS = 0.01, 0.05  # [m] over the floor: from there a figure flies; and does so for long
-_RISES = 0.6  # [m/s] of the root: faster, it is about to take off
+_STANDS, _LEAPS = 0.01, 0.05  # [m] clearance of the feet: below the first it stands, above the second it is in a leap
+_RISES = 0.6  # [m/s] vertical speed of the root from which the figure is about to take off
 _PATIENCE = 1.0  # [s] for which a change waits at most
 
 
 @njit
 def stands(transition: Transition, pose: Array, rise: float) -> bool:
-    """Whether a figure is on the floor and does not take off, its root rising so fast [m/s]: it can change over."""
+    """Whether a figure is on the floor and not about to take off, given the vertical speed of its root [m/s]."""
     return clearance(transition.limbs, transition.ends, pose) < _STANDS and rise < _RISES
 
 
 @njit
 def leaps(transition: Transition, pose: Array) -> bool:
-    """Whether a pose is one of a flight, in the middle of which no motion can begin."""
+    """Whether a pose is in the middle of a flight, where no new motion may begin."""
     return clearance(transition.limbs, transition.ends, pose) > _LEAPS
 
 
 @njit
 def waits_no_longer(transition: Transition) -> bool:
-    """Whether a river that would take over has waited long enough; without legs, or where it jumps, none waits."""
+    """Whether the river that would take over has waited long enough; without legs or blend time there is no wait."""
     return transition.rival[1] > DWELL + _PATIENCE or transition.seconds == 0.0 or transition.limbs.shape[0] == 0

@@ -1,1 +1,1 @@
-"""Simulated users: an arm that acts on the stylus and knows nothing of the field."""
+"""Simulated users at the stylus, who know nothing of the force field: a simple arm, and a person with senses."""

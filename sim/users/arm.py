@@ -1,4 +1,4 @@
-"""The simulated hand: an arm's impedance on the stylus. It feels position and velocity, never the field."""
+"""The simulated hand: the impedance of an arm on the stylus, from position and velocity alone, never the field."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
     pushes : Array
         Rows of `sim.users.intent.push_table`, shape (n, 11).
     begun : Array
-        When each push began [s], NaN before it has; shape (n,), updated.
+        When each push began [s], NaN if it has not; shape (n,), updated.
     t : float
         Time [s].
     p : Array
@@ -57,17 +57,17 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
 def arm_force(
     stiffness: float, damping: float, samples: Array, period: float, t: float, p: Array, v: Array, force: Array
 ) -> None:
-    """Set the force of an arm that holds on to its own path: F = k (p_d − p) + b (ṗ_d − v).
+    """Set the force of an arm that tracks its own intended path: F = k (p_d − p) + b (ṗ_d − v).
 
     Parameters
     ----------
     stiffness, damping : float
         k [N/m], b [N s/m].
     samples : Array
-        The intended path in H at equal steps of `period` seconds, shape (n, 3); n = 0: no grip, no force. The path ends
-        at rest in its last sample.
+        The intended path in H, sampled every `period`, shape (n, 3); n = 0: no grip, no force. The path ends at rest in
+        its last sample.
     period : float
-        [s]
+        Sampling period [s].
     t, p, v, force
         Time [s], hand position [m], velocity [m/s] and result [N], in H.
     """
@@ -87,7 +87,7 @@ def arm_force(
 
 @njit
 def _least_jerk(s: float) -> tuple[float, float]:
-    """σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
+    """Minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
     s = min(max(s, 0.0), 1.0)
     return smooth_step(s), 30.0 * s * s * (1.0 - s) * (1.0 - s)
 
@@ -96,7 +96,7 @@ def _least_jerk(s: float) -> tuple[float, float]:
 def grab_force(
     stiffness: float, damping: float, grabs: Array, held: Array, t: float, p: Array, v: Array, force: Array
 ) -> float:
-    """Add the force of an arm that is about a grab at time t, k (p_d − p) + b (ṗ_d − v), and tell of the switch.
+    """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
 
     Parameters
     ----------
@@ -105,9 +105,9 @@ def grab_force(
     grabs : Array
         Rows of `sim.users.intent.grab_table`, shape (n, 11).
     held : Array
-        Where the hand was when each grab began, NaN before it has; shape (n, 3), updated.
+        Position of the hand when each grab began [m], NaN if it has not; shape (n, 3), updated.
     t, p, v, force
-        Time [s], hand position [m], velocity [m/s] and what is added to [N], in H.
+        Time [s], hand position [m], velocity [m/s], and the force that is added to [N], in H.
 
     Returns
     -------
@@ -137,7 +137,10 @@ def grab_force(
 
 
 class CompiledArm(NamedTuple):
-    """An `Arm` as plain numbers and arrays; its state is when pushes begun, where grabs held, and the switch (1,)."""
+    """An `Arm` as plain numbers and arrays.
+
+    Its state is `begun`, when each push began; `held`, where the hand was when each grab began; and `switch` (1,).
+    """
 
     stiffness: float
     damping: float
@@ -153,7 +156,7 @@ class CompiledArm(NamedTuple):
     turns: Array
 
 
-@njit(inline="always")  # at each physics step a call would count references to every array
+@njit(inline="always")  # a call would count references to every array at each physics step
 def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
     """Set the force of the hand on the stylus, in H: arm impedance plus pushes and grabs; and the switch."""
     if arm.path.shape[0] + arm.pushes.shape[0] + arm.grabs.shape[0] == 0:
@@ -166,31 +169,32 @@ def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> 
 
 @dataclass(frozen=True)
 class Arm:
-    """A user: an arm that is relaxed or traces a path of its own, pushes at given places and times, and grabs.
+    """A simple user: an arm that is relaxed or tracks a path of its own, with pushes, grabs and turns of the stylus.
 
     Parameters
     ----------
     stiffness, damping : float
-        Of the arm about its intended path, and about that of a grab [N/m], [N s/m]; unused without either.
+        Impedance of the arm about its intended path or that of a grab [N/m], [N s/m]; unused without either.
     path : Array
-        Intended positions in H [m], shape (n, 3), `period` seconds apart; none for a relaxed hand.
+        Intended positions in H [m], shape (n, 3), `period` apart; empty for a relaxed hand.
     period : float
-        [s]
+        Sampling period of the path [s].
     pushes : sequence of Push
-        What the hand does beside it.
+        Additional forces of the hand.
     grabs : sequence of Grab
-        When and where the hand takes hold, one after the other; for an arm without a path.
+        When and where the hand takes hold, one after the other; only for an arm without a path.
     turns : sequence of Turn
-        How it turns the stylus; with any it also holds it upright in between, and without it lets the gimbal swing.
+        Rotations of the stylus. If there are any, the hand holds the stylus upright in between; if there are none, the
+        gimbal swings freely.
     turn_stiffness, turn_damping : float
-        Of the fingers about the orientation they want [N m/rad], [N m s/rad]; unused without turns. The defaults
-        damp a stylus about critically.
+        Impedance of the fingers about the intended orientation [N m/rad], [N m s/rad]; unused without turns. The
+        defaults damp the stylus about critically.
 
     Raises
     ------
     SimError
-        If an impedance is negative or not finite, the path is not an (n, 3) array of finite numbers, there are a path
-        and grabs, or grabs overlap.
+        If an impedance is negative or not finite, the path is not an (n, 3) array of finite numbers or its period not
+        positive, there are both a path and grabs, or grabs overlap.
     """
 
     stiffness: float = 300.0
@@ -217,7 +221,7 @@ class Arm:
         grab_table(self.grabs)
 
     def compiled(self) -> CompiledArm:
-        """The arm as the servo loop holds it."""
+        """The arm as arrays for the servo loop."""
         return CompiledArm(self.stiffness, self.damping, np.ascontiguousarray(self.path), self.period,
                            push_table(self.pushes), np.full(len(self.pushes), np.nan),
                            grab_table(self.grabs), np.full((len(self.grabs), 3), np.nan), np.zeros(1),

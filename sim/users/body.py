@@ -1,12 +1,12 @@
-r"""A person's arm at the stylus: a mass on the arm's spring, and the fingers' spring between it and the stylus.
+r"""A person's arm at the stylus: a mass on the spring of the arm, coupled to the stylus by the spring of the fingers.
 
 .. math:: M \ddot x_h = K (x_d - x_h) + B (\dot x_d - \dot x_h) + u - F, \qquad
           F = k_g (x_h - p) + b_g (\dot x_h - \dot p)
 
-with M, K, B of an ellipsoid each (Hogan 1985, Mussa-Ivaldi et al. 1985); masses, springs and dampers are joined as in
-the five-parameter model of Speich, Shao & Goldfarb 2005, which is what a hand on a stylus is identified with. The mass
-is a body of its own, carried by the person, not one that is added to the linkage: it has a direction, and the fingers
-between it and the stylus give way.
+with an ellipsoid for each of M, K, B (Hogan 1985, Mussa-Ivaldi et al. 1985), x_h the hand's position, x_d the intended
+one, u the other muscle forces and F the force on the stylus. Masses, springs and dampers are connected as in the
+five-parameter model of Speich, Shao & Goldfarb 2005, which was identified for a hand on a stylus. The mass is a body of
+its own, not added to the linkage, because its inertia depends on direction and the fingers' coupling is compliant.
 """
 
 import math
@@ -17,10 +17,10 @@ from controllers.state import Array
 from sim.errors import SimError
 from sim.users.person import Person
 
-REFERENCE_GRIP = 2.0  # [N] at which impedances are given: the middle of Fu & Cavusoglu 2012
-LEAST_TIP = 0.03  # [kg] of the bare linkage, in its lightest direction: its own M seen through J at θ = 0
-_STIFF_AXIS = np.deg2rad(40.0)  # from straight ahead to the midline: the line from the shoulder to a hand before it
-_UP = 0.6  # stiffness upwards over the stiffest (m): between the axes of the horizontal ellipse
+REFERENCE_GRIP = 2.0  # [N] grip force at which impedances are given: the middle of Fu & Cavusoglu 2012
+LEAST_TIP = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0
+_STIFF_AXIS = np.deg2rad(40.0)  # from straight ahead towards the midline: the line from shoulder to hand
+_UP = 0.6  # vertical over largest stiffness (m): between the axes of the horizontal ellipse
 
 
 def arm_matrices(person: Person) -> tuple[Array, Array, Array]:
@@ -35,15 +35,15 @@ def arm_matrices(person: Person) -> tuple[Array, Array, Array]:
 
 
 def check_steps(person: Person, physics_step: float) -> None:
-    """Refuse a person that the physics step cannot carry, or whose reflexes alone would shake the arm.
+    """Refuse a person for whom the physics step is too long, or whose delayed reflexes make the arm unstable.
 
-    The fingers' damper is held for a step h: b_g h < m of the lightest tip, and k_g h² < m; a spring that answers after
-    a delay T has the damping −k T at low frequency, which the arm's own damping has to outdo.
+    The fingers' force is held for a step h, so b_g h < m and k_g h² < m is required with the lightest apparent mass m
+    of the tip. A spring k with a delay T has the damping −k T at low frequency, which the arm's damping must exceed.
 
     Raises
     ------
     SimError
-        If either is so.
+        If either condition is violated.
     """
     stiffening = 1.0 + person.stiffening * max(10.0 - REFERENCE_GRIP, 0.0)
     most = min(LEAST_TIP / (stiffening * person.grip_damping),

@@ -1,4 +1,4 @@
-"""Random numbers inside compiled code: a state of 64 bits that a run carries, so a run is repeated bit for bit.
+"""Pseudo-random numbers for compiled code: the 64-bit state is part of the run, so a run is repeated bit for bit.
 
 The generator is xorshift64* (S. Vigna, "An experimental exploration of Marsaglia's xorshift generators, scrambled",
 ACM Trans. Math. Softw. 42, 2016): period 2⁶⁴ − 1.
@@ -17,14 +17,14 @@ _FACTOR = np.uint64(0x2545F4914F6CDD1D)
 
 
 def fresh_chance(seed: int) -> State:
-    """State of a generator, shape (1,), from a seed: any whole number, spread by NumPy's `SeedSequence`."""
+    """State of a generator, shape (1,), from an integer seed ≥ 0, hashed by NumPy's `SeedSequence`."""
     state = np.random.SeedSequence(seed).generate_state(1, np.uint64)
-    return np.maximum(state, np.uint64(1))  # zero would stay zero
+    return np.maximum(state, np.uint64(1))  # the state zero would stay zero
 
 
 @njit
 def uniform(state: State) -> float:
-    """A number in [0, 1), and the next state."""
+    """A uniform number in [0, 1); advances the state."""
     x = state[0]
     x ^= x >> _A
     x ^= x << _B
@@ -35,6 +35,6 @@ def uniform(state: State) -> float:
 
 @njit
 def normal(state: State) -> float:
-    """A number of the standard normal distribution (Box and Muller 1958)."""
+    """A number of the standard normal distribution (Box and Muller 1958); advances the state twice."""
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(state)))
     return radius * math.cos(2.0 * math.pi * uniform(state))

@@ -1,10 +1,10 @@
-r"""A hand that somebody drags: an arm whose intended point is told anew for every block of ticks.
+r"""A hand dragged interactively: an arm whose intended point is set anew for every block of ticks.
 
 .. math:: F = k\,(p_d - p) + b\,(\dot p_d - v), \qquad p_d(t) = a + (b - a)\,(t - t_0)/T
 
-It is the arm of `sim.users.arm` with other numbers: in a block the intended point goes from a to b at a steady speed,
-as a path of two samples, or with the switch pressed as a grab that carries steadily. So nothing is compiled for it, and
-the force is the same law by which every simulated hand holds the stylus.
+It is the arm of `sim.users.arm` with other numbers: in a block the intended point moves from a to b at constant speed,
+as a path of two samples or, with the switch pressed, as a steady grab. So nothing new is compiled, and the force law is
+the same as for every simulated hand.
 """
 
 import numpy as np
@@ -13,10 +13,10 @@ from controllers.state import Array
 from sim.users.arm import CompiledArm
 from sim.users.intent import GRAB_COLUMNS
 
-_SPAN = 1e6  # [s] between the two samples of a path, longer than anybody watches
-_FOR_EVER = 1e9  # [s]
-_TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # [Hz], [rad] along x, y, z
-_TREMBLES = 1e-4  # [m]
+_SPAN = 1e6  # [s] between the two samples of a path, longer than any run
+_FOR_EVER = 1e9  # [s] hold time of a grab
+_TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
+_TREMBLES = 1e-4  # [m] amplitude of the tremor
 
 
 def relaxed(arm: CompiledArm) -> CompiledArm:
@@ -26,18 +26,18 @@ def relaxed(arm: CompiledArm) -> CompiledArm:
 
 
 def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array, pressed: bool) -> CompiledArm:
-    """The arm of a hand that takes the stylus along from one point to another within a block.
+    """The arm of a hand that drags the stylus from one point to another within a block.
 
     Parameters
     ----------
     arm : CompiledArm
-        Its impedance is kept.
+        Gives the impedance.
     t, seconds : float
-        Beginning and length of the block [s].
+        Start and duration of the block [s].
     start, end : Array
         a and b in H [m], shape (3,).
     pressed : bool
-        Whether it presses the switch.
+        Whether the switch is pressed.
     """
     carry = np.asarray(end, dtype=np.float64) - start
     if pressed:
@@ -52,7 +52,7 @@ def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array
 def tremor(t: float) -> Array:
     """Physiological tremor of an outstretched hand at a time [s], in H [m], shape (3,): 8 to 12 Hz, a tenth of a mm.
 
-    A living hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54); a device takes readings
-    that do not change for broken ones.
+    A real hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54), so the plausibility check of a device
+    takes constant readings for a fault.
     """
     return np.array([_TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])

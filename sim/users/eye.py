@@ -1,15 +1,16 @@
-r"""What a person sees: the animation's pose, and where on the motion that she has in mind such a pose belongs.
+r"""A person's vision: an estimate of her hand's place from the pose of the figure that she sees.
 
-She has learned what the figure does along that motion and a little beside it. Of a pose q and the place f where she
-feels her hand to be she makes the most likely place: with a picture that is uncertain by σ_q and a feeling by σ_f, and
-λ = σ_q/σ_f,
+She has learned the map h along the motion that she intends and close beside it. From the pose q that she sees and the
+place f where she feels her hand, she estimates the most likely place p. With standard deviations σ_q of the seen pose
+and σ_f of the felt place, and λ = σ_q/σ_f,
 
 .. math:: p = \varphi + H^+\bigl(q \ominus h(\varphi)\bigr) + (1 - H^+ H)(f - \varphi), \qquad
           H^+ = (H^T H + \lambda^2)^{-1} H^T, \qquad \varphi = \varphi(s^*), \\
           s^* = \arg\min_s \|q \ominus h(\varphi(s))\|^2 + \lambda^2 \|f - \varphi(s)\|^2
 
-What does not show in the figure she takes from what she feels: each sense has its weight by direction, as vision and
-proprioception are combined (van Beers, Sittig & Gon 1999, J. Neurophysiol. 81: 1355-1364).
+where H is the derivative of h by the hand's place. Directions that do not show in the figure are taken from
+proprioception: each sense is weighted by direction, as people combine vision and proprioception (van Beers, Sittig &
+Gon 1999, J. Neurophysiol. 81: 1355-1364).
 """
 
 from typing import NamedTuple
@@ -20,27 +21,27 @@ from numba import njit
 from controllers.rotations import logarithm, relative
 from controllers.state import Array
 
-LOOKS = 0.008  # [s] between two pictures of the figure, at most: 120 a second
-_NEAR = 1.0 / 8.0  # of the motion, around where she feels it to be, in which she looks for a pose: steps are alike
+LOOKS = 0.008  # [s] between two pictures of the figure: about 120 a second
+_NEAR = 1.0 / 8.0  # share of the motion, around the felt place, in which a pose is sought: steps of a gait look alike
 
 
 class Eye(NamedTuple):
-    """What a person compares a pose with; without poses she sees the stylus itself.
+    """What a person has learned of the figure along the intended motion; without poses she sees the stylus itself.
 
     Attributes
     ----------
     pose : Array
-        The animation's pose now, that of the reference itself, shape (75,); (0,) where no figure is shown.
+        The pose shown now, a view of the reference's, shape (75,); (0,) where no figure is shown.
     poses : Array
-        Poses along the motion that she has in mind, shape (n, 75).
+        Poses at n samples of the intended motion, shape (n, 75).
     places : Array
-        Where the stylus is then, in H [m], shape (n, 3).
+        Position of the stylus at each sample, in H [m], shape (n, 3).
     inverses : Array
-        H⁺ there, shape (n, 3, 57).
+        H⁺ at each sample, shape (n, 3, 57).
     unseen : Array
-        1 − H⁺H there, shape (n, 3, 3).
+        1 − H⁺H at each sample, shape (n, 3, 3).
     trust : Array
-        λ² there [rad²/m²], shape (n,).
+        λ² at each sample [rad²/m²], shape (n,).
     """
 
     pose: Array
@@ -52,13 +53,13 @@ class Eye(NamedTuple):
 
 
 def no_eye() -> Eye:
-    """No figure is shown: she sees the stylus."""
+    """The eye of a person to whom no figure is shown: she sees the stylus."""
     return Eye(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 3, 3)), np.zeros(0))
 
 
 @njit
 def _likeliest(eye: Eye, felt: Array) -> int:
-    """Which place along the motion is the most likely one, near where the hand is felt to be."""
+    """Index of the most likely sample of the motion for the pose shown, near the felt place of the hand."""
     n, q, around, best = eye.poses.shape[0], eye.pose, 0, np.inf
     away = np.zeros(n)
     for i in range(n):
@@ -84,18 +85,18 @@ def _likeliest(eye: Eye, felt: Array) -> int:
 
 @njit
 def seen_place(eye: Eye, felt: Array, difference: Array, place: Array) -> None:
-    """Set the place (3,) that the pose shown now tells.
+    """Set the estimate p of the hand's place from the pose shown now (see the module's equations).
 
     Parameters
     ----------
     eye : Eye
-        With poses.
+        An eye with poses.
     felt : Array
-        Where she feels her hand to be [m], shape (3,).
+        Felt place of the hand, f [m], shape (3,).
     difference : Array
-        Room for the difference of two poses, shape (57,).
+        Scratch for the difference of two poses, shape (57,).
     place : Array
-        Set [m].
+        Set: p [m], shape (3,).
     """
     q, i = eye.pose, _likeliest(eye, felt)
     other = eye.poses[i]

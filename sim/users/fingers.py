@@ -1,4 +1,4 @@
-"""The simulated fingers: what turns the stylus. The arm moves its tip (see `arm`)."""
+"""The simulated fingers: the moment that turns the stylus; its tip is moved by the arm (see `arm`)."""
 
 import math
 
@@ -11,7 +11,7 @@ from controllers.work_array import work_array
 
 @njit
 def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
-    """Set the rotation vector r [rad] of the orientation that a hand wants at time t, and ṙ [rad/s], shape (3,) each.
+    """Set the rotation vector r [rad] of the intended orientation at time t, and ṙ [rad/s], shape (3,) each.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
 def turning_moment(
     stiffness: float, damping: float, turns: Array, t: float, q: Array, w: Array, moment: Array
 ) -> None:  # fmt: skip
-    r"""Set the moment of fingers that hold the stylus at the orientation they want: k log(R_d Rᵀ) + b (ω_d − ω).
+    r"""Set the moment of fingers that hold the stylus at the intended orientation R_d: k log(R_d Rᵀ) + b (ω_d − ω).
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def turning_moment(
     wanted_turn(turns, t, r, rate)
     a, b, c, d = exponential(r[0], r[1], r[2])
     error = logarithm(*multiply(a, b, c, d, q[0], -q[1], -q[2], -q[3]))
-    # In the frame of H, that is not turned.
+    # With −r and ṙ this is ω_d in the frame H, not in the frame of the stylus.
     speed = angular_velocity(-r[0], -r[1], -r[2], rate[0], rate[1], rate[2])
     for k in range(3):
         moment[k] = stiffness * error[k] + damping * (speed[k] - w[k])

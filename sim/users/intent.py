@@ -1,8 +1,4 @@
-"""What a simulated user means to do with the stylus.
-
-Nothing, trace a path of their own, push at a place and a time, go to a place, press the switch and carry the stylus, or
-turn it.
-"""
+"""Scripted actions of a simulated arm at the stylus: pushes, grabs with the switch pressed, and turns of the stylus."""
 
 import itertools
 from collections.abc import Sequence
@@ -38,12 +34,12 @@ class Push:
     force : float
         Largest force [N]; negative pushes the other way.
     direction : tuple of float, optional
-        Fixed direction d in the hand frame, any length but zero. By default away from the vertical axis of the hand
-        frame, wherever the hand is.
+        Fixed direction d in the hand frame, any length but zero. By default horizontally away from the vertical axis of
+        the hand frame, wherever the hand is.
     place : tuple of float, optional
-        Where in the hand frame [m]: the push begins when the hand first comes within `radius` of it after `at`.
+        Point in the hand frame [m]: the push begins when the hand first comes within `radius` of it after `at`.
     radius : float
-        [m]
+        Radius about `place` [m].
 
     Raises
     ------
@@ -82,30 +78,30 @@ def push_table(pushes: Sequence[Push]) -> Array:
 
 @dataclass(frozen=True)
 class Grab:
-    r"""Go to a place, press the switch, carry the stylus along a vector, let go of both.
+    r"""Go to a place, press the switch, carry the stylus along a vector, hold, and release stylus and switch.
 
     .. math:: p_d(t) = a + \sigma(t)\,(b - a), \qquad \sigma(s) = 10 s^3 - 15 s^4 + 6 s^5
 
-    The hand means to be at p_d, which moves with least jerk from where the hand is when the grab begins to the place
-    within `reach` seconds, and from there along `carry` within `seconds`, with the switch pressed, and stays
-    for `hold` seconds. An arm's impedance pulls the stylus along (see `sim.users.arm`), so what resists keeps it back.
+    The intended position p_d moves with minimum jerk from the hand's position at the start of the grab to the place
+    within `reach`, and from there, with the switch pressed, along `carry` within `seconds`; it then stays for `hold`.
+    The stylus is pulled by the arm's impedance (see `sim.users.arm`), so it lags behind p_d where a force resists.
 
     Parameters
     ----------
     at : float
-        [s]
+        Start of the grab [s].
     carry : tuple of float
-        In the hand frame [m]. A grab that carries nowhere is a click.
+        Displacement in the hand frame [m]; zero for a mere click.
     seconds : float
-        Of the carrying [s].
+        Duration of the displacement [s].
     hold : float
-        [s]
+        Time that the hand stays at the end with the switch pressed [s].
     place : tuple of float, optional
-        In the hand frame [m]; by default where the hand is.
+        Where the switch is pressed, in the hand frame [m]; by default where the hand is.
     reach : float
         Time to get there [s]; ignored without a place.
     steady : bool
-        Carry at a steady speed, σ(s) = s: the hand takes hold of a stylus that moves and lets go of it moving.
+        Carry at constant speed, σ(s) = s: the stylus is taken hold of and released in motion.
 
     Raises
     ------
@@ -130,7 +126,7 @@ class Grab:
 
     @property
     def end(self) -> float:
-        """When the switch is let go of [s]."""
+        """When the switch is released [s]."""
         return self.at + (self.reach if self.place else 0.0) + self.seconds + self.hold
 
     def row(self) -> Array:
@@ -140,12 +136,12 @@ class Grab:
 
 
 def grab_table(grabs: Sequence[Grab]) -> Array:
-    """Rows of all grabs in the order of their beginnings, shape (n, 11).
+    """Rows of all grabs by starting time, shape (n, 11).
 
     Raises
     ------
     SimError
-        If one begins before another is over; a hand has one stylus.
+        If grabs overlap.
     """
     ordered = sorted(grabs, key=lambda grab: grab.at)
     for before, after in itertools.pairwise(ordered):
@@ -156,7 +152,7 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
 
 @dataclass(frozen=True)
 class Turn:
-    r"""Turn the stylus about an axis and back; between turns a hand that turns it means to hold it upright.
+    r"""Turn the stylus about an axis and back; between turns the intended orientation is upright.
 
     .. math:: R_d(t) = \exp\bigl(\textstyle\sum_i \alpha_i \sin^2(\pi (t - t_i) / T_i)\, n_i\bigr)
 
@@ -165,9 +161,9 @@ class Turn:
     at : float
         t_i [s].
     seconds : float
-        T_i, of turning there and back [s].
+        T_i, duration of turning there and back [s].
     angle : float
-        α_i, the farthest [rad]; at most half a turn either way.
+        α_i, the peak angle [rad]; at most half a turn either way.
     axis : tuple of float
         n_i in the hand frame, any length but zero: x rolls the pen, y points it down, z points it to the left.
 

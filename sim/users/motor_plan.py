@@ -1,4 +1,4 @@
-"""Submovements of a person: when she decides on one, where it goes, and by how much it misses."""
+"""Motor planning of a person: when a submovement begins, its goal and duration, and the scatter of its endpoint."""
 
 import math
 
@@ -30,17 +30,17 @@ from sim.users.person_state import (
 from sim.users.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.wishes import PLACE
 
-ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994 I: less; by how much, m)
-LEAST_SECONDS = 0.16  # [s] of the shortest submovement
-WATCHED = 0.8  # of a submovement's time: 94 % of its way, by which it is seen where it ends
-SURPRISE, REACTION = 0.004, 0.08  # [m] from where it should be, a hand is looked after within so long [s]
+ACROSS = 0.85  # endpoint scatter across the direction over that along it (below 1: Gordon et al. 1994 I; the value: m)
+LEAST_SECONDS = 0.16  # [s] duration of the shortest submovement
+WATCHED = 0.8  # share of a submovement's time, 94 % of its way, after which its endpoint can be seen
+SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan [m] that is corrected, and after what time [s]
 
 
 @njit
 def may_decide(person: PersonState, waits: bool) -> bool:
-    """Whether it is time for a new submovement: after the last one's end, or earlier if she is surprised.
+    """Whether a new submovement may begin: in the second half of the last one, or earlier after a deviation from it.
 
-    Who aims at a target `waits` until she sees where the last one ends.
+    A person who aims at a target `waits` until she has seen where the last submovement ends.
     """
     n, m, V = person.numbers, person.memory, person.vectors
     now = m[TICKS] * n[PERIOD]
@@ -63,9 +63,9 @@ def may_decide(person: PersonState, waits: bool) -> bool:
 
 @njit
 def aim(person: PersonState, goal: Array, width: float) -> bool:
-    """Decide on a submovement to a target; whether it is reached already.
+    """Begin a submovement to a target; returns True, and begins none, if the target is already reached.
 
-    A target is a strip across the way from the last one, as in Fitts 1954; the first one is a ball.
+    A target is a strip across the line from the previous target, as in Fitts 1954; the first one is a ball.
     """
     n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[TARGET])
     away, along, apart = 0.0, 0.0, 0.0
@@ -86,11 +86,11 @@ def aim(person: PersonState, goal: Array, width: float) -> bool:
 
 @njit
 def submove(person: PersonState, goal: Array, seconds: float) -> None:
-    r"""Begin a submovement from where the hand is believed to be to a goal.
+    r"""Begin a submovement from the believed place of the hand to a goal.
 
-    It misses by σ = K A/D along its way and 0.85 of that across (Schmidt et al. 1979; ellipses of endpoints:
-    Gordon et al. 1994): the noise of a motor command
-    grows with it (Harris & Wolpert 1998).
+    Its endpoint scatters with σ = K A/D along its direction and less across (`ACROSS`), A its length and D its duration
+    (Schmidt et al. 1979; ellipses of endpoints: Gordon et al. 1994), because the noise of a motor command grows with
+    the command (Harris & Wolpert 1998).
     """
     n, m, V = person.numbers, person.memory, person.vectors
     start, end, way, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
@@ -116,7 +116,7 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
 
 @njit
 def drive(person: PersonState) -> None:
-    """Follow the submovement that is under way, and remember how far it was meant to go."""
+    """Follow the submovement in progress, and accumulate the intended displacement."""
     n, m, V = person.numbers, person.memory, person.vectors
     if m[LASTS] == 0.0:
         return

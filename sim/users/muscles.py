@@ -1,7 +1,7 @@
-r"""Muscles, arm and fingers of a person at a physics step; see `sim.users.body` for her arm.
+r"""Muscles, arm and fingers of a person in one physics step; see `sim.users.body` for the arm.
 
-Fatigue is that of a three-compartment model of muscle (Frey-Law, Looft & Heitsman 2012, J. Biomech. 45: 1803-1808): of
-the force f that she exerts, over her strength, the share F f of what is able tires, and R of what is tired recovers:
+Fatigue follows a three-compartment model of muscle (Frey-Law, Looft & Heitsman 2012, J. Biomech. 45: 1803-1808): the
+capacity C, as a share of her strength, falls by F times the exerted force f, and recovers at the rate R:
 
 .. math:: \dot C = R (1 - C) - F f, \qquad f \le C
 """
@@ -35,13 +35,16 @@ from sim.users.person_state import (
 )
 
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
-RECOVERY = 0.04  # [1/min] of muscle that is tired: grip of the three-compartment model (Frey-Law et al. 2012, m)
-RESTED, RESTING = 15.0, 0.05  # times as fast at rest (Looft et al. 2018, m); share of strength that is rest
+RECOVERY = 0.04  # R [1/min] of fatigued muscle, for grip (Frey-Law et al. 2012, m)
+RESTED, RESTING = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m); share of strength below which it is rest
 
 
 @njit
 def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> None:
-    """Muscles, arm and fingers for a physics step (semi-implicit Euler); see `sim.users.body`."""
+    """Advance the hand by a physics step dt [s] (semi-implicit Euler), and set its force on the stylus [N].
+
+    `p` and `v` are position and velocity of the stylus in H, shape (3,); see `sim.users.body`.
+    """
     n, m, V = person.numbers, person.memory, person.vectors
     engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
     spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])

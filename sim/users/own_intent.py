@@ -1,7 +1,7 @@
-"""An intent of the caller's own: a function that says what a person wants, from what she knows.
+"""The calling convention of a compiled user-defined intent (see `sim.users.intents.own`).
 
-Her wishes are then two rows (see `sim.users.wishes`) that the function writes: the wish now, and in the place of the
-second row the velocity at which the wanted place moves.
+The wishes are then two rows (see `sim.users.wishes`) that the function writes: the wish now, and in the place columns
+of the second row the velocity of the wanted place.
 """
 
 from numba import types
@@ -11,4 +11,4 @@ from controllers.kernel_call import kernel_call
 _VECTOR = types.Array(types.float64, 1, "C")
 INTENT_ARGUMENTS = (types.float64, _VECTOR, _VECTOR, types.Array(types.float64, 2, "C"))
 call_intent = kernel_call(INTENT_ARGUMENTS)
-"""Call of a compiled intent: ``(t, place, force, rows)``, from compiled code."""
+"""Calls a compiled intent with ``(t, place, force, rows)``, from compiled code."""

@@ -1,8 +1,8 @@
-r"""The pace at which a hand draws a given path: the smoothest one.
+r"""The natural timing of a hand along a given closed path: that of minimum jerk.
 
 .. math:: \min_{s(t)} \int_0^T \left|\frac{d^3}{dt^3} x(s(t))\right|^2 dt
 
-(Todorov & Jordan 1998: smoothness along a predefined path gives the speeds that people show.)
+(Todorov & Jordan 1998: smoothness along a predefined path predicts the speed profiles of people.)
 """
 
 import numpy as np
@@ -10,13 +10,14 @@ from scipy.optimize import minimize
 
 from controllers.state import Array
 
-_WAVES = 6  # of the logarithm of the pace, a lap
+_WAVES = 6  # Fourier terms of the logarithm of the speed along a lap
 
 
 def natural_times(points: Array, seconds: float) -> Array:
-    """When a closed path, drawn in so long [s], passes each of its points (n, 3), the last of which is the first; (n,).
+    """Times [s], shape (n,), at which a closed path of a given duration passes its points (n, 3).
 
-    The pace along the path is exp of a Fourier sum in arc length, whose coefficients minimise the jerk.
+    The last point must equal the first. The speed along the path is exp of a Fourier series in arc length, whose
+    coefficients minimise the jerk.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = np.concatenate(([0.0], np.cumsum(steps)))
@@ -35,7 +36,7 @@ def natural_times(points: Array, seconds: float) -> Array:
     def jerk(coefficients: Array) -> float:
         at = times(coefficients)
         x = np.stack([np.interp(even, at, points[:, k]) for k in range(points.shape[1])], axis=1)
-        # Of the first waves only: between its points a path is not known.
+        # Only of low frequencies, since the path between its points is not known.
         spectrum = np.where(np.abs(frequencies) <= 4 * _WAVES, np.fft.fft(x, axis=0), 0.0)
         return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
 

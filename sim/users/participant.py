@@ -1,4 +1,4 @@
-"""A person with something to do: what the loop is given in the place of an arm."""
+"""A participant: a simulated person together with her wishes, given to the loop in place of an arm."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,8 +15,8 @@ from sim.users.person import Person
 from sim.users.person_state import PersonState
 from sim.users.wishes import Wishes
 
-LONGEST_PERIOD = 0.01  # [s] of a servo whose ticks a person can be asked in: a third of the shortest reflex
-_QUALITY = 4.0  # of the tremor's resonance: a peak some 2 Hz wide
+LONGEST_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
+_QUALITY = 4.0  # quality factor of the tremor's resonance: a peak some 2 Hz wide
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Participant:
     wishes : Wishes
         What she wants.
     seed : int
-        Of her noise: the same seed, the same run.
+        Seed of her noise: the same seed gives the same run.
     own : Own, optional
-        The caller's own intent, that writes her wishes.
+        A user-defined intent that writes her wishes.
     """
 
     person: Person = field(default_factory=Person)
@@ -41,20 +41,20 @@ class Participant:
     own: Own | None = None
 
     turns: tuple[()] = ()
-    """She lets the gimbal swing."""
+    """None: a person lets the gimbal swing."""
 
     def compiled(self, period: float, physics_step: float) -> PersonState:
-        """The person as the servo loop holds her, without the address of her code.
+        """The person's state for the servo loop, without the address of her compiled time step.
 
         Parameters
         ----------
         period, physics_step : float
-            Of the servo and of the physics [s].
+            Servo period and physics step [s].
 
         Raises
         ------
         SimError
-            If the rates cannot carry her.
+            If either is too long for this person, or her own intent cannot be compiled.
         """
         person = self.person
         if period > LONGEST_PERIOD:
@@ -90,7 +90,10 @@ class Participant:
 
 
 def tremor_filter(person: Person, period: float) -> tuple[float, float, float]:
-    """Coefficients a, b, g of y = a y₋₁ + b y₋₂ + g w: white noise w to a tremor of the person's size and frequency."""
+    """Coefficients a, b, g of y = a y₋₁ + b y₋₂ + g w, which turns white noise w into the tremor of one axis.
+
+    The person's `tremor` is the RMS of the vector of three axes, hence the factor 3 of the variance.
+    """
     radius = math.exp(-math.pi * person.tremor_frequency / _QUALITY * period)
     turn = 2.0 * math.pi * person.tremor_frequency * period
     a, b = 2.0 * radius * math.cos(turn), -radius * radius

@@ -1,4 +1,4 @@
-"""A person at the stylus, as numbers: arm, senses and motor system. Pure data; `population` draws them."""
+"""Parameters of a simulated person at the stylus: arm, senses and motor system. Pure data; see also `population`."""
 
 import math
 from dataclasses import dataclass, fields
@@ -8,17 +8,17 @@ from sim.errors import SimError
 
 
 class Interval(NamedTuple):
-    """What a number of a person may be.
+    """The admissible interval of a parameter.
 
     Attributes
     ----------
     least, most : float
-        Inclusive.
+        Bounds, inclusive.
     unit : str
-        Of both.
+        Unit of both.
     source : str
-        Where the interval is from. "(a)" marks a paper of which the abstract was read, "(q)" one as it is quoted by who
-        read it, "(m)" one quoted from memory; see docs/validation/published-numbers.md.
+        Source of the interval. "(a)" marks a paper of which the abstract was read, "(q)" one as quoted by another
+        author, "(m)" one quoted from memory; see docs/validation/published-numbers.md.
     """
 
     least: float
@@ -89,7 +89,7 @@ INTERVALS = {
         0.0, 0.5, "", "share learned a repetition: Smith et al. 2006 (q): 0.23, of which 0.21 is soon forgotten"
     ),
 }
-"""Interval of every number of a `Person`, with its unit and its source."""
+"""Interval of every numeric parameter of a `Person`, with its unit and source."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class Person:
     Parameters
     ----------
     name : str
-        For tables.
+        Name, for tables.
     age : float
-        [years]; what follows from it is in the numbers already, as `population` draws them.
+        Age [years]; its effects are already in the other numbers, as `population` draws them.
     hand : {"right", "left"}
-        That holds the stylus: the ellipsoids of inertia and stiffness are mirrored.
+        The hand that holds the stylus: the ellipsoids of inertia and stiffness are mirrored.
     skill : float
         Share of the arm's own inertia that the motor command foresees.
     grip : float
@@ -111,13 +111,13 @@ class Person:
     mass : float
         Inertia of hand and arm at the stylus, across its heaviest direction [kg].
     stiffness : float
-        Of the arm in its stiffest direction, at a grip of 2 N [N/m].
+        Stiffness of the arm in its stiffest direction, at a grip of 2 N [N/m].
     damping_ratio : float
-        Of the arm.
+        Damping ratio of the arm.
     anisotropy : float
-        Stiffest over softest direction in the horizontal plane; of the inertia its square root.
+        Ratio of largest to smallest stiffness in the horizontal plane; for the inertia, its square root.
     grip_stiffness, grip_damping : float
-        Of the fingers between hand and stylus, at a grip of 2 N [N/m], [N s/m].
+        Stiffness and damping of the fingers between hand and stylus, at a grip of 2 N [N/m], [N s/m].
     stiffening : float
         Relative rise of stiffness and damping with grip [1/N].
     strength : float
@@ -125,40 +125,41 @@ class Person:
     fatigue : float
         Share of the muscle that tires while all of it is active [1/min]; 0 for none.
     reflex_delay : float
-        Of force and motion that are felt [s].
+        Delay of felt force and motion [s].
     reflex_gain : float
         Share of the arm's stiffness that answers with this delay.
     visual_delay : float
-        Of what is seen [s].
+        Delay of vision [s].
     felt_noise, seen_noise : float
-        Standard deviation of a place that is felt, and of one that is seen [m].
+        Standard deviation of a felt and of a seen position [m].
     felt_force_noise : float
-        Standard deviation of a force that is felt, over the force.
+        Standard deviation of a felt force, relative to the force.
     direction_noise : float
-        Standard deviation of the angle by which a movement is felt to go in a wrong direction [rad].
+        Standard deviation of the error of a movement's felt direction [rad].
     refractory : float
-        Least time between two decisions [s].
+        Refractory period: least time between two decisions [s].
     horizon : float
         Duration of a submovement in tracking [s].
     motor_noise : float
-        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, 0.85 of it across [s].
+        K in σ = K A/T [s], the standard deviation of a submovement's endpoint along its direction (0.85 σ across), with
+        A its length and T its duration.
     force_noise : float
-        Standard deviation of a force over the force.
+        Standard deviation of an exerted force, relative to the force.
     tremor, tremor_frequency : float
-        Root mean square of its acceleration [m/s²], and its frequency [Hz].
+        RMS acceleration of the tremor [m/s²], and its frequency [Hz].
     correction : float
-        Share of a perceived error that the next submovement makes up for.
+        Share of a perceived error that the next submovement corrects.
     caution : float
-        Standard deviations of her own scatter that she keeps within a target or a tunnel.
+        Number of standard deviations of her own scatter that she keeps within a target or a tunnel.
     entrainment : float
-        Rate at which her own clock gives way to the motion [1/s].
+        Rate at which her own clock adapts to the motion [1/s].
     learning : float
-        Share of a repeated error that is learned a repetition; 0 for none.
+        Share of a repeated error that is learned per repetition; 0 for none.
 
     Raises
     ------
     SimError
-        If a number is outside of its interval, or the hand is neither.
+        If a number is outside of its interval, or `hand` is neither right nor left.
     """
 
     name: str = "median"

@@ -1,7 +1,7 @@
-"""A person's time step: senses and decides once a servo tick, moves her arm at every physics step.
+"""A person's time step: senses and decides once per servo tick, moves her arm at every physics step.
 
-She gets what a person gets: force and motion of the stylus with noise and a reflex's delay, what she sees with a
-sight's delay, and what she wants. No field, no phase, no limiter reaches her.
+Her inputs are those of a real person: force and motion of the stylus with noise and reflex delay, vision with visual
+delay, and her wishes. She has no access to field, phase or limiter.
 """
 
 from numba import njit
@@ -48,7 +48,7 @@ def person_step(
     p, v : Array
         True position [m] and velocity [m/s] of the stylus in H, shape (3,).
     force : Array
-        That of the last step [N], in H; set to that of this one, shape (3,).
+        Force of the last step [N], in H, shape (3,); set to that of this step.
     switch : Array
         Set to 1 while the switch is pressed, shape (1,).
     """
@@ -67,7 +67,7 @@ def _step(person: PersonState, dt: float, substep: int, p: Array, v: Array, forc
 
 @njit
 def _begin(person: PersonState, p: Array, v: Array) -> None:
-    """Begin where the stylus is, at its speed."""
+    """Initialise the person with her hand at the stylus, moving with its velocity."""
     memory, vectors = person.memory, person.vectors
     vectors[:] = 0.0
     for place in (HAND_P, DRIVEN_P, BELIEF, SHOWN):

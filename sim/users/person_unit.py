@@ -1,4 +1,4 @@
-"""The unit of compiled code that a person is: kept by itself, so a change in people compiles no loop again."""
+"""The compilation unit of a person's time step, separate so that a change in it does not recompile the loop."""
 
 import numpy as np
 from numba import typeof, types
@@ -9,11 +9,11 @@ from sim.users.person_step import person_step
 
 
 def person_unit() -> Unit:
-    """Unit of a person's time step."""
+    """The compilation unit of `person_step`."""
     number, vector = types.float64, typeof(np.zeros(3))
     return Unit.of(person_step, typeof(nobody()), number, number, types.int64, vector, vector, vector, vector)
 
 
 def link_person(person: PersonState) -> None:
-    """Give a person the address of her code, in place; compiles it if it is not kept."""
+    """Set the address of a person's compiled time step, in place; compiles it if it is not in the cache."""
     person.units[0] = person_unit().address()

@@ -1,4 +1,4 @@
-"""People: seeded draws of persons, and some that have a name."""
+"""Populations of simulated persons: seeded random draws, and named personas."""
 
 from dataclasses import replace
 
@@ -16,16 +16,14 @@ _SPREAD = {
 }  # fmt: skip
 """Standard deviation of the logarithm of each number between people: log-normal, so none is negative.
 
-Of tremor as wide as the normative study's range (a factor of 20 between extremes of 97 people); of impedance as the
-inter-subject variation of arm models (a factor of about two either way); the others as coefficients of variation of a
-healthy sample, which are some 10 to 30 %.
+For tremor, as wide as the range of the normative study (a factor of 20 between the extremes of 97 people); for
+impedance, the inter-subject variation of arm models (a factor of about two either way); for the others, coefficients of
+variation of a healthy sample, some 10 to 30 %.
 """
-_SKILL = (8.5, 1.5)  # of a beta distribution: adults know the inertia of their own arm, but not all of it
+_SKILL = (8.5, 1.5)  # parameters of a beta distribution: adults know most of their arm's inertia, but not all of it
 _MEAN_SKILL = _SKILL[0] / sum(_SKILL)
 _LEFT = 0.1  # share of people who hold a pen in the left hand
-_AGING = (
-    0.006  # relative slowing a year from 30 years on: choice reaction and movement times rise by 5 to 10 % a decade
-)
+_AGING = 0.006  # relative slowing per year from age 30 on: choice reaction, movement times rise 5 to 10 % a decade
 
 PERSONAS = {
     "median": Person(),
@@ -39,7 +37,7 @@ PERSONAS = {
     "firm": Person(name="firm", grip=8.0, stiffness=420.0, strength=30.0),
     "light": Person(name="light", grip=1.0, stiffness=120.0, mass=0.4),
 }  # fmt: skip
-"""Persons with a name, each a point of the population that stands for a kind of people."""
+"""Named persons, each a point of the population that represents a kind of user."""
 
 
 def persona(name: str) -> Person:
@@ -48,7 +46,7 @@ def persona(name: str) -> Person:
     Raises
     ------
     SimError
-        If there is nobody of that name.
+        If there is no such person.
     """
     if name in PERSONAS:
         return PERSONAS[name]
@@ -59,20 +57,20 @@ def persona(name: str) -> Person:
     raise SimError(f"no person {name!r}; there are {known}, or SEED:PLACE of a population, such as 7:3")
 
 
-_MOST = 1_000_000  # people of one population
+_MOST = 1_000_000  # largest size of a population
 
 
 def population(number: int, seed: int) -> tuple[Person, ...]:
-    """People drawn by lot; the first ones of a larger population of the same seed are the same.
+    """Draw a population; a larger one of the same seed begins with the same people.
 
-    Age is uniform between 20 and 75, skill a Beta(8.5, 1.5), one in ten left-handed, all other numbers are log-normal
-    about the median person's, cut off at their intervals. Scatter of endpoints and horizon grow as skill falls, delays
-    as age rises.
+    Age is uniform between 20 and 75, skill is Beta(8.5, 1.5), one in ten is left-handed; the numbers of `_SPREAD` are
+    log-normal about the median person's, clipped to their intervals, all others are the median person's. Endpoint
+    scatter and horizon grow as skill falls; delays, refractory period and horizon grow with age.
 
     Parameters
     ----------
     number : int
-        How many, one or more.
+        Number of people, one or more.
     seed : int
         0 or more.
 

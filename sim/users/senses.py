@@ -1,6 +1,6 @@
-"""What a person feels and sees, late and with noise, and where she believes her hand to be.
+"""Senses of a person: proprioception and vision with delay and noise, and her estimate of her hand's position.
 
-Her belief is what she feels, corrected by what she sees when that arrives, and carried on by what she intended since
+The estimate is the delayed felt position, corrected by vision when that arrives, plus the displacement intended since
 (a forward model: Miall et al. 1993, J. Mot. Behav. 25: 203-216).
 """
 
@@ -55,24 +55,24 @@ from sim.users.person_state import (
     PersonState,
 )
 
-DRIFT_TIME = 120.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
-BLUR_TIME = 0.2  # [s] of what is seen: a fixation
-CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
-DOUBTED = 0.005  # [m], and three times the noise of what is felt: what is seen further away is not believed
-VEER_TIME = 0.5  # [s] within which the felt direction of a movement wanders
-ASTRAY_TIME = 0.5  # [s] within which a place that movement led astray is felt again where it is
-UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 2002, m)
+DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
+BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
+CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
+DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen further from the felt one is rejected
+VEER_TIME = 0.5  # [s] correlation time of the error of felt direction
+ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
+UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
 
 
 @njit
 def sense(person: PersonState, p: Array, force: Array) -> None:
-    """Note what is felt and seen, and make of what arrives now where the hand is believed to be."""
+    """Store what is felt and seen now, and update the estimate, reflexes and tremor from what arrives now."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
     _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
     go_astray(person)
     _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
-    if n[WISH_PERIOD] < 0.0:  # only an intent of the caller's own asks for the force
+    if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
         _noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
     tick = int(m[TICKS])
@@ -102,7 +102,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
 
 @njit
 def _noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
-    """A step of a noise whose standard deviation and correlation time are given (an Ornstein–Uhlenbeck process)."""
+    """Advance a noise vector, an Ornstein–Uhlenbeck process of given standard deviation and correlation time [s]."""
     kept = math.exp(-person.numbers[PERIOD] / seconds)
     fresh = deviation * math.sqrt(1.0 - kept * kept)
     for k in range(3):
@@ -111,12 +111,12 @@ def _noise(person: PersonState, which: int, deviation: float, seconds: float) ->
 
 @njit
 def go_astray(person: PersonState) -> None:
-    r"""A movement is felt to go in a direction that is wrong by a small rotation δ [rad], which wanders.
+    r"""Advance the error e of the felt position that arises because the felt direction of a movement is wrong.
 
     .. math:: \dot e = \delta \times v - e / T
 
-    for the error e of the place that is felt: unseen movements miss by an angle that is the same for short ways and
-    long ones (Gordon, Ghilardi & Ghez 1994 I).
+    with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
+    (Gordon, Ghilardi & Ghez 1994 I).
     """
     _noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
     V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
@@ -128,7 +128,7 @@ def go_astray(person: PersonState) -> None:
 
 @njit
 def _look(person: PersonState, p: Array) -> None:
-    """Look at the figure, or at the stylus (p) where there is none."""
+    """Look at the figure or, if there is none, at the stylus (p)."""
     m, V, eye = person.memory, person.vectors, person.eye
     if eye.pose.shape[0] == 0:
         V[SHOWN] = p
@@ -139,5 +139,5 @@ def _look(person: PersonState, p: Array) -> None:
         seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
         for k in range(3):
             away += (V[SHOWN, k] - felt[k]) ** 2
-        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # she takes it for another pose
+        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # rejected: taken for another pose
             V[SHOWN] = felt

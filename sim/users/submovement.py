@@ -1,10 +1,10 @@
-r"""Submovements of least jerk: quintic polynomials between states of rest or motion.
+r"""Minimum-jerk submovements: quintic polynomials between two states of motion.
 
 .. math:: x(t) = \sum_{i=0}^{5} c_i\, (t/D)^i
 
-is the motion of least ∫|x⃛|² between two states (position, velocity, acceleration) in a time D; from rest to rest it is
-10 s³ − 15 s⁴ + 6 s⁵ (Flash & Hogan 1985). A new one that begins in the middle of another is their superposition
-(Flash & Henis 1991).
+minimises ∫|x⃛|² between two states (position, velocity, acceleration) in a time D; from rest to rest it is
+10 s³ − 15 s⁴ + 6 s⁵ (Flash & Hogan 1985). A submovement that begins during another superposes on it (Flash & Henis
+1991).
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from numba import njit
 
 from controllers.state import Array
 
-MOST_STAGES = 8  # submovements to a target that are planned ahead: more leave a 2000th of the way
+MOST_STAGES = 8  # most submovements to a target that are planned ahead; more would leave a 2000th of the way
 
 
 @njit
@@ -41,9 +41,9 @@ def set_submovement(plan: Array, start: Array, goal: Array, seconds: float) -> N
 
 @njit
 def submovement(plan: Array, seconds: float, elapsed: float, state: Array) -> None:
-    """Set the state (position, velocity, acceleration), shape (3, 3), so long [s] after a submovement began.
+    """Set the state (position, velocity, acceleration), shape (3, 3), at a time `elapsed` [s] after its start.
 
-    After its end it goes on at the speed that it ends with.
+    After its end the motion continues with its final velocity.
     """
     s = min(elapsed / seconds, 1.0)
     beyond = max(elapsed - seconds, 0.0)
@@ -58,22 +58,23 @@ def submovement(plan: Array, seconds: float, elapsed: float, state: Array) -> No
 
 @njit
 def aimed_seconds(difficulty: float, scatter: float, overhead: float, least: float) -> float:
-    r"""Duration of the next submovement to a target, of as many as get there soonest (Meyer et al. 1988) [s].
+    r"""Duration [s] of the next submovement to a target, for the number of submovements that is fastest in total.
 
-    n submovements, each of which leaves the same share of its way within z standard deviations of σ = K A/D, take
+    After Meyer et al. 1988: n submovements, each of which leaves the same share of its length A as an error of z
+    standard deviations σ = K A/D, take
 
     .. math:: \min_n\ n \bigl(D_0 + \max(D_{min},\ z K x^{1/n})\bigr)
 
     Parameters
     ----------
     difficulty : float
-        x, the way over half of the target's width; the way over what may be left of it.
+        x, the distance over half of the target's width.
     scatter : float
-        z K, standard deviations times the constant of σ [s].
+        z K, number of standard deviations times the constant of σ [s].
     overhead : float
-        D₀, to see where a submovement ends [s].
+        D₀, time to see where a submovement ends [s].
     least : float
-        D_min, of the shortest one [s].
+        D_min, duration of the shortest submovement [s].
     """
     soonest, seconds = np.inf, least
     for n in range(1, MOST_STAGES + 1):

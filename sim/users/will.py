@@ -1,4 +1,4 @@
-"""What a person wants at a tick, and what she does about it."""
+"""A person's decisions at a tick: reading her wish, starting submovements, adapting her clock, learning forces."""
 
 import math
 
@@ -38,15 +38,15 @@ from sim.users.person_state import (
 from sim.users.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
 from sim.users.wishes import GRIP as WISHED_GRIP
 
-ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
-YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
-RETAINED = 0.99  # A, share of what is learned that lasts to the next repetition: slow process of Smith et al. 2006 (m)
-BEND = 0.1  # [s] before and after which she looks at a way to see how it bends: a third of a submovement
+ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise
+YIELDING_TIME = 0.15  # [s] time constant with which a relaxed arm's rest position follows the hand
+RETAINED = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
+BEND = 0.1  # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
 
 
 @njit
 def want(person: PersonState, switch: Array) -> None:
-    """Read what is wanted now, decide on a submovement if it is time to, and follow the one that is under way."""
+    """Read the current wish, begin a submovement if it is time to, and follow the one in progress."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = work_array((3, 3)), work_array((3, 3))
     wanted[:], goal[:] = 0.0, 0.0
@@ -92,7 +92,7 @@ def want(person: PersonState, switch: Array) -> None:
 
 @njit
 def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
-    """Set the motion that will be wanted at a time [s]; no corner of it asks for more than `BEND` allows."""
+    """Set the motion that will be wanted at time t [s]; its acceleration is averaged over ± `BEND`, also at corners."""
     before, bend = work_array((3, 3)), work_array(3)
     before[:] = 0.0
     wanted_motion(rows, period, t - BEND, before)
@@ -105,7 +105,7 @@ def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
 
 @njit
 def _ahead(entrainment: float, place: Array, wanted: Array) -> float:
-    """By how much her clock runs faster [1]: a motion that is ahead of what was wanted takes it along."""
+    """Relative speed-up of her clock [1], −0.5 to 0.5: positive if the hand is ahead of the wanted motion."""
     speed, way = 0.0, 0.0
     for k in range(3):
         speed += wanted[1, k] * wanted[1, k]
@@ -115,7 +115,7 @@ def _ahead(entrainment: float, place: Array, wanted: Array) -> float:
 
 @njit
 def _yield(person: PersonState) -> None:
-    """Let the hand go where it goes: the arm takes the place where it is believed to be for its own."""
+    """Be passive: the arm's rest position follows the believed position of the hand."""
     n, m, V = person.numbers, person.memory, person.vectors
     for k in range(3):
         V[DRIVEN_P, k] += n[PERIOD] / YIELDING_TIME * (V[BELIEF, k] - V[DRIVEN_P, k])
@@ -125,11 +125,11 @@ def _yield(person: PersonState) -> None:
 
 @njit
 def _learn(person: PersonState, wanted: Array) -> None:
-    r"""Learn the force that keeps the hand where it is wanted, for each part of a lap.
+    r"""Learn the force that keeps the hand on the wanted motion, for each part of a lap.
 
     .. math:: f_{n+1} = A f_n + B K (p_d - p)
 
-    a repetition (Thoroughman & Shadmehr 2000); it is begun as much earlier as muscles take to be activated.
+    per repetition (Thoroughman & Shadmehr 2000). The learned force is applied earlier by the time of muscle activation.
     """
     n, m, V = person.numbers, person.memory, person.vectors
     if n[LEARNING] == 0.0 or n[LAP] == 0.0:
@@ -146,5 +146,5 @@ def _learn(person: PersonState, wanted: Array) -> None:
 
 @njit
 def _part(laps: float) -> int:
-    """Part of a lap, of so many laps."""
+    """Index of the part of a lap after a number of laps."""
     return int(LEARNED_PARTS * (laps - math.floor(laps))) % LEARNED_PARTS

@@ -1,4 +1,4 @@
-"""What a person wants from one moment to the next: the table that an intent becomes, and how it is read."""
+"""Wishes of a person over time: the table that an intent is turned into, and its interpolation."""
 
 from dataclasses import dataclass, field
 
@@ -9,30 +9,30 @@ from controllers.state import Array
 from sim.errors import SimError
 
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
-"""Columns of a wish: place (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target [m],
-switch, and whether the person does anything; without, she lets the stylus go where it goes."""
+"""Columns of a wish: position (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target
+[m], 1 if the switch is pressed, and 1 if the person is active; if not, she lets the stylus be led."""
 OWN = -1.0
-"""Period of wishes that an intent of the caller's own writes."""
+"""Value of `Wishes.period` that marks wishes written by a user-defined intent."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """Wishes of a person, either by time or one target after the other.
+    """Wishes of a person, either sampled in time or as a sequence of targets.
 
     Parameters
     ----------
     rows : Array
         Wishes, shape (n, 10), columns as above.
     period : float
-        Time between two rows [s]; 0 where each row is a target, and the next one's turn comes when it is reached;
-        negative where an intent of the caller's own writes the two rows (see `sim.users.own_intent`).
+        Time between two rows [s]; 0 if each row is a target, to be reached before the next one; negative if a
+        user-defined intent writes the two rows (see `sim.users.own_intent`).
     lap : float
-        Time after which the wish repeats itself, for what is learned from one repetition to the next [s]; 0: never.
+        Period with which the wishes repeat, for learning from one repetition to the next [s]; 0: never.
 
     Raises
     ------
     SimError
-        If the table has another shape, no row, or a number that is not finite.
+        If the table has another shape or no row, a number is not finite, or a target has no width.
     """
 
     rows: Array = field(default_factory=lambda: resting(1))
@@ -52,21 +52,21 @@ class Wishes:
 
 
 def resting(n: int) -> Array:
-    """Wishes of a person who does nothing, shape (n, 10)."""
+    """Rows of a passive person, shape (n, 10)."""
     rows = np.zeros((n, WISH_SIZE))
     rows[:, GRIP] = np.nan
     return rows
 
 
 def following(points: Array) -> Array:
-    """Wishes of a person who follows points (n, 3) of H, shape (n, 10)."""
+    """Rows of a person who follows points (n, 3) in H, shape (n, 10)."""
     rows = resting(len(points))
     rows[:, PLACE : PLACE + 3], rows[:, ENGAGED] = points, 1.0
     return rows
 
 
 def targets(points: Array, width: float) -> Wishes:
-    """Targets (n, 3) of a width [m] across the way from the last one, one after the other; each is clicked."""
+    """Wishes to reach and click targets (n, 3) in turn; `width` [m] is along the line from the previous target."""
     rows = following(points)
     rows[:, WIDTH] = width
     return Wishes(rows, period=0.0)
@@ -74,9 +74,9 @@ def targets(points: Array, width: float) -> Wishes:
 
 @njit
 def wanted_motion(rows: Array, period: float, t: float, motion: Array) -> int:
-    """Set the motion (position, velocity, acceleration), shape (3, 3), that is wanted at a time [s]; return the row.
+    """Set the wanted motion (position, velocity, acceleration), shape (3, 3), at a time t [s]; returns the row's index.
 
-    Between rows a cubic with the rows' central differences as velocities; before the first and after the last at rest.
+    Rows are interpolated by cubics with central differences as velocities; after the last row the motion is at rest.
     """
     n = rows.shape[0]
     place = min(max(t / period, 0.0), float(n - 1))

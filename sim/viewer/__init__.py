@@ -1,1 +1,1 @@
-"""What a person looks at: the live page and the replay."""
+"""Visualisation in the browser: the live page and the replay."""

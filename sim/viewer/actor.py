@@ -1,4 +1,4 @@
-"""Bodies of a model as they are drawn: solid or as a ghost, at their true size or magnified."""
+"""Drawing of a model's bodies in a viser scene: solid or as a ghost, at true size or magnified."""
 
 import mujoco
 import viser
@@ -11,20 +11,20 @@ GHOST_OPACITY = 0.35
 
 
 class Actor:
-    """Bodies of the model that are drawn in one style and placed by position and quaternion.
+    """Bodies of a model that are drawn in one style and placed by position and quaternion.
 
     Parameters
     ----------
     scene : viser.SceneApi
-        Where they are drawn.
+        Scene in which they are drawn.
     name : str
-        Of the node that holds them.
+        Name of the scene node that holds them.
     shapes : list of Shape
-        What is drawn.
+        Shapes of the bodies.
     scale : float
-        By which it is magnified.
+        Magnification.
     ghost : str, optional
-        Colour of a translucent one, ``#rrggbb``; by default it has its own colours.
+        Colour of a translucent ghost, ``#rrggbb``; by default bodies are drawn solid in their own colours.
     """
 
     def __init__(self, scene: viser.SceneApi, name: str, shapes: list[Shape], scale: float, ghost: str = ""):
@@ -61,7 +61,7 @@ class Actor:
         self._root.visible = value
 
     def remove(self) -> None:
-        """Draw it no more."""
+        """Remove the bodies from the scene."""
         self._root.remove()
 
 

@@ -1,4 +1,4 @@
-"""The curves that are drawn of a run: the one that it has, or every river in a colour of its own."""
+"""Curves of a run as they are drawn: its only curve, or every river in a colour of its own."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -16,11 +16,11 @@ class Course(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the river; of a run's only curve, none.
+        Name of the river; empty for a run's only curve.
     points : array (m, 3)
-        In the hand frame [m].
+        Points in the hand frame [m].
     line, tube : str
-        Colours, ``#rrggbb``.
+        Colours of curve and tube, ``#rrggbb``.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Course(NamedTuple):
 
 
 def courses(static: Mapping[str, npt.ArrayLike | str]) -> tuple[Course, ...]:
-    """What is drawn of a recording's arrays and texts: ``curve``, or ``river_curves`` by their ``river_names``."""
+    """The curves in a recording's arrays and texts: ``curve``, or ``river_curves`` with their ``river_names``."""
     if "river_curves" not in static:
         return (Course("", np.asarray(static["curve"], dtype=np.float64), CURVE, TUBE),)
     names, curves = str(static["river_names"]).split("\n"), np.asarray(static["river_curves"], dtype=np.float64)

@@ -1,27 +1,27 @@
-"""What keeps a replay in the picture: arrows of a length that fits, and a camera that follows a figure that travels."""
+"""Framing of a replay: a scale for force arrows, and a view that follows a travelling figure."""
 
 import numpy as np
 
 from controllers.state import Array
 from sim.recording.recording import Channel
 
-TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
+TRAVEL = 1.5  # [m] a figure that leaves this radius is followed
 
 
 def typical_peak(channel: Channel) -> float:
-    """Norm that only a two-hundredth of the rows exceeds, so that a jolt does not shrink all other arrows."""
+    """The 99.5 % quantile of the rows' norms, so that a jolt does not shrink all other arrows."""
     return float(np.percentile(np.linalg.norm(channel[:: max(1, len(channel) // 20000)], axis=1), 99.5))
 
 
 def followed(roots: Array, fps: float) -> Array:
-    """What is subtracted from positions on the floor: nothing, or the path of a travelling root, smoothed over 1 s.
+    """Horizontal offset of the view (n, 2) [m]: the path of a travelling root smoothed over 1 s; else zero.
 
     Parameters
     ----------
     roots : array (n, 2)
-        [m], at equal steps of time.
+        Positions of the root on the floor [m], at equal time steps.
     fps : float
-        Of them [1/s].
+        Their rate [1/s].
     """
     if np.max(np.linalg.norm(roots - roots[0], axis=1)) < TRAVEL:
         return np.zeros_like(roots)

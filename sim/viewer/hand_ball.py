@@ -1,4 +1,4 @@
-"""The ball by which the stylus is taken: it is dragged with the mouse, in the plane of the screen."""
+"""The ball by which a person drags the stylus with the mouse, in the plane of the screen."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,23 +11,23 @@ from sim.viewer.live_stage import drawn_at, taken_at
 from sim.viewer.palette import USER, rgb
 
 Dragged = Callable[[Any, Array, bool], None]
-"""Called with viser's event, the place of the hand in H [m], shape (3,), and whether shift is held."""
+"""Called with viser's event, the hand's position in H [m], shape (3,), and whether shift is pressed."""
 
-RADIUS = 0.12  # drawn [m]: it covers the magnified gimbal, and is large enough for a finger
+RADIUS = 0.12  # [m] in the scene: covers the magnified gimbal, and is large enough for a finger
 
 
 class HandBall:
-    """A ball at the stylus, or where a hand means to have it.
+    """A ball at the stylus or, while it is dragged, at the hand's intended position.
 
     Parameters
     ----------
     scene : viser.SceneApi
-        In which it is drawn.
+        Scene in which it is drawn.
 
     Attributes
     ----------
     dragged : bool
-        Whether a mouse has it.
+        Whether it is being dragged.
     """
 
     def __init__(self, scene: viser.SceneApi):
@@ -36,16 +36,16 @@ class HandBall:
         self.dragged = False
 
     def on_drag(self, told: Dragged) -> None:
-        """Tell of every drag; with the left button, and with shift besides."""
+        """Set the callback of drags with the left button, without and with shift."""
         for modifier in (None, "shift"):
             self._ball.on_drag("left", modifier=modifier)(self._listener(told, modifier is not None))
 
     def rest(self, p_H: Array) -> None:
-        """Lie at a point of the hand frame [m], shape (3,)."""
+        """Put the ball at a point of the hand frame [m], shape (3,)."""
         self._ball.position = drawn_at(p_H)
 
     def _listener(self, told: Dragged, shift: bool) -> Any:
-        # Asynchronous, so that the phases of a drag come in their order.
+        # Asynchronous, so that the phases of a drag are handled in order.
         async def listen(event: Any) -> None:
             if event.phase == "start":
                 self._offset = np.asarray(self._ball.position) - np.asarray(event.start_position)

@@ -1,4 +1,4 @@
-"""A page in the browser on which a run is seen while it goes on: the live stage, a clock, and where to look from."""
+"""A browser page that shows a run while it goes on: the live stage, a clock, and a choice of views."""
 
 import html
 import time
@@ -28,13 +28,13 @@ class LivePage:
     drawn : sequence of Course
         The curves.
     radius : float
-        Of the tube around each [m], 0 for none.
+        Radius of the tube around each curve [m], 0 for none.
     p_WH : array (3,)
-        Origin of the hand frame in the world.
+        Origin of the hand frame in the world [m].
     figure : {"physical", "kinematic", "none"}
-        The figure; a physical one has the animation beside it as a ghost.
+        Kind of figure; beside a physical one the animation is shown as a ghost.
     port : int
-        The next free one is taken if it is in use.
+        Port; if it is in use, the next free one is taken.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class LivePage:
         self._server.on_client_connect(lambda client: look_from(client, VIEWS["both"]))
 
     def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
-        """Show a moment with notes below its time, unless the last was shown less than a thirtieth of a second ago."""
+        """Show a moment with notes below its time, at most 30 times a second; calls in between are ignored."""
         now = time.monotonic()
         if now - self._shown < 1 / _FPS:
             return

@@ -1,7 +1,7 @@
-"""What is seen of a run while it goes on: the workspace, magnified, and beside it the figure and its ghost.
+"""The live scene of a run: the magnified workspace, and beside it the figure and its ghost.
 
-Drawn as the replay draws it (`sim.viewer.replay_html`): Phantom, curves, tubes and forces are magnified and stand
-beside the figures, their axes are the world's. A figure that travels is followed: the floor moves under it.
+As in the replay (`sim.viewer.replay_html`), Phantom, curves, tubes and forces are magnified and drawn beside the
+figures, with axes parallel to the world's. A travelling figure is followed: the floor moves under it.
 """
 
 from collections.abc import Sequence
@@ -19,45 +19,45 @@ from sim.viewer.shapes import body_shapes, coarser, tube
 from sim.viewer.shown import Shown
 
 MAGNIFICATION = 8.0
-PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # where the origin of the hand frame is drawn, out of the figure's reach [m]
-GHOST_AT = np.array([-0.75, 0.45, 0.0])  # the ghost's distance from the figure [m]
+PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # [m] where the hand frame's origin is drawn, out of the figure's reach
+GHOST_AT = np.array([-0.75, 0.45, 0.0])  # [m] offset of the ghost from the figure
 METRES_PER_NEWTON = 0.12  # drawn length of a force
-LEAST_ARROW = 0.02  # [m] below which a force is not drawn
-TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
-LONGEST_SLICE = 0.11  # [m] drawn length of the largest force on a slice
-FOLLOWS = 0.5  # [s] by which the view is behind a figure that travels
-TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
-FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
-LEAPS = 3.0  # [m] a figure that is so far from where the view has it was put there
+LEAST_ARROW = 0.02  # [m] drawn length below which a force is hidden
+TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
+LONGEST_SLICE = 0.11  # [m] drawn length of the largest force of a field slice
+FOLLOWS = 0.5  # [s] time constant with which the view follows a travelling figure
+TRAVELS = 1.5  # [m] distance from its start beyond which a figure is followed
+FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] mesh resolution, coarse enough for a phone
+LEAPS = 3.0  # [m] distance from the view's position beyond which a figure was relocated, not moved
 
 
 def drawn_at(p_H: Array) -> Array:
-    """Where a point of the hand frame is drawn [m], shapes (..., 3)."""
+    """Scene position of a point of the hand frame [m], shapes (..., 3)."""
     return PHANTOM_AT + MAGNIFICATION * p_H
 
 
 def taken_at(position: Array) -> Array:
-    """Point of the hand frame that is drawn at a place [m], shapes (..., 3)."""
+    """Point of the hand frame that is drawn at a scene position [m], shapes (..., 3)."""
     return (position - PHANTOM_AT) / MAGNIFICATION
 
 
 class LiveStage:
-    """Everything that is drawn of a run.
+    """The live scene of a run.
 
     Parameters
     ----------
     scene : viser.SceneApi
-        Of the page; what is in it goes.
+        Scene of the page.
     model : mujoco.MjModel
         The world with the figure: bodies named ``phantom/…`` and ``figure/…``.
     drawn : sequence of Course
         The curves.
     radius : float
-        Of the tube around each [m], 0 for none.
+        Radius of the tube around each curve [m], 0 for none.
     p_WH : array (3,)
-        Origin of the hand frame in the world.
+        Origin of the hand frame in the world [m].
     figure, ghost : str
-        What the labels call them; without a ghost, nothing.
+        Labels of the two; empty if there is no ghost.
     """
 
     def __init__(
@@ -94,17 +94,17 @@ class LiveStage:
 
     @property
     def configuration_size(self) -> int:
-        """Numbers in a configuration of the world."""
+        """Length of a configuration of the world (nq)."""
         return int(self._model.nq)
 
     def shows_ghost(self, shows: bool) -> None:
-        """Whether the ghost is seen, or something else stands in its place."""
+        """Show or hide the ghost, for example while takes are shown in its place."""
         if self._ghost.visible != shows:
             self._ghost.visible = shows
             self._ghost_label.visible = shows and self._has_ghost
 
     def draw_course(self, k: int, points: Array) -> None:
-        """Draw one of the curves where it is now: points in the hand frame [m], shape (m, 3)."""
+        """Draw curve number k at its present points in the hand frame [m], shape (m, 3)."""
         course, radius = self._courses[k]
         line = drawn_at(points)
         self._draw_tube(f"/curve/{k}/line", line, 0.006, 8, {"color": rgb(course.line), "cast_shadow": False})
@@ -121,7 +121,7 @@ class LiveStage:
             self._tubes[node] = self._scene.add_mesh_simple(node, vertices, faces, **looks)
 
     def draw_slice(self, points: Array, forces: Array) -> None:
-        """Draw the field's forces [N] at points of the hand frame [m], shapes (n, 3); none if there are none."""
+        """Draw the field's forces [N] at points of the hand frame [m], shapes (n, 3); with no points, hide them."""
         self._slice.visible = len(points) > 0
         if len(points) == 0:
             return
@@ -152,7 +152,7 @@ class LiveStage:
             self._lag.points = np.array([[tip, drawn_at(shown.target)]], dtype=np.float32)
 
     def _follow(self, t: float, qpos: Array) -> Array:
-        """What is subtracted from places of the figure: nothing, or the way that it has travelled, smoothed."""
+        """Offset of the view (3,) [m]: the smoothed displacement of a travelling figure; else zero."""
         if self._root < 0:
             return np.zeros(3)
         place = qpos[self._root : self._root + 2]
@@ -184,10 +184,10 @@ class LiveStage:
 
 
 def light(scene: viser.SceneApi, shadows: bool = True) -> None:
-    """Light a page: a soft sky, a light from beside the camera, and one from above that casts shadows.
+    """Light a page: a soft sky, a light from the front, and viser's default lights, with or without shadows.
 
-    Without viser's environment map, which matt bodies hardly show, and without shadows, a page without a graphics card
-    is drawn tens of times as fast.
+    viser's environment map, hardly visible on matt bodies, is switched off. Without it and without shadows, a page is
+    drawn tens of times as fast on a machine without a graphics card.
     """
     scene.configure_environment_map(None)
     scene.configure_default_lights(shadows, cast_shadow=shadows)

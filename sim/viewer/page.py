@@ -1,4 +1,4 @@
-"""What a run shows itself to while it goes on; and the page of a run that nobody watches."""
+"""The interface of a live page, and a null implementation for runs without one."""
 
 from typing import Protocol
 
@@ -6,19 +6,19 @@ from sim.viewer.shown import Shown
 
 
 class Page(Protocol):
-    """What a run shows itself to."""
+    """A page that shows a run while it goes on."""
 
     def show(self, shown: Shown) -> None:
-        """Show a moment of it."""
+        """Show a moment of the run."""
         ...
 
     def close(self) -> None:
-        """Show nothing more."""
+        """Close the page."""
         ...
 
 
 class NullPage:
-    """The page of a run that nobody watches."""
+    """The page of a run without display."""
 
     def show(self, shown: Shown) -> None:
         """Do nothing."""

@@ -1,4 +1,4 @@
-"""What a colour means, the same in the replay, the report and the figures; and what counts as a push there."""
+"""Colours and their meaning, common to replay, report and figures; and the threshold of a push."""
 
 import colorsys
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ FIELD = "#22a046"  # the field and what it leads
 USER = "#eb7814"  # the hand's own force, and where it pushes
 CURVE = "#3c465a"
 TUBE = "#4682c8"
-RIVERS = (TUBE, "#b5417a", "#8a6d1d", "#7a5fc0", "#1f8f98", "#a8453a", "#6b7280")  # the first seven
+RIVERS = (TUBE, "#b5417a", "#8a6d1d", "#7a5fc0", "#1f8f98", "#a8453a", "#6b7280")  # of the first seven rivers
 
-PUSH = 0.2  # a hand that presses harder than this is pushing [N]
+PUSH = 0.2  # [N] force of the hand above which it counts as pushing
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -24,7 +24,7 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def river_colors(n: int) -> tuple[str, ...]:
-    """Colours of n rivers: `RIVERS`, then what differs most to the eye from those before and from all else here."""
+    """Colours of n rivers: `RIVERS`, then colours perceptually furthest from the previous and the other ones here."""
     colors: list[str] = list(RIVERS)
     candidates, places = _candidates()
     nearest = np.min(
@@ -38,7 +38,7 @@ def river_colors(n: int) -> tuple[str, ...]:
 
 
 def _candidates() -> tuple[list[str], Array]:
-    """Colours that are seen well on white, and are not glaring, and where they are in OKLab."""
+    """Colours with good contrast on white that are not glaring, and their coordinates in OKLab."""
     grid = product(np.arange(36) / 36.0, (0.3, 0.4, 0.5, 0.6), (0.35, 0.5, 0.65))
     shares = np.array([colorsys.hls_to_rgb(*place) for place in grid])
     colors = ["#" + bytes(row).hex() for row in np.rint(255.0 * shares).astype(np.uint8)]
@@ -48,7 +48,7 @@ def _candidates() -> tuple[list[str], Array]:
 
 
 def _oklab(colors: Sequence[str]) -> Array:
-    """Colours as points (n, 3) that are as far apart as they look (Ottosson 2020, "OKLab")."""
+    """Colours as points (n, 3) of a perceptually uniform space (Ottosson 2020, "OKLab")."""
     share = np.array([rgb(color) for color in colors]) / 255.0
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.cbrt(linear @ _CONES) @ _LAB

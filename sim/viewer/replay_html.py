@@ -1,9 +1,9 @@
 """The 3D replay of a recording as one HTML page that plays and scrubs without a network or a server.
 
 Drawn from left to right: the animation h(p) (the kinematic figure, as a translucent ghost), the physical figure, and
-the Phantom with stylus, curve, tube and forces. The Phantom is magnified and moved beside the figures, since at its
-true size its curve would be a few pixels wide; its axes stay the world's. A figure that travels is followed: the floor
-moves under it.
+the Phantom with stylus, curve, tube and forces. The Phantom is magnified and drawn beside the figures, since at its
+true size its curve would be a few pixels wide; its axes stay parallel to the world's. A travelling figure is followed:
+the floor moves under it.
 """
 
 import contextlib
@@ -23,28 +23,28 @@ from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import body_shapes, tube
 
 FPS = 30.0
-SECONDS = 60.0  # of a longer run, the beginning is shown
+SECONDS = 60.0  # [s] longest replay; of a longer run the beginning is shown
 MAGNIFICATION = 4.0
-PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # where the origin of the hand frame is drawn, out of the figure's reach [m]
-GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
-ARROW = 0.6  # drawn length of a large force [m]
-TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
-TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
+PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin is drawn, out of the figure's reach
+GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
+ARROW = 0.6  # [m] drawn length of a large force (`typical_peak`)
+TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the stylus's path appears
+TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
 
 class Target(NamedTuple):
-    """What follows the animation.
+    """The body that follows the animation.
 
     Attributes
     ----------
     prefix : str
-        Of its bodies and joints in the world.
+        Prefix of its bodies and joints in the world.
     name, animation : str
-        What the labels call it and what it follows.
+        Labels of the body and of its reference.
     height : float
-        Of the labels [m].
+        Height of the labels [m].
     """
 
     prefix: str
@@ -57,19 +57,19 @@ FIGURE_TARGET = Target("figure/", "physical figure", "animation h(p)", 2.0)
 
 
 def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FIGURE_TARGET) -> str:
-    """The page.
+    """Make the replay page.
 
     Parameters
     ----------
     recording : Recording
-        With arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius``, 0 for none, and ``p_WH``, the
-        hand frame's origin in the world, and where there are rivers their ``river_curves`` (k, m, 3) and
-        ``river_names``; in group ``frames`` the channels t, qpos (nq) and reference (75, or the target's); in group
-        ``ticks`` the channels t, p, force and user (3 each, hand frame).
+        Must have the arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius``, 0 for none, and
+        ``p_WH``, the hand frame's origin in the world; for rivers also ``river_curves`` (k, m, 3) and ``river_names``;
+        in group ``frames`` the channels t, qpos (nq) and, if there is a figure, reference (75, or the target's size);
+        in group ``ticks`` the channels t, p, force and user (3 each, hand frame).
     model : mujoco.MjModel
         The world that was recorded: bodies named ``phantom/…`` and those of the target.
     target : Target
-        What follows the animation.
+        The body that follows the animation.
 
     Returns
     -------
@@ -79,9 +79,9 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
     Raises
     ------
     RecordingError
-        If any of that is missing, or the run ended before anything was recorded.
+        If an array or channel is missing, or the run ended before anything was recorded.
     """
-    quiet = io.StringIO()  # viser announces its address and its end, which mean nothing here
+    quiet = io.StringIO()  # viser prints its address and its end, which are irrelevant here
     with contextlib.redirect_stdout(quiet):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
@@ -93,18 +93,18 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
 
 
 def drawn_tube(recording: Recording) -> float:
-    """Radius with which the tube is drawn [m]: ε, or less where that would hide the curve and the hand."""
+    """Drawn radius of the tube [m]: the recorded radius, limited so that it does not hide the curve and the hand."""
     extent = float(np.max(np.ptp(recording.array("curve"), axis=0)))
     return min(float(recording.array("tube_radius")), TUBE_SHARE * extent)
 
 
 class _Stage:
-    """Everything that is drawn, and how it moves."""
+    """The scene of a replay and its animation."""
 
     def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel, target: Target):
         self._scene = scene
         self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
-        # Of a figure that is only shown there is one, where the animation has it; and there may be none.
+        # A kinematic figure is drawn once, without a ghost; there may be no figure at all.
         kind = recording.texts.get("figure", "physical")
         self._simulated = kind == "physical"
         names = ("t", "qpos") if kind == "none" else ("t", "qpos", "reference")

@@ -1,4 +1,4 @@
-"""Triangles and turns for what a viewer draws: the bodies of a MuJoCo model, the tube around a curve."""
+"""Triangle meshes for the viewer: bodies of a MuJoCo model, and the tube around a curve."""
 
 from typing import NamedTuple
 
@@ -10,9 +10,9 @@ from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
 from controllers.state import Array
 
-_LEAST_STEP = 1e-12  # [m] from one point to the next, that has a direction
-_LEAST_NORMAL = 1e-6  # of what is left of a unit normal
-_FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for looking at
+_LEAST_STEP = 1e-12  # [m] shortest step between two points that has a direction
+_LEAST_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
+_FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 
 
 class Shape(NamedTuple):
@@ -42,8 +42,9 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
     Parameters
     ----------
     model : mujoco.MjModel
+        The model.
     prefix : str
-        Such as ``figure/``.
+        Prefix of the bodies, such as ``figure/``.
     """
     parts: dict[tuple[int, tuple[float, ...]], list[trimesh.Trimesh]] = {}
     for geom in range(model.ngeom):
@@ -70,14 +71,14 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
 
 
 def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
-    """Shapes with fewer triangles: vertices within a cube are one, at their mean (Rossignac & Borrel 1993).
+    """Simplify shapes by vertex clustering: vertices in a cubic cell merge at their mean (Rossignac & Borrel 1993).
 
     Parameters
     ----------
     shapes : list of Shape
-        Which stay as they are.
+        The originals, left unchanged.
     cell : float
-        Width [m].
+        Width of a cell [m].
     """
     made: list[Shape] = []
     for shape in shapes:
@@ -92,21 +93,25 @@ def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
 
 
 def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Surface of the tube around a polyline, without caps; closed where the last point is the first.
+    """Surface of the tube around a polyline, without caps; closed if the last point equals the first.
 
-    The rings are carried along by parallel transport, so that the surface does not twist more than the line does.
+    The rings are oriented by parallel transport, so that the surface does not twist more than the line does.
 
     Parameters
     ----------
     points : array (n, 3)
+        Points of the polyline.
     radius : float
+        Radius of the tube, in the unit of the points.
     sides : int
         Corners of a ring.
 
     Returns
     -------
     vertices : array (n sides, 3)
+        Vertices, ring by ring.
     faces : array (2 (n − 1) sides, 3)
+        Indices of vertices.
     """
     closed = bool(np.allclose(points[0], points[-1]))
     tangents = np.gradient(points, axis=0)
@@ -119,7 +124,7 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDAr
     for ring, point, tangent in zip(rings, points, tangents, strict=True):
         normal = normal - (normal @ tangent) * tangent
         if np.linalg.norm(normal) < _LEAST_NORMAL:
-            # There is none yet, or a corner has turned the path to where it was.
+            # At the first ring, or where the path turns into the direction of the normal, choose a new normal.
             normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
         normal /= np.linalg.norm(normal)
         ring[:] = point + radius * (
@@ -133,7 +138,7 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDAr
 
 
 def _directions(tangents: Array) -> Array:
-    """Unit tangents (n, 3); where a path rests or turns back on itself, the last one before, or else the first."""
+    """Unit tangents (n, 3); where a path rests or reverses, the previous tangent, or at the start the first one."""
     lengths = np.linalg.norm(tangents, axis=1)
     moves = np.flatnonzero(lengths > _LEAST_STEP)
     if len(moves) == 0:

@@ -1,4 +1,4 @@
-"""A moment of a run, as it is shown."""
+"""The data of a moment of a run that is displayed."""
 
 from typing import NamedTuple
 
@@ -6,20 +6,20 @@ from controllers.state import Array
 
 
 class Shown(NamedTuple):
-    """What is drawn of a run at one time.
+    """The displayed state of a run at one time.
 
     Attributes
     ----------
     t : float
-        [s]
+        Time [s].
     qpos : Array
         Configuration of the world, with the figure.
     ghost : Array
-        Pose of the ghost, shape (75,), or nothing.
+        Pose of the ghost, shape (75,); empty if there is none.
     p, force, user : Array
-        Stylus tip [m], force of the device and of the hand on it [N], in H, shape (3,).
+        Stylus tip [m], force of the device and force of the hand [N], in H, shape (3,) each.
     target : Array
-        Where the hand means to be, in H [m], shape (3,); NaN where it has let go.
+        Intended position of the hand in H [m], shape (3,); NaN if the hand has let go.
     """
 
     t: float

@@ -1,4 +1,4 @@
-"""Takes shown over each other: a translucent figure for each, and the way that the stylus went."""
+"""Overlay of recorded takes: a translucent figure and the stylus's path for each."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,7 +13,7 @@ from sim.viewer.palette import RIVERS, rgb
 from sim.viewer.shapes import body_shapes, coarser, tube
 
 COLORS = RIVERS[1:]
-_LEAST = 1e-4  # [m] from point to point of a path that is drawn
+_LEAST = 1e-4  # [m] least distance between drawn points of a path
 
 
 class TakeGhosts:
@@ -22,11 +22,11 @@ class TakeGhosts:
     Parameters
     ----------
     scene : viser.SceneApi
-        In which they are drawn.
+        Scene in which they are drawn.
     model : mujoco.MjModel
         The world with the figure.
     paths : Mapping
-        Of the stylus by the takes' names, in H [m], shapes (n, 3).
+        Paths of the stylus by name of the take, in H [m], shapes (n, 3).
     """
 
     def __init__(self, scene: viser.SceneApi, model: mujoco.MjModel, paths: Mapping[str, Array]):
@@ -43,13 +43,13 @@ class TakeGhosts:
                 self._paths.append(scene.add_mesh_simple(f"/take/path/{k}", vertices, faces, color=rgb(color)))
 
     def show(self, poses: Sequence[Array]) -> None:
-        """Show a pose (75,) of each take, each where it began."""
+        """Show a pose (75,) of each take; the takes are drawn at one place, that of the ghost."""
         for ghost, pose in zip(self._ghosts, poses, strict=False):
             self._data.qpos[self._root : self._root + len(pose)] = pose
             mujoco.mj_kinematics(self._model, self._data)
             ghost.pose(self._data, np.zeros(3), 1.0, GHOST_AT)
 
     def remove(self) -> None:
-        """Show them no more."""
+        """Remove figures and paths from the scene."""
         for drawn in (*self._ghosts, *self._paths):
             drawn.remove()

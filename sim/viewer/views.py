@@ -1,4 +1,4 @@
-"""From where a live page is looked at: so that what a view shows fills what the panel leaves free of the window."""
+"""Camera views of a live page, placed such that a view fills the part of the window that the panel leaves free."""
 
 from typing import NamedTuple
 
@@ -8,23 +8,23 @@ import viser
 from controllers.state import Array
 
 FIELD_OF_VIEW = np.deg2rad(34.0)
-PANEL = 335.0  # [px] that viser's panel takes of the width of a window
-PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel lies over the lower part
-SHEET = 0.6  # of the height that it takes there
-DEFAULT_SIZE = 1400.0, 850.0  # [px] of a window that has not told its own
+PANEL = 335.0  # [px] width of viser's panel
+PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel covers the lower part
+SHEET = 0.6  # share of the height that the panel covers on a phone
+DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not reported its own
 
 
 class View(NamedTuple):
-    """What is looked at, and from which side.
+    """The region that is viewed, and the direction to the camera.
 
     Attributes
     ----------
     centre : tuple of float
-        Of what is shown [m].
+        Centre of the region [m].
     half : tuple of float
         Half its width and half its height on the screen [m].
     side : tuple of float
-        On which side of it the camera is, of any length.
+        Direction from the centre to the camera, of any length.
     """
 
     centre: tuple[float, float, float]
@@ -33,7 +33,7 @@ class View(NamedTuple):
 
 
 class Camera(NamedTuple):
-    """Where a camera is, and the point in the middle of its picture [m], shapes (3,)."""
+    """Position of a camera, and the point in the middle of its picture [m], shapes (3,)."""
 
     position: Array
     look_at: Array
@@ -47,10 +47,10 @@ VIEWS = {
 
 
 def camera_of(view: View, width: float, height: float) -> Camera:
-    r"""Where a camera stands that shows a view in a window of so many pixels.
+    r"""The camera that shows a view in a window of a given size [px].
 
-    With m metres a pixel in the plane of the view's centre, its distance is m h/(2 tan(α/2)), and it is shifted by half
-    of what the panel covers, so that the centre is in the middle of the rest.
+    With m metres per pixel in the plane of the view's centre, window height h and field of view α, its distance is
+    m h/(2 tan(α/2)). It is shifted by half of what the panel covers, so that the view is centred in the rest.
     """
     phone = width < PHONE * height
     free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, 0.3 * width), height)
@@ -62,23 +62,23 @@ def camera_of(view: View, width: float, height: float) -> Camera:
 
 
 def screen_axes(forward: Array) -> tuple[Array, Array]:
-    """Directions to the right and up on the screen of a camera that looks along a unit vector, shapes (3,)."""
+    """Unit vectors to the right and up on the screen of a camera that looks along a unit vector, shapes (3,)."""
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     return right, np.cross(right, forward)
 
 
 def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, size: tuple[float, float]) -> None:
-    """Put a camera where a view is shown in a window of so many pixels."""
+    """Place a camera such that it shows a view in a window of a given size (width, height) [px]."""
     place = camera_of(view, *size)
     camera.position, camera.look_at, camera.fov = place.position, place.look_at, FIELD_OF_VIEW
 
 
 def look_from(client: viser.ClientHandle, view: View) -> None:
-    """Let a browser show a view.
+    """Show a view in a client's browser.
 
-    It tells how many pixels it draws, of which a fine screen has two or three for each of its window's: so a window is
-    taken for no wider than the default one.
+    The browser reports physical pixels, of which a high-resolution screen has two or three per CSS pixel, so the width
+    is limited to the default one.
     """
     width = min(float(client.camera.image_width), DEFAULT_SIZE[0])
     look(client.camera, view, (width, width / client.camera.aspect))

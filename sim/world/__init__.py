@@ -1,1 +1,1 @@
-"""The world as it is stepped: MuJoCo's model and state, the Phantom's wires, the hand on the stylus."""
+"""The simulated world: MuJoCo's model and state, the Phantom's encoders and motors, the user's hand on the stylus."""

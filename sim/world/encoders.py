@@ -1,6 +1,6 @@
-r"""The Phantom's own arithmetic: from joint angles to a hand, and from a force on the hand to motor torques.
+r"""The Phantom's kinematics in the loop: from joint angles to the hand vector, and from a force to motor torques.
 
-The simulated device and a real one differ in where the angles come from and where the torques go, not in this.
+The simulated device and a real one share this code; they differ only in the source of angles and the sink of torques.
 """
 
 import math
@@ -43,17 +43,19 @@ Angles = tuple[float, float, float]
 PEAK_TORQUE = PREMIUM_1_5.peak_torque
 FRICTION = PREMIUM_1_5.coulomb_friction
 ANGLES, RATES, SENSED, MEMORY_SIZE = 0, 6, 12, 13
-"""The velocity filter's memory: last angles (6, the gimbal's unused), filtered rates (6), 1 once it was read."""
+"""Places in the velocity filter's memory: last angles (6, those of the gimbal unused), filtered rates (6), 1 once a
+reading was taken."""
 SILENT_PERIODS = 5
-"""Periods without reading or command after which the motors are off. At 1 kHz a hand of 0.5 m/s comes 2.5 mm by then,
-which is 1.3 N in a spring of 500 N/m; a bus or a system that is late by less is not worth a loss of force."""
+"""Servo periods without a reading or a command after which the motors are switched off. At 1 kHz a hand at 0.5 m/s
+moves 2.5 mm in this time, which changes the force of a spring of 500 N/m by 1.3 N; shorter delays of a bus or of the
+operating system do not justify a loss of force."""
 
 
 def top_rates() -> Angles:
-    r"""Fastest that the joints can turn [rad/s]: from stop to stop under the peak torque, :math:`\sqrt{2 P \Delta/M}`.
+    r"""Upper bound of the joint rates [rad/s]: from stop to stop under the peak torque, :math:`\sqrt{2 P \Delta/M}`.
 
-    Without friction, and with the least inertia M_ii of the workspace, so no motor gets there; a hand that would take
-    the tip there (10 m/s and more) neither.
+    Friction is neglected and the least inertia M_ii of the workspace is used, so no motor reaches these rates; nor does
+    a hand, for which they would mean 10 m/s and more at the tip.
     """
     ranges = PREMIUM_1_5.limit
     of_arrays: Any = mass_matrix.py_func
@@ -70,7 +72,7 @@ TOP_RATES = top_rates()
 
 
 def plausibility(period: float, silent: float = SILENT_PERIODS) -> Plausibility:
-    """What a Phantom's readings may be at a servo period [s], silent for so many of them."""
+    """Plausibility limits of a Phantom's readings at a servo period [s]; `silent` is the watchdog time in periods."""
     return Plausibility(period, TOP_RATES, ENCODER_STEP, silent * period)
 
 
@@ -86,7 +88,7 @@ def take_reading(
     switch: float,
     verdict: int,
 ) -> None:
-    r"""Fill a hand vector with what joint angles tell at time t.
+    r"""Fill a hand vector from joint angles read at time t.
 
     Joint rates are backward differences of the encoder angles through a first-order low-pass,
     ω_k = s ω_{k−1} + (1 − s) (θ_k − θ_{k−1})/T; the tip's velocity is J(θ) θ̇, its angular velocity the change of the
@@ -103,7 +105,7 @@ def take_reading(
     t, switch : float
         Time [s], and 1 while the switch is pressed.
     verdict : int
-        `RESTARTED` (of `controllers.safety.faults`) to forget the speed.
+        Result of `controllers.safety.faults.judge_reading`; `RESTARTED` resets the velocity filter.
     """
     orientation = stylus_orientation(theta, gimbal)
     if verdict == RESTARTED:
@@ -140,7 +142,7 @@ def take_reading(
 
 @njit
 def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
-    """Filter the angular velocity in H: 2 vec(q q_last*) / T, for the small turn of one period."""
+    """Low-pass the angular velocity in H, 2 vec(q q̄_last) / T for the small rotation of one period."""
     last = HAND_QUATERNION
     w, x, y, z = hand[last], -hand[last + 1], -hand[last + 2], -hand[last + 3]
     scalar = q[0] * w - q[1] * x - q[2] * y - q[3] * z
@@ -157,16 +159,16 @@ def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, p
 
 @njit
 def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: Array) -> None:
-    """Joint torques for a force on the hand: τ = J(θ)ᵀ F + N(θ), within ± the peak torque; zero from a fault on.
+    """Joint torques for a force on the hand: τ = J(θ)ᵀ F + N(θ), limited to ± the peak torque; zero after a fault.
 
-    N balances the linkage's own weight, so a commanded force of zero leaves the stylus floating.
+    N compensates for the linkage's weight, so with a commanded force of zero the stylus floats.
 
     Parameters
     ----------
     faults : Array
-        Of the device; a force that is not finite is latched.
+        Fault memory of the device; a force that is not finite is latched.
     memory : Array
-        Of `take_reading`, for θ.
+        Memory of `take_reading`, which holds θ.
     t : float
         Time of the command [s].
     force : Array
@@ -183,7 +185,7 @@ def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: 
     load = 0.0
     for i in range(3):
         load = max(load, abs(wanted[i]) / FRICTION[i])
-        # With NaN, min(P, max(−P, τ)) would be −P: nothing is cut that may not be trusted.
+        # For NaN, min(P, max(−P, τ)) would be −P, so after a fault the torque is set to zero explicitly.
         trusted = faults[FAULT_CODE] == 0.0
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], wanted[i] + weight[i])) if trusted else 0.0
     note_command(faults, t, load)

@@ -1,4 +1,4 @@
-"""What a device is beside its geometry and the published masses: friction, rotors, delay, encoders."""
+"""Parameters of a device beyond geometry and published masses: friction, added inertia, delay, encoder offsets."""
 
 from dataclasses import dataclass
 
@@ -15,25 +15,25 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Linkage:
-    """What a device is beside its geometry and weights.
+    """Parameters of a device beyond its geometry and masses.
 
     Parameters
     ----------
     coulomb : three floats
-        Friction of the joints [N m].
+        Coulomb friction of the joints [N m].
     viscous : three floats
-        [N m s/rad]
+        Viscous friction of the joints [N m s/rad].
     inertia : three floats
-        Added to the published one at the joints, as a rotor's or a handle's [kg m²]; may be negative.
+        Inertia added to the published one at the joints, such as a rotor's or a handle's [kg m²]; may be negative.
     delay : float
-        From a command to the motors' torque [s], below a servo period.
+        Latency from a command to the motors' torque [s], below a servo period.
     offset : three floats
         Encoder reading minus angle [rad].
 
     Raises
     ------
     SimError
-        If a friction is negative, or takes the rotors more than their inertia.
+        If a friction or the delay is negative, or a negative added inertia exceeds that of the rotors.
     """
 
     coulomb: Triple = PREMIUM_1_5.coulomb_friction
@@ -49,7 +49,7 @@ class Linkage:
             raise SimError(f"an added inertia of {self.inertia} kg m² is more than the rotors have to give")
 
     def into(self, world: World) -> None:
-        """Give a world's Phantom these numbers; delay and offset are not the world's."""
+        """Set friction and inertia of a world's Phantom; delay and offset have no place in the world's model."""
         model = world.model
         for axis, name in enumerate(ARM_JOINTS):
             place = int(model.joint(PHANTOM + name).dofadr[0])

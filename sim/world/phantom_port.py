@@ -1,4 +1,4 @@
-"""The simulated Phantom's wires: what its encoders tell, and what its motors do."""
+"""Encoders and motors of the simulated Phantom: the link between the compiled loop and MuJoCo's state."""
 
 import math
 from typing import NamedTuple
@@ -36,19 +36,19 @@ class PhantomPort(NamedTuple):
     qpos, qvel, ctrl, applied : Array
         Views of the world's MjData: positions, velocities, motor commands, external generalised forces.
     arm_q, arm_v, gimbal_q, gimbal_v, motor : tuple of three ints
-        Where the device's joints and motors stand in them.
+        Indices of the device's joints and motors in these arrays.
     period : float
         Servo period [s].
     smoothing : float
         Share of the old velocity that the velocity filter keeps each period.
     memory : Array
-        Last angles (6) and filtered rates (6) of the joints and the gimbal, 1 when initialised: shape (13,).
+        Memory of the velocity filter, shape (13,); see `sim.world.encoders.ANGLES`.
     hand : Array
         The hand vector of `controllers.state`: t, p, quaternion, v, ω, switch; shape (15,).
     torque : Array
         Last commanded joint torques [N m], shape (3,).
     faults : Array
-        What was wrong with its readings and commands (`controllers.safety.faults`).
+        Latched faults of its readings and commands (`controllers.safety.faults`).
     """
 
     qpos: Array
@@ -69,7 +69,7 @@ class PhantomPort(NamedTuple):
 
 
 def velocity_smoothing(cutoff: float, period: float) -> float:
-    """Share of the old velocity that a first-order filter of a corner frequency [Hz] keeps each period [s].
+    """Share of the old velocity that a first-order low-pass of cutoff frequency [Hz] keeps each period [s].
 
     Raises
     ------
@@ -82,7 +82,7 @@ def velocity_smoothing(cutoff: float, period: float) -> float:
 
 
 def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cutoff: float) -> PhantomPort:
-    """Wire up the Phantom of a compiled world.
+    """Connect to the Phantom of a compiled world.
 
     Parameters
     ----------
@@ -120,11 +120,11 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
 
 @njit(forceinline=True)
 def sense(port: PhantomPort, t: float, switch: float) -> None:
-    """Fill `port.hand` with what the encoders tell at time t (see `take_reading`)."""
+    """Fill `port.hand` from the encoders at time t (see `take_reading`)."""
     q, a, g = port.qpos, port.arm_q, port.gimbal_q
     theta = encoder_reading((q[a[0]], q[a[1]], q[a[2]]))
     gimbal = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
-    # A simulated hand that holds on does not tremble; it presses the switch.
+    # A real hand trembles, so constant readings are a fault; a simulated hand with the switch pressed may hold still.
     verdict = judge_reading(port.faults, theta, gimbal, port.memory, t, t, NO_SEQUENCE, switch > 0.0)
     if verdict == HELD:
         port.hand[HAND_TIME] = t
@@ -133,9 +133,9 @@ def sense(port: PhantomPort, t: float, switch: float) -> None:
 
 
 def sense_in_motion(port: PhantomPort) -> None:
-    """Let a device whose joints move begin as if it had been sensed before: its velocity is known from the first tick.
+    """Initialise the velocity filter of a device whose joints move, as if it had been sensed one period before.
 
-    Else a field takes the hand for one that rests, and pushes it on.
+    Otherwise the first ticks would show a hand at rest, and a field would accelerate it.
     """
     theta, rate = port.qpos[list(port.arm_q)], port.qvel[list(port.arm_v)]
     orientation = stylus_orientation.py_func(
@@ -148,14 +148,14 @@ def sense_in_motion(port: PhantomPort) -> None:
 def sensed_before(
     port: PhantomPort, theta: npt.ArrayLike, rate: npt.ArrayLike, orientation: npt.ArrayLike = (1.0, 0.0, 0.0, 0.0)
 ) -> None:
-    """Let the velocity filter begin with angles and rates, shape (3,) each, and an orientation (wxyz)."""
+    """Set the velocity filter's last angles [rad] and rates [rad/s], shape (3,) each, and the last orientation."""
     port.memory[ANGLES : ANGLES + 3], port.memory[RATES : RATES + 3], port.memory[SENSED] = theta, rate, 1.0
     port.hand[HAND_QUATERNION : HAND_QUATERNION + 4] = orientation
 
 
 @njit
 def has_sensed(port: PhantomPort) -> bool:
-    """Whether `sense` has been called before."""
+    """Whether a reading has been taken before."""
     return port.memory[SENSED] != 0.0
 
 
@@ -184,16 +184,16 @@ def let_go(port: PhantomPort) -> None:
 
 @njit(forceinline=True)
 def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> None:
-    """Where the stylus really is and how it moves, in H: what the hand feels, unquantised.
+    """True position and velocity of the stylus in H, unquantised, as the hand feels them.
 
     Parameters
     ----------
     port : PhantomPort
         Read only.
     p, v : Array
-        Set: position [m] and velocity [m/s], shape (3,).
+        Written: position [m] and velocity [m/s], shape (3,).
     jacobian_H : Array
-        Set: ∂p_H/∂θ at the true angles, shape (3, 3).
+        Written: ∂p_H/∂θ at the true angles, shape (3, 3).
     """
     q, a, b = port.qpos, port.arm_q, port.arm_v
     theta = (q[a[0]], q[a[1]], q[a[2]])
@@ -211,16 +211,16 @@ def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> Non
 
 @njit(forceinline=True)
 def true_turn(port: PhantomPort, orientation: Array, spin: Array, axes: Array) -> None:
-    """How the stylus is really turned and turning, in H: what the fingers feel, unquantised.
+    """True orientation and angular velocity of the stylus in H, unquantised, as the fingers feel them.
 
     Parameters
     ----------
     port : PhantomPort
         Read only.
     orientation, spin : Array
-        Set: R_H as a unit quaternion wxyz, shape (4,), and ω [rad/s], shape (3,).
+        Written: R_H as a unit quaternion wxyz, shape (4,), and ω [rad/s], shape (3,).
     axes : Array
-        Set: unit vectors about which the three gimbal joints turn it, columns, shape (3, 3).
+        Written: unit vectors of the three gimbal joints' axes, columns, shape (3, 3).
     """
     q, v, a, g = port.qpos, port.qvel, port.arm_q, port.gimbal_q
     theta, gimbal = (q[a[0]], q[a[1]], q[a[2]]), (q[g[0]], q[g[1]], q[g[2]])

@@ -1,4 +1,4 @@
-"""The world as compiled code steps it: MuJoCo's memory and the hand on the stylus, one servo period at a time."""
+"""Stepping of the world from compiled code: the physics and the user's hand, one servo period at a time."""
 
 from typing import NamedTuple
 
@@ -28,11 +28,11 @@ class Plant(NamedTuple):
     qpos, ctrl, applied : Array
         Views of MuJoCo's own memory: state, motor commands, external generalised forces.
     ground : Array
-        View of the ground's whole push on the figure [N], shape (3,); zero for a body that does not stand on it.
+        View of the total ground reaction force on the figure [N], shape (3,); zero for a world without one.
     arm_v : tuple of three ints
         Degrees of freedom of θ1, θ2, θ3.
     substeps : int
-        Physics steps a servo period.
+        Physics steps per servo period.
     period : float
         Servo period T [s].
     """
@@ -49,10 +49,11 @@ class Plant(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """The simulated user, in H what the hand feels (true position, velocity, Jacobian) and its force.
+    """The simulated user's hand on the stylus; all vectors are in H.
 
-    And the same of a hand that turns the stylus: true orientation (wxyz), angular velocity, gimbal axes, its moment.
-    A person, if there is one, moves the stylus in the place of the arm.
+    `p`, `v`, `jacobian` and `force` are the stylus's true position, velocity and Jacobian, and the hand's force; `q`
+    (wxyz), `w`, `axes` and `moment` are its true orientation, angular velocity and gimbal axes, and the hand's moment.
+    A `person`, if there is one, sets the force in place of the `arm`.
     """
 
     arm: CompiledArm
@@ -68,7 +69,7 @@ class Hand(NamedTuple):
 
 
 def make_plant(world: World | RobotWorld) -> Plant:
-    """Wire up a world; it must outlive the plant, which holds its addresses."""
+    """Connect to a world; it must outlive the plant, which holds addresses of its memory."""
     model, data = world.model, world.data
     a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
     return Plant(
@@ -85,7 +86,7 @@ def make_hand(user: Arm | PersonState) -> Hand:
 
 
 def hand_torques(hand: Hand) -> int:
-    """How many joints the hand has torques about: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
+    """Number of joints on which the hand exerts torques: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
     return 6 if len(hand.arm.turns) > 0 else 3
 
 
@@ -93,7 +94,7 @@ def hand_torques(hand: Hand) -> int:
 def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
     """Step the physics from time t for one servo period.
 
-    Motors whose last command is too old are off, as a real device's are.
+    Motors are switched off if their last command is too old, as by a real device's watchdog.
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
     t : float
         [s]
     replay : bool
-        Take the hand's torques from `applied` instead of asking the hand.
+        Take the hand's torques from `applied` instead of computing them.
     applied : Array
         The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], and with six columns about the gimbal
         joints, τ = AᵀM; written or read, shape (substeps, `hand_torques`).
@@ -140,6 +141,6 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
 
 @njit
 def step(plant: Plant) -> None:
-    """Step the physics for one servo period, with no hand in it."""
+    """Step the physics for one servo period, without a simulated hand."""
     for _ in range(plant.substeps):
         mj_step(plant.model, plant.data)

@@ -18,12 +18,12 @@ class RobotWorld:
     Parameters
     ----------
     config : SceneConfig
-        The two rates; stature and mass play no part.
+        Servo period and physics step; stature and mass are unused.
 
     Raises
     ------
     ModelError
-        If the rates do not divide.
+        If the servo period is not a multiple of the physics step.
     """
 
     config: SceneConfig = field(default_factory=SceneConfig)
@@ -39,11 +39,11 @@ class RobotWorld:
 
     @property
     def ground(self) -> Array:
-        """Push of the ground on what walks: nothing does, shape (3,)."""
+        """Ground reaction force [N], shape (3,): zero, since nothing in this world walks."""
         return np.zeros(3)
 
     def reset(self, p_H: Array) -> None:
-        """Put the stylus at a point [m], shape (3,), at rest, and the arm straight up.
+        """Put the stylus at a point of H [m], shape (3,), at rest, and the arm straight up.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The Phantom of a world put where a hand is that is not simulated: it is seen there, and no force moves it."""
+"""A Phantom that is only shown: its linkage is set kinematically to the configuration of a real or recorded hand."""
 
 from typing import NamedTuple
 
@@ -18,14 +18,14 @@ _JOINTS = ("theta1", "theta2", "theta3", "elbow", "twin", "gimbal1", "gimbal2", 
 
 
 class ShownPhantom(NamedTuple):
-    """Where the joints of the linkage stand in a world.
+    """The linkage's joints in a world's state.
 
     Attributes
     ----------
     qpos, qvel : Array
         Views of the world's MjData.
     places, rates : IntArray
-        Of θ1, θ2, θ3, elbow, twin and the gimbal's three in them, shape (8,).
+        Indices in them of θ1, θ2, θ3, elbow, twin and the gimbal's three joints, shape (8,).
     """
 
     qpos: Array
@@ -35,7 +35,7 @@ class ShownPhantom(NamedTuple):
 
 
 def shown_phantom(model: mujoco.MjModel, data: mujoco.MjData) -> ShownPhantom:
-    """The linkage of a world, which must outlive it."""
+    """The linkage of a world; the world must outlive it."""
     joints = [model.joint(PHANTOM + name) for name in _JOINTS]
     places, rates = ([int(address[0]) for address in column] for column in zip(
         *((joint.qposadr, joint.dofadr) for joint in joints), strict=True
@@ -54,7 +54,7 @@ def show_angles(shown: ShownPhantom, theta: Angles, gimbal: Angles) -> None:
 
 @njit
 def show_hand(shown: ShownPhantom, p: Array, q: Array) -> None:
-    """Put the stylus at a position in H [m], shape (3,), and orientation wxyz; out of reach it stays where it is."""
+    """Put the stylus at a position in H [m], shape (3,), and orientation wxyz; if out of reach, it is not moved."""
     a, b, c, reachable = inverse_kinematics(vector_to_device_frame((p[0], p[1], p[2])))
     if reachable:
         show_angles(shown, (a, b, c), gimbal_angles((a, b, c), (q[0], q[1], q[2], q[3])))

@@ -1,4 +1,4 @@
-"""The world as it is stepped: the compiled model, its state, and how both are put where a run begins."""
+"""The world: the compiled MuJoCo model of Phantom and figure, its state, and setting its initial state."""
 
 from copy import copy
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from models.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world
 from sim.errors import SimError
 
 FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]
-"""How a world has the figure: stepped with the rest; as the pose h(p), evaluated and recorded; not at all."""
+"""The figure in a world: simulated physically; kinematic, its pose h(p) only evaluated and recorded; or none."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,20 @@ class World:
     Parameters
     ----------
     config : SceneConfig
-        Stature, mass and the two rates.
+        Stature, mass, servo period and physics step.
     kind : FigureKind
-        ``physical``: the figure is stepped with the Phantom. ``kinematic``: it is not in the physics, and is where the
-        animation has it. ``none``: there is no figure.
+        ``physical``: the figure is simulated together with the Phantom. ``kinematic``: it is not in the physics, and is
+        shown in the animation's pose. ``none``: there is no figure.
 
     Attributes
     ----------
     figure : MjModel
-        The figure alone, whose tangent space animations live in.
+        Model of the figure alone; poses and tangents of animations are its qpos and qvel.
 
     Raises
     ------
     ModelError
-        If the rates do not divide, or stature or mass are outside their intervals.
+        If the servo period is not a multiple of the physics step, or stature or mass are outside their intervals.
     SimError
         If there is no such kind.
     """
@@ -79,7 +79,7 @@ class World:
         p_H : Array
             Stylus tip in the hand frame [m], shape (3,).
         pose : Array
-            The figure's pose, shape (75,); unused where it is not in the physics.
+            The figure's pose, shape (75,); used only if it is in the physics.
         q_HS : Quat, optional
             Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
         v_H : Array, optional
@@ -102,20 +102,20 @@ class World:
 
     @property
     def pose_at(self) -> int:
-        """Where the figure's pose begins in a recorded configuration: in the physics or not, behind the device's."""
+        """Index of the figure's pose in a recorded configuration; if not in the physics, it is appended to qpos."""
         if self.kind != "physical":
             return int(self.model.nq)
         return int(self.model.joint(FIGURE + "root").qposadr[0])
 
     def full_model(self) -> mujoco.MjModel:
-        """The model that recorded configurations are of: with the figure if there is one, in the physics or not."""
+        """The model of recorded configurations: with the figure if there is one, whether in the physics or not."""
         return world_model(self.config) if self.kind == "kinematic" else self.model
 
     @property
     def ground(self) -> Array:
-        """View of the constraint force on the root's linear degrees of freedom: the ground's push [N], shape (3,).
+        """Ground reaction force [N], shape (3,): view of the constraint force on the root's linear degrees of freedom.
 
-        Zero where no figure is in the physics.
+        Zero if no figure is in the physics.
         """
         if self.kind != "physical":
             return np.zeros(3)
@@ -123,7 +123,7 @@ class World:
         return self.data.qfrc_constraint[root : root + 3]
 
     def warnings(self) -> dict[str, int]:
-        """MuJoCo's warnings since the last reset, by name; empty if there was none."""
+        """Counts of MuJoCo's warnings since the last reset, by name; empty if there were none."""
         names = [warning.name.removeprefix("mjWARN_").lower() for warning in mujoco.mjtWarning.__members__.values()]
         counts = (int(warning.number) for warning in self.data.warning)
         return {name: count for name, count in zip(names, counts, strict=False) if count}
@@ -134,8 +134,8 @@ def place_stylus(
 ) -> None:
     """Reset a world that holds the Phantom, with the stylus tip at a point of the hand frame [m], shape (3,).
 
-    The stylus is turned to an orientation (wxyz); by default its gimbal joints are at zero. It rests, or moves with a
-    velocity in the hand frame [m/s], shape (3,).
+    `q_HS` is the stylus's orientation (wxyz); by default its gimbal joints are at zero. `v_H` is the tip's velocity in
+    the hand frame [m/s], shape (3,); by default it is at rest.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def place_stylus(
 
 @lru_cache(maxsize=8)
 def _models(config: SceneConfig, kind: FigureKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
-    """World and figure as they are compiled, of which every world takes a copy."""
+    """The compiled models of world and figure, cached; every world takes a copy of them."""
     model = world_model(config) if kind == "physical" else device_world_model(config)
     return model, figure_model(config.stature, config.mass)
 

@@ -1,4 +1,4 @@
-"""Hold and bend a tube."""
+"""The intent to hold and bend a stretchy tube."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from sim.users.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
 
 @dataclass(frozen=True)
 class Bend:
-    """Take hold of the curve at places with the switch, carry it, let go; in between let the stylus be led.
+    """Take hold of the curve with the switch at given places, carry it, release it; in between be led by the field.
 
     Parameters
     ----------
     grabs : sequence of Grab
-        Each with a place.
+        Each must have a place.
 
     Raises
     ------
     SimError
-        If they overlap, or one has no place: a person knows where she wants to take hold.
+        If grabs overlap, or one has no place, since a person decides where she takes hold.
     """
 
     grabs: Sequence[Grab]

@@ -1,4 +1,4 @@
-"""Change over to another motion."""
+"""The intent to change over to another motion."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from sim.users.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class ChangeOver:
-    """Trace the curve, and from some time on another one.
+    """Trace the curve, and from a given time on another one.
 
     Parameters
     ----------
     to : Trajectory, optional
-        The other curve; by default the same further out, where a cylindrical map blends other clips.
+        The other curve; by default the same curve enlarged, where a cylindrical map blends other clips.
     at, seconds : float
-        When the change begins, by default after half of the run, and how long it takes [s].
+        Start of the change, by default after half of the run, and its duration [s].
     """
 
     to: Trajectory | None = None
@@ -38,4 +38,4 @@ class ChangeOver:
         return Wishes(following((1.0 - share) * before + share * after), PERIOD)
 
 
-_FURTHER = 1.35  # times as far out
+_FURTHER = 1.35  # factor by which the default curve is enlarged about its centre

@@ -1,4 +1,4 @@
-"""Cut a corner."""
+"""The intent to cut a corner of the curve."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from sim.users.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class CutCorner:
-    """Trace the curve, but for a part of it that is cut straight.
+    """Trace the curve, with a straight line in place of one part of it.
 
     Parameters
     ----------
     start, end : float
-        Phases of a lap between which it is, 0 to 1.
+        Phases of the lap between which the line is, 0 to 1.
     """
 
     start: float = 0.3

@@ -1,4 +1,4 @@
-"""Exaggerate here, calm there."""
+"""The intent to exaggerate one part of a motion and to calm another."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,14 @@ from sim.users.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class Exaggerate:
-    """Trace the curve, further out where the motion is to be larger and further in where it is to be calmer.
+    """Trace the curve, further from its centre where the motion is to be larger, closer where it is to be calmer.
 
     Parameters
     ----------
     larger, calmer : float
-        By what the way from the curve's middle is multiplied.
+        Factors on the distance from the curve's centre.
     where, there : tuple of (float, float)
-        Phases of a lap from and until which, 0 to 1.
+        First and last phase of the lap for `larger` and for `calmer`, 0 to 1.
     """
 
     larger: float = 1.3

@@ -1,4 +1,4 @@
-"""Get lost and come back."""
+"""The intent of a person who loses the curve and comes back to it."""
 
 from dataclasses import dataclass
 
@@ -16,9 +16,9 @@ class GetLost:
     Parameters
     ----------
     at, seconds : float
-        When, and for how long [s].
+        Start and duration of the wandering [s].
     away : float
-        How far she wanders [m], as a standard deviation along each axis.
+        Size of the wandering [m], as a standard deviation along each axis.
     """
 
     at: float = 3.0
@@ -37,10 +37,10 @@ class GetLost:
         turns = rng.uniform(0.0, 2.0 * np.pi, (3, len(_WAVES)))
         wander = np.sqrt(2.0 / len(_WAVES)) * np.stack([np.cos(waves + turn).sum(axis=1) for turn in turns], axis=1)
         rows = following(curve.point(curve.start + t) + self.away * size[:, None] * wander)
-        # Between looking about and coming back she lets go for a moment.
+        # In the middle she is passive for a moment.
         rows[(lost > 0.45) & (lost < 0.55), ENGAGED] = 0.0
         return Wishes(rows, PERIOD)
 
 
-_WAVES = np.array([0.23, 0.41, 0.67])  # [Hz], of no common period
-_LOT = 20  # of the numbers drawn from a run's seed
+_WAVES = np.array([0.23, 0.41, 0.67])  # [Hz], without a short common period
+_LOT = 20  # number of this random stream of a run's seed

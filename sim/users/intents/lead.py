@@ -1,4 +1,4 @@
-"""Lead along a path."""
+"""The intent to lead the figure along a path."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from sim.users.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class Lead:
-    """Lead along a path, and stay at its end.
+    """Move along a path, and stay at its end.
 
     Parameters
     ----------
     points : Array
-        Places in H [m], shape (n, 3).
+        Points of the path in H [m], shape (n, 3).
     period : float
-        Time between two of them [s].
+        Time between two points [s].
     """
 
     points: Array

@@ -1,4 +1,4 @@
-"""An intent of the caller's own: a function that says what a person wants, from what she knows."""
+"""A user-defined intent: a function that computes a person's wish from what she perceives."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ class Wish(NamedTuple):
     Attributes
     ----------
     place : sequence of float, optional
-        Where the stylus should be, in H [m]; None: she lets it go where it goes.
+        Wanted position of the stylus in H [m]; None: she is passive.
     velocity : sequence of float
-        At which that place moves [m/s]: she plans ahead by it.
+        Velocity of that position [m/s], by which she plans ahead.
     force : sequence of float
-        That she exerts besides, in H [N].
+        Additional force that she exerts, in H [N].
     grip : float
-        [N]; NaN for her own.
+        Grip force [N]; NaN for the person's own.
     switch : bool
-        Whether she presses it.
+        Whether she presses the switch.
     """
 
     place: npt.ArrayLike | None
@@ -43,23 +43,23 @@ class Wish(NamedTuple):
 
 @dataclass(frozen=True)
 class Own:
-    """What a function says: in Python, asked now and then, or compiled, asked at every servo tick.
+    """An intent given by a function: in Python, called periodically, or compiled, called at every servo tick.
 
     Parameters
     ----------
     function : callable
-        In Python ``function(t, place, force)`` gives a `Wish`, or a place [m]. Compiled, ``function(t, place, force,
-        rows)`` writes the wishes' two rows (see `sim.users.own_intent`). Either is told the time [s], where she
-        believes her hand is [m] and the force of her hand that she feels [N], in H, shape (3,).
+        In Python ``function(t, place, force)`` returns a `Wish`, or a position [m]. Compiled, ``function(t, place,
+        force, rows)`` writes the wishes' two rows (see `sim.users.own_intent`). Its arguments are the time [s], her
+        estimate of her hand's position [m] and the force of her hand as she feels it [N], in H, shape (3,).
     every : float
-        Time between two questions in Python [s].
+        Time between two calls in Python [s].
     compiled : bool
         Whether the function is compiled by numba.
 
     Raises
     ------
     SimError
-        If the time is not positive, or the function cannot be compiled.
+        If `every` is not positive and finite.
     """
 
     function: Callable[..., Any]
@@ -75,7 +75,7 @@ class Own:
         return Wishes(resting(2), OWN)
 
     def address(self) -> int:
-        """Where its code is, compiled for this process; 0 of one in Python.
+        """Address of the function compiled for this process; 0 if it is in Python.
 
         Raises
         ------
@@ -92,12 +92,12 @@ class Own:
             raise SimError(f"the intent {self.function.__name__} cannot be compiled: {first}") from None
 
     def ask(self, person: PersonState, t: float) -> None:
-        """Ask the function in Python what a person wants at a time [s].
+        """Call the function in Python at time t [s] and set the person's wishes from its result.
 
         Raises
         ------
         SimError
-            If it gives something else.
+            If the result is neither a `Wish` nor a position.
         """
         said = self.function(t, person.vectors[BELIEF].copy(), person.vectors[FELT_FORCE].copy())
         try:

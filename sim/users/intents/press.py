@@ -1,4 +1,4 @@
-"""Push at times."""
+"""The intent to push the stylus at given times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from sim.users.wishes import FORCE, Wishes, resting
 
 @dataclass(frozen=True)
 class Press:
-    """Let the stylus be led, and push it at given times with a force of her own.
+    """Be led by the field, and push the stylus at given times with an additional force.
 
     Parameters
     ----------
     pushes : sequence of Push
-        Without a place; those without a direction are away from the curve's middle.
+        Pushes without a place; those without a direction are directed away from the curve's centre.
 
     Raises
     ------
     SimError
-        If one has a place: a person does not wait for her hand to be somewhere, she moves it.
+        If a push has a place.
     """
 
     pushes: Sequence[Push]

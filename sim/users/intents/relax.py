@@ -1,4 +1,4 @@
-"""Relax: let the stylus go where it goes."""
+"""The intent to be passive: the stylus is led by the field."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from sim.users.wishes import Wishes, resting
 
 @dataclass(frozen=True)
 class Relax:
-    """Hold the stylus and let it be led: the arm is slack and takes any place for its own."""
+    """Hold the stylus and be led: the arm is slack, and its rest position follows the hand."""
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""

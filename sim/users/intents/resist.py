@@ -1,4 +1,4 @@
-"""Resist."""
+"""The intent to resist the field for some time."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from sim.users.wishes import GRIP, PLACE, Wishes, following
 
 @dataclass(frozen=True)
 class Resist:
-    """Trace the curve, then stay where that has brought her, with a firm grip, whatever the field does; and go on.
+    """Trace the curve, but stay at one place of it for some time, with a firm grip, against the field; then go on.
 
     Parameters
     ----------
     at, seconds : float
-        When, and for how long [s].
+        Start and duration of the stay [s].
     grip : float
-        [N]
+        Grip force during the stay [N].
     """
 
     at: float = 3.0

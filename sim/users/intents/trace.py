@@ -1,4 +1,4 @@
-"""Trace a curve."""
+"""The intent to trace the curve."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from sim.users.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class Trace:
-    """Trace the curve by herself, again and again.
+    """Trace the curve actively, lap after lap.
 
     Parameters
     ----------
     tempo : float
-        Her pace over the curve's own.
+        Factor on the curve's own speed.
     """
 
     tempo: float = 1.0
