@@ -1,16 +1,14 @@
 """Reading certificates from files, and checking them against their inputs, without CasADi."""
 
-import hashlib
 import json
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 
 from controllers.certificates.flight.tolerance import Judging
 from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
 from experiments.files.json_text import json_text
 from models.mocap.clip import Clip
-from sim.compilation.compiled import source_hash
+from sim.compilation.sources import sources_hash
 
 
 def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
@@ -18,15 +16,9 @@ def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
     return {"clip": (clip.fps, clip.poses), "judging": judging, "code": code_inputs()}
 
 
-def code_inputs() -> list[object]:
-    """Hashes of the code that verdicts depend on, and versions of the libraries."""
-    experiments = Path(__file__).parents[1]
-    makers = sorted(path for room in ("certify", "flights", "setups") for path in (experiments / room).glob("*.py"))
-    return [
-        source_hash(),
-        [hashlib.sha256(file.read_bytes()).hexdigest() for file in makers],
-        [version(library) for library in ("casadi", "numpy", "scipy")],
-    ]
+def code_inputs() -> str:
+    """Hash of the code that verdicts depend on, of the libraries and the processor."""
+    return sources_hash("experiments.certify.certify")
 
 
 def read_certificate(file: Path) -> Certificate:

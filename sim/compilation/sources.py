@@ -1,4 +1,7 @@
-"""Which sources a module is made of: its own, and those of the project that it imports, and so on."""
+"""The code that a module reaches by imports, within this project, and hashes of it.
+
+Comments and docstrings do not count, so a change of wording invalidates no cached result.
+"""
 
 import ast
 import hashlib
@@ -21,13 +24,13 @@ _LIBRARIES = ("casadi", "mujoco", "numba", "numpy", "scipy")
 
 
 def kept_folder(module: str) -> Path:
-    """Folder for what a module of the project finds and what is found anew only after a change of its code."""
+    """Cache folder for results computed by a module of the project; it changes with the code that they depend on."""
     return cache_folder() / sources_hash(module)[:16]
 
 
 @cache
 def sources_hash(module: str) -> str:
-    """Hash of the code that a module reaches by imports, of the libraries and the machine; comments do not count.
+    """Hash of the code that a module reaches by imports, of the libraries and the processor.
 
     Parameters
     ----------
@@ -39,7 +42,17 @@ def sources_hash(module: str) -> str:
     str
         Hexadecimal digits.
     """
-    known = _Known(cache_folder() / "sources.json")
+    found = reached_code(module)
+    libraries = [f"{library} {version(library)}" for library in _LIBRARIES]
+    # Rounding in libraries depends on the processor's instructions.
+    processor = [llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()]
+    text = "\n".join([*(f"{name} {found[name]}" for name in sorted(found)), *libraries, *processor])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def reached_code(module: str) -> dict[str, str]:
+    """Hash of the code of a module, and of each that it reaches by imports within the project, by name."""
+    known = _Known(cache_folder() / "code.json")
     found: dict[str, str] = {}
     waiting = [module]
     while waiting:
@@ -49,20 +62,16 @@ def sources_hash(module: str) -> str:
         found[name], imported = known.read(path)
         waiting += imported
     known.keep()
-    libraries = [f"{library} {version(library)}" for library in _LIBRARIES]
-    # Libraries round by the processor's own instructions.
-    processor = [llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()]
-    text = "\n".join([*(f"{name} {found[name]}" for name in sorted(found)), *libraries, *processor])
-    return hashlib.sha256(text.encode()).hexdigest()
+    return found
 
 
 class _Known:
-    """Hashes and imports of files, kept by their times and sizes: to parse a hundred takes longer than to import them.
+    """A cache of hashes and imports of files, by modification time and size, since parsing all of them is slow.
 
     Parameters
     ----------
     file : Path
-        Where they are kept; it may be missing.
+        File of the cache; it may be missing.
     """
 
     def __init__(self, file: Path):
@@ -77,12 +86,12 @@ class _Known:
         kept = self._entries.get(str(path))
         if kept is None or kept[0] != stamp:
             tree = ast.parse(path.read_bytes())
-            kept = stamp, hashlib.sha256(ast.dump(tree).encode()).hexdigest(), list(_imported(tree))
+            kept = stamp, _hash(tree), list(_imported(tree))
             self._entries[str(path)], self._new = kept, True
         return kept[1], kept[2]
 
     def keep(self) -> None:
-        """Write what is new; a folder that cannot be written to is done without."""
+        """Write new entries to the file; a folder that cannot be written to is ignored."""
         if not self._new:
             return
         with suppress(OSError):
@@ -98,6 +107,17 @@ def _file(name: str) -> Path | None:
         return None
     path = _ROOT.joinpath(*name.split("."))
     return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
+
+
+def _hash(tree: ast.Module) -> str:
+    return hashlib.sha256(ast.dump(_WithoutWords().visit(tree)).encode()).hexdigest()
+
+
+class _WithoutWords(ast.NodeTransformer):
+    """Removes docstrings, and other strings that stand alone as statements."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        return None if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) else node
 
 
 def _imported(tree: ast.Module) -> Iterator[str]:

@@ -90,7 +90,7 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
         patch.setattr(certified_field, "PREMIUM_1_5", heavier)
         with pytest.raises(CertificateError, match="changed: device;"):
             verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
-    monkeypatch.setattr(certificate_files, "source_hash", lambda: "0")
+    monkeypatch.setattr(certificate_files, "sources_hash", lambda module: "0")
     with pytest.raises(CertificateError, match="changed: code;"):
         verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
 

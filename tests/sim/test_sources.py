@@ -41,15 +41,16 @@ def test_a_change_in_what_a_module_imports_however_far_is_another_hash(tree: Pat
     assert edited(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != own
 
 
-def test_a_comment_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
+def test_a_comment_a_docstring_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
     before = hashed()
     assert edited(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
+    assert edited(tree, "controllers/rotations.py", '\n"""Words that stand alone."""\n') == before
     assert edited(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
 
 
 def test_what_is_kept_of_files_gives_the_same_hash_and_nothing_kept_or_nonsense_does_no_harm(tree: Path) -> None:
     first = hashed()
-    (kept,) = (tree / "cache").rglob("sources.json")
+    (kept,) = (tree / "cache").rglob("code.json")
     assert hashed() == first
     for nonsense in ("[1, 2", "7.5", "[[1]]"):
         kept.write_text(nonsense, encoding="utf-8")
