@@ -25,6 +25,7 @@ from controllers.curves.deformation import (
 )
 from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
+from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow, FollowGains, follow_wrench
 from controllers.fields.instructions import TRACE_SIZE, leave_trace
@@ -60,11 +61,10 @@ def stretch_force(p: float, v: float, target: float, stiffness: float, damping: 
 
 @njit
 def eased_share(t: float, seconds: float) -> float:
-    """Weight σ = x³ (10 − 15 x + 6 x²), x = t/T, of FOLLOW at t [s] in a transition of T [s], which may be 0; C²."""
+    """Weight σ = S(t/T) (`smooth_step`) of FOLLOW at t [s] in a transition of T [s], which may be 0; C²."""
     if t >= seconds:
         return 1.0
-    x = max(t, 0.0) / seconds
-    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    return smooth_step(t / seconds)
 
 
 @njit

@@ -17,7 +17,8 @@ import numpy as np
 from scipy.ndimage import convolve1d, maximum_filter1d, uniform_filter1d
 from scipy.spatial.transform import Rotation
 
-from controllers.legs.footfalls import MeanEnd, mean_end, own_shares, smooth_step
+from controllers.easing import smooth_steps
+from controllers.legs.footfalls import MeanEnd, mean_end, own_shares
 from controllers.legs.limb_ends import grounds
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT
@@ -59,7 +60,7 @@ def cleared(
     width = max(1, round(_SPREAD * n))
     bump = np.hanning(2 * width + 3)
     ground = between @ grounds(channels, limbs)
-    mixed = smooth_step((1.0 - own_shares(channels, nodes).sum(axis=1)) / _ALONE)
+    mixed = smooth_steps((1.0 - own_shares(channels, nodes).sum(axis=1)) / _ALONE)
     for j, limb in enumerate(limbs):
         foot = slice(ROOT + FOOT * j, ROOT + FOOT * (j + 1))
         end = mean_end(channels, drifts, limbs, j, between)
@@ -94,11 +95,11 @@ def _lacking(end: MeanEnd, levers: Array, d: Array, ground: Array) -> Array:
     place = (end.place[..., :2] + d[..., :2])[..., None, :] + turned(d[..., 3:], levers[..., :2])
     place = turned(end.angle[..., None], np.concatenate([place, place[:1]])) + end.shift[..., None, :]
     way = np.linalg.norm(np.diff(place, axis=0), axis=-1)
-    touches = smooth_step(low / (_CLEAR - _TOUCHES))
+    touches = smooth_steps(low / (_CLEAR - _TOUCHES))
     moment = max(1, round(_MOMENT * n))
     on_ground = way * np.minimum(touches, np.roll(touches, -1, axis=0))
     dragged = moment * uniform_filter1d(on_ground, moment, axis=0, mode="wrap")
     # The larger of the two steps beside a sample.
     speed = n * np.maximum(way, np.roll(way, 1, axis=0))
-    lacks = smooth_step((dragged - _LEAST) / (_MOST - _LEAST)) * smooth_step(speed / _FAST) * low
+    lacks = smooth_steps((dragged - _LEAST) / (_MOST - _LEAST)) * smooth_steps(speed / _FAST) * low
     return np.maximum(lacks, -_DEEP - height).max(axis=2)

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.easing import smooth_steps
 from controllers.legs.limb_ends import contact_moves, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.motion.inbetween import FOOT, ROOT
@@ -80,12 +81,6 @@ class MeanEnd(NamedTuple):
     turn: Array
     shift: Array
     angle: Array
-
-
-def smooth_step(x: Array) -> Array:
-    """C² step from 0 to 1 on [0, 1]."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def _raise(lift: Array) -> Array:
@@ -214,9 +209,9 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     up = flight + lift + raised
     highest = up.max(axis=0)
     least = np.minimum(STANDS, _SHARE_STANDS * highest)
-    free = smooth_step((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
+    free = smooth_steps((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
     # A foot that the clips do not lift follows the mean.
-    held = smooth_step(highest / _LIFTED)
+    held = smooth_steps(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)
     rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
     slips = (1.0 - free)[..., None] * feet.moves

@@ -23,7 +23,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.curves.splines import round_lap
-from controllers.legs.footfalls import gap, smooth_step
+from controllers.easing import smooth_steps
+from controllers.legs.footfalls import gap
 from controllers.legs.grounded import Mask, runs
 from controllers.legs.limb_ends import contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import END, Limb
@@ -53,7 +54,7 @@ def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
     for start, end in runs(mask):
         samples = np.arange(start, end)
         edge = np.minimum(samples - start + 0.5, end - samples - 0.5)
-        result[samples % n] = smooth_step(edge / min(rise * (end - start), longest))
+        result[samples % n] = smooth_steps(edge / min(rise * (end - start), longest))
     return np.ones(n) if mask.all() else result
 
 
@@ -122,7 +123,7 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
     tilt = np.arctan2(breadth[:, 2], np.cross(length, breadth)[:, 2])
     tilt -= np.pi * np.round(tilt / np.pi)
     # An end whose length is nearly vertical is not levelled.
-    lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
+    lies = smooth_steps((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
     slope = np.arctan2(length[:, 2], np.hypot(length[:, 0], length[:, 1]))
     across = np.cross(length, [0.0, 0.0, 1.0])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
@@ -141,7 +142,7 @@ def levels(heights: Array, stands: Mask) -> Array:
         here, there = (np.median(heights[np.arange(a, b) % n]) for a, b in ((start, end), (following, last)))
         swing = (following - end) % n
         level[np.arange(start, end) % n] = here
-        level[np.arange(end, end + swing) % n] = here + (there - here) * smooth_step((np.arange(swing) + 0.5) / swing)
+        level[np.arange(end, end + swing) % n] = here + (there - here) * smooth_steps((np.arange(swing) + 0.5) / swing)
     return level
 
 

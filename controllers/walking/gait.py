@@ -17,6 +17,7 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.checks import checked
+from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -68,8 +69,7 @@ def decide_flight(decision: Array, share: float, speed: float, take_off: float, 
         decision[_AIM] = 0.0 if speed >= (landing if flew else take_off) else 1.0
     x = abs(share - decision[_ENTRY])
     x = min(x / WITHIN, 1.0) if decision[_AIM] < decision[_BEFORE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
-    x = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
-    decision[_HELD] = decision[_BEFORE] + x * (decision[_AIM] - decision[_BEFORE])
+    decision[_HELD] = decision[_BEFORE] + smooth_step(x) * (decision[_AIM] - decision[_BEFORE])
     return decision[_HELD]
 
 

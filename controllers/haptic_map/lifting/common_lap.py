@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from controllers.easing import smooth_steps
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
 from controllers.state import Array
 
@@ -138,8 +139,7 @@ def _smoothed(lead: Array, gap: float) -> CubicSpline:
     smooth = np.append(smooth, smooth[0])
     if gap > 0.0:
         # Within the gap the lead is zero, and at its edges pace and acceleration are the clip's own.
-        x = np.clip(np.minimum(knots, 1.0 - gap - knots) / 0.1, 0.0, 1.0)
-        smooth = smooth * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        smooth = smooth * smooth_steps(np.minimum(knots, 1.0 - gap - knots) / 0.1)
     smooth = smooth - smooth[0]
     steepest = float(np.abs(np.diff(smooth)).max()) * _STEPS * (1.0 - gap)
     return CubicSpline(knots, smooth * min(1.0, _STEEPEST / max(steepest, 1e-12)), bc_type="periodic")

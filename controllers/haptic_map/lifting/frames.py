@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
+from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
 from controllers.state import Array
@@ -215,7 +216,7 @@ def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array
     rest_out, rest_back = (np.maximum(1.0 - gap * s / coast, 0.0) ** 3 * gap * s for s in (u, 1.0 - u))
     leaving = channels[-1] + rest_out[:, None] * out
     arriving = signs * channels[0] - rest_back[:, None] * back
-    ease = (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
+    ease = smooth_steps(u)[:, None]
     values = (1.0 - ease) * leaving + ease * arriving
     quaternions = values[:, 3 : 3 + 4 * rotations].reshape(len(u), rotations, 4)
     quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)

@@ -238,9 +238,10 @@ def _half_stride(clip: Clip) -> tuple[int, int, float] | None:
     return (int(inner[i]), int(inner[j]), float(apart[j, i])) if apart[j, i] < _MIRRORED else None
 
 
-def _smooth(x: float) -> float:
-    x = min(max(x, 0.0), 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+def _smooth(x: float | Array) -> Array:
+    """S(x) = x³ (10 − 15 x + 6 x²) on [0, 1], 0 before and 1 after; C²."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def _with_way_back(clip: Clip, gap: float) -> Looped:
@@ -252,7 +253,7 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
     start, end = clip.velocities()[-1] / clip.fps * n, clip.velocities()[0] / clip.fps * n
     x = np.linspace(0.0, 1.0, n + 1)[1:, None]
     # Quintic with the ends' values and velocities and no acceleration.
-    ease = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    ease = _smooth(x)
     leave = x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5
     arrive = -4.0 * x**3 + 7.0 * x**4 - 3.0 * x**5
     way = plus(np.repeat(last[None], n, axis=0), ease * difference + leave * start + arrive * end)
@@ -282,7 +283,7 @@ def _dying(pose: Array, velocity: Array, fps: float) -> Array:
     path = (x - x**3 + x**4 / 2.0) * times
     poses = plus(np.repeat(pose[None], n, axis=0), path[:, np.repeat((0, 1), (3, len(velocity) - 3))] * velocity)
     low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
-    poses[:, 2] -= x[:, 0] ** 3 * (10.0 - 15.0 * x[:, 0] + 6.0 * x[:, 0] ** 2) * low
+    poses[:, 2] -= _smooth(x[:, 0]) * low
     return poses
 
 
