@@ -15,6 +15,7 @@ from models.robot_arm.spec import arm_spec
 PHANTOM = "phantom/"
 FIGURE = "figure/"
 ROBOT = "robot/"
+FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation from device frame to world: the user faces +x, so right, up and towards the user are −y, z and −x."""

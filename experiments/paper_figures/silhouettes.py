@@ -10,11 +10,11 @@ from matplotlib.patches import Polygon
 
 from controllers.state import Array
 from models.humanoid.skeleton import figure_model
+from models.scene import FIRST_HIDDEN_GROUP
 
 Paint = Callable[[str, Array], str | tuple[float, ...]]
 
 _CORNERS = 28  # corners of an outline
-_FIRST_HIDDEN_GROUP = 3
 
 
 class Outline(NamedTuple):
@@ -59,7 +59,7 @@ class Silhouettes:
         origin = np.array([pose[0], pose[1], 0.0])
         found: list[Outline] = []
         for geom in range(model.ngeom):
-            if model.geom_group[geom] >= _FIRST_HIDDEN_GROUP:
+            if model.geom_group[geom] >= FIRST_HIDDEN_GROUP:
                 continue
             centre, turn = data.geom_xpos[geom] - origin, data.geom_xmat[geom].reshape(3, 3)
             size = model.geom_size[geom]

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
+from models.scene import FIRST_HIDDEN_GROUP
 
 _GEOM = mujoco.mjtGeom
-FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision and not drawn
 
 
 def seen_geoms(model: mujoco.MjModel, prefix: str) -> tuple[int, ...]:

@@ -113,7 +113,7 @@ def _slow_heading(q: Array, fps: float) -> Array:
     turns = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     window = int(TURN_SECONDS * fps) | 1
     padded = np.pad(turns, window // 2, mode="reflect", reflect_type="odd") if len(turns) > 1 else turns
-    slow = np.rad2deg(np.convolve(padded, np.full(window, 1.0 / window), mode="valid")) if len(turns) > 1 else turns
-    if len(slow) > 1 and np.max(np.abs(np.diff(slow))) * fps > FASTEST_TURN:
-        return np.full(len(slow), np.rad2deg(turns[0]))
-    return slow
+    slow = np.convolve(padded, np.full(window, 1.0 / window), mode="valid") if len(turns) > 1 else turns
+    if len(slow) > 1 and np.rad2deg(np.max(np.abs(np.diff(slow)))) * fps > FASTEST_TURN:
+        slow = np.full(len(slow), turns[0])
+    return np.rad2deg(slow)

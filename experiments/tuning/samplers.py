@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import optuna
 
+REFUSED_MOST = 30  # proposals per candidate to simulate; a space that needs more has hardly a certified point
 STARTUP = 10  # candidates drawn at random before a sampler begins to learn from results
 
 

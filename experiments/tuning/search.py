@@ -9,11 +9,10 @@ from optuna.trial import TrialState
 
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.tuning.panel import Panel, panel_runs
-from experiments.tuning.samplers import STARTUP, sampler_of
+from experiments.tuning.samplers import REFUSED_MOST, STARTUP, sampler_of
 from experiments.tuning.tune_config import TuneConfig
 
 _TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
-REFUSED_MOST = 30  # proposals per candidate to simulate; a space that needs more has hardly a certified point
 
 
 class Candidate(NamedTuple):

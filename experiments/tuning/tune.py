@@ -17,7 +17,6 @@ from experiments.simulation import Simulation, User
 from experiments.sweep import with_values
 
 Cost = Callable[[Run], float | Sequence[float]]
-REFUSED_MOST = 30  # proposals per candidate to simulate; a space that needs more has hardly a certified point
 
 
 @dataclass(frozen=True)
@@ -104,6 +103,8 @@ def tune(
         If the space has an unknown parameter, or none of its candidates may be tried.
     """
     import optuna  # an optional dependency, which takes half a second to import
+
+    from experiments.tuning.samplers import REFUSED_MOST
 
     search, users = search or Search(), tuple(panel) or (sim.user,)
     # A session in the middle of the space: reports unknown parameters and compiles the units before any run.

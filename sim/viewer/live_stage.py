@@ -15,7 +15,7 @@ from controllers.state import Array
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.palette import FIELD, USER, rgb
-from sim.viewer.shapes import body_shapes, coarser, tube
+from sim.viewer.shapes import TUBE_SHARE, body_shapes, coarser, tube
 from sim.viewer.shown import Shown
 
 MAGNIFICATION = 8.0
@@ -23,7 +23,6 @@ PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # [m] where the hand frame's origin is 
 GHOST_AT = np.array([-0.75, 0.45, 0.0])  # [m] offset of the ghost from the figure
 METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] drawn length below which a force is hidden
-TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force of a field slice
 FOLLOWS = 0.5  # [s] time constant with which the view follows a travelling figure
 TRAVELS = 1.5  # [m] distance from its start beyond which a figure is followed

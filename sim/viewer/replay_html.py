@@ -20,7 +20,7 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course, courses
 from sim.viewer.framing import followed, typical_peak
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
-from sim.viewer.shapes import body_shapes, tube
+from sim.viewer.shapes import TUBE_SHARE, body_shapes, tube
 
 FPS = 30.0
 SECONDS = 60.0  # [s] longest replay; of a longer run the beginning is shown
@@ -29,7 +29,6 @@ PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin i
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
 ARROW = 0.6  # [m] drawn length of a large force (`typical_peak`)
 TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the stylus's path appears
-TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 

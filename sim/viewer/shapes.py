@@ -9,10 +9,12 @@ import trimesh
 from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
 from controllers.state import Array
+from models.scene import FIRST_HIDDEN_GROUP
+
+TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 
 _LEAST_STEP = 1e-12  # [m] shortest step between two points that has a direction
 _LEAST_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
-_FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 
 
 class Shape(NamedTuple):
@@ -49,7 +51,7 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
     parts: dict[tuple[int, tuple[float, ...]], list[trimesh.Trimesh]] = {}
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])
-        if model.geom_group[geom] >= _FIRST_HIDDEN_GROUP or not model.body(body).name.startswith(prefix):
+        if model.geom_group[geom] >= FIRST_HIDDEN_GROUP or not model.body(body).name.startswith(prefix):
             continue
         is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
         mesh = mujoco_mesh_to_trimesh(model, geom) if is_mesh else create_primitive_mesh(model, geom)

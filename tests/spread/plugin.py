@@ -91,8 +91,8 @@ def _look_at_arrays() -> None:
         compare(actual, desired, rtol, atol, **options)
         line, wanted = sys._getframe(1).f_lineno, np.asarray(desired, float)
         allowed = atol + rtol * np.abs(wanted)
-        shares = np.divide(np.abs(np.asarray(actual, float) - wanted), allowed, where=allowed > 0.0)
-        worst = float(np.nanmax(np.where(allowed > 0.0, shares, 0.0), initial=0.0))
+        apart = np.abs(np.asarray(actual, float) - wanted)
+        worst = float(np.nanmax(apart / np.where(allowed > 0.0, allowed, np.inf), initial=0.0))
         assertion = f"assert_allclose, rtol {rtol:g}, atol {atol:g}"
         _write(test=_now["test"], line=line, assertion=assertion, which=0, value=worst, relation="<=", bound=1.0)
 
