@@ -4,10 +4,11 @@ The bare steps are those of the same run: its recorded controls are replayed thr
 then only `mj_step` takes time. So contacts and constraints are the same at every tick.
 """
 
-import statistics
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
+
+import numpy as np
 
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
@@ -17,7 +18,8 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import FrameLog, TickLog, run_block
 
 STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
-SECONDS, ROUNDS = 1.0, 3
+SECONDS, ROUNDS = 1.0, 5
+SLICE = 50  # ticks between a run and its replay, so that both meet the same machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
     "follow": lambda: run_config(physics_step=STEP),
@@ -35,7 +37,7 @@ MODES: Mapping[str, Callable[[], RunConfig]] = {
 
 
 class TickCost(NamedTuple):
-    """Processor time of a closed-loop tick and of a bare step [s], medians over rounds, and whether states agreed."""
+    """Processor time of a closed-loop tick and of a bare step [s], means over a run, and whether states agreed."""
 
     tick: float
     step: float
@@ -43,17 +45,27 @@ class TickCost(NamedTuple):
 
 
 def tick_cost(config: RunConfig) -> TickCost:
-    """Measure a run and the replay of its controls, in turn."""
-    ticks_of, steps_of, same = list[float](), list[float](), True
+    """Measure a run and the replay of its controls, in turns of `SLICE` ticks.
+
+    Every round repeats the same work, slice by slice, so what a slice takes is the least over the rounds: other
+    processes only add to it.
+    """
+    closed, bare, same, substeps = [], [], True, 1
     for _ in range(ROUNDS):
-        session, ticks, frames, n = prepared(lambda: wire(config))
-        closed = timed(session, n, False, ticks, frames)
-        other, _, unused, _ = prepared(lambda: wire(config))
-        bare = timed(other, n, True, ticks, unused)
+        session, other = wire(config), wire(config)
+        ticks, frames = make_logs(session.servo, SLICE)
+        _, unused = make_logs(other.servo, SLICE)
+        begins = range(0, round(SECONDS / session.servo.plant.period), SLICE)
+        times = [
+            (timed(session, k, SLICE, False, ticks, frames), timed(other, k, SLICE, True, ticks, unused))
+            for k in begins
+        ]
+        closed.append([time[0] for time in times])
+        bare.append([time[1] for time in times])
         same = same and bool((session.world.data.qpos == other.world.data.qpos).all())
-        ticks_of.append(closed / n)
-        steps_of.append(bare / n / session.servo.plant.substeps)
-    return TickCost(statistics.median(ticks_of), statistics.median(steps_of), same)
+        substeps = session.servo.plant.substeps
+    tick, replayed = (float(np.min(rounds, axis=0).mean()) / SLICE for rounds in (closed, bare))
+    return TickCost(tick, replayed / substeps, same)
 
 
 def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
@@ -63,8 +75,8 @@ def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, i
     return session, *make_logs(session.servo, n), n
 
 
-def timed(session: Session, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> float:
-    """Processor time of this thread for n ticks [s]."""
+def timed(session: Session, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> float:
+    """Processor time of this thread for n ticks from the tick `first` [s]."""
     begin = time.thread_time()
-    run_block(session.servo, 0, n, replay, ticks, frames)
+    run_block(session.servo, first, n, replay, ticks, frames)
     return time.thread_time() - begin
