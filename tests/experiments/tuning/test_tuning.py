@@ -7,6 +7,8 @@ import pytest
 pytest.importorskip("optuna")
 
 import hvf
+from controllers.certificates.loop import governed
+from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import load_config
@@ -184,6 +186,15 @@ def test_the_shipped_tunings_can_be_read(name: str) -> None:
 @pytest.mark.slow
 def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
     assert kept_stability(run_config(mode="lead")).verdict == "unknown"
+
+
+def test_a_verdict_without_a_number_is_a_verdict_without_a_margin(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(governed, "governed_stability", lambda *given: Verdict("unknown", "no boundary was found"))
+    found = kept_stability(run_config(figure="none"))
+    assert (found.verdict, found.margin, found.reason) == ("unknown", None, "no boundary was found")
 
 
 @pytest.mark.slow
