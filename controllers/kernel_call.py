@@ -12,8 +12,6 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from controllers.borrowed import without_owner
-
 
 def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, ...]], None]:
     """Call of kernels with given types of arguments, for compiled code: ``call(address, (argument, ...))``.
@@ -43,35 +41,6 @@ def _call_as_given(typingctx: Any, address: Any, given: Any) -> Any:
 
 call_as_given = cast(Callable[[int, tuple[Any, ...]], None], _call_as_given)
 """`kernel_call` of kernels compiled for exactly the types of the given arguments."""
-
-
-@intrinsic
-def _lend(typingctx: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        place = cgutils.alloca_once_value(builder, values[0])
-        return builder.bitcast(place, context.get_value_type(signature.return_type))
-
-    return types.CPointer(value)(value), generate
-
-
-lend = cast(Callable[[tuple[Any, ...]], Any], _lend)
-"""Pointer to a tuple in the compiled caller's stack frame, for kernels that it calls: they get one pointer instead of
-all the tuple's arrays, field by field. Valid as long as the caller runs."""
-
-
-@intrinsic
-def _lent(typingctx: Any, place: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        kind = context.get_value_type(signature.return_type).as_pointer()
-        tuple_ = builder.load(builder.bitcast(values[0], kind))
-        return without_owner(context, builder, signature.return_type, tuple_)
-
-    return place.dtype(place), generate
-
-
-lent = cast(Callable[[Any], Any], _lent)
-"""The tuple behind a pointer from `lend`, without reference counting (`controllers.borrowed`); nothing checks that it
-is still valid."""
 
 
 def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:

@@ -131,7 +131,7 @@ def _after(phase: float, moment: float, lap: float) -> float:
     return way - lap * np.floor(way / lap + _PAST)
 
 
-@njit(forceinline=False)
+@njit
 def takes_over(params: Array, memory: Array, river: float) -> bool:
     """Whether the active river of the field (−1: none) takes the hand over from another river, or a held clip goes on.
 
@@ -141,7 +141,7 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
     return 0.0 <= river < params[_RIVERS] and (other or memory[STILL] > 0.0)
 
 
-@njit(forceinline=False)
+@njit
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
     curve = _course(params, memory)
@@ -149,7 +149,7 @@ def phase_rate(params: Array, memory: Array, later: Array, period: float) -> flo
     return (way - lap * np.round(way / lap)) / period
 
 
-@njit(forceinline=False)
+@njit
 def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
     """Whether the hand has left the river of the playing clip: no river is active, and it is off the tube or too fast.
 
@@ -184,7 +184,7 @@ def change_clip(memory: Array, river: float, phase: float) -> None:
     memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
 
 
-@njit(forceinline=False)
+@njit
 def knows_change(params: Array, memory: Array, river: float) -> bool:
     """Whether a precomputed change leads from the playing clip to that of a river, or the river is already playing."""
     if memory[STILL] > 0.0:
@@ -192,7 +192,7 @@ def knows_change(params: Array, memory: Array, river: float) -> bool:
     return river == memory[RIVER] or known_between(changes_of(params), memory[RIVER], river)
 
 
-@njit(forceinline=False)
+@njit
 def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]:
     """Number and gate [s] of a change to a river whose gate was passed since the last call; number −1 if none was."""
     curve, before = _course(params, memory), memory[LOOKED]
@@ -201,7 +201,7 @@ def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]
     return gate_behind(changes_of(params), memory[RIVER], river, before - start, memory[SHOWN] - start, lap)
 
 
-@njit(forceinline=False)
+@njit
 def changing(memory: Array) -> bool:
     """Whether a precomputed change is in progress."""
     return bool(memory[CHANGE] >= 0.0)

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof
 from numba.extending import overload
 
 from controllers.fields.instructions import VECTOR
-from controllers.kernel_call import call_as_given, lend
+from controllers.kernel_call import call_as_given
+from controllers.lent import Lent, lend
 from controllers.state import Array, IntArray
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
@@ -29,7 +30,7 @@ _DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotStat
 
 def drive_unit(body: FigureState | RobotState) -> Unit:
     """The unit that sets a body's torques for the reference pose, velocity and acceleration of a control tick."""
-    return Unit.of(_DRIVES[type(body)], types.CPointer(types.Tuple((typeof(body), VECTOR, VECTOR, VECTOR))))
+    return Unit.of(_DRIVES[type(body)], Lent(typeof(body)), VECTOR, VECTOR, VECTOR)
 
 
 def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, ...]:
@@ -48,38 +49,29 @@ def follow_addresses(body: BodyState, reference: CompiledReference) -> IntArray:
     return addresses
 
 
-@njit(inline="always")
-def lend_followed(body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> tuple[Any, Any]:
-    """The arguments of `follow`'s two kernels, lent for as long as the caller runs.
+def follow(units: IntArray, body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> None:
+    """Update the reference, and set the torques of the body that tracks it. For compiled code only.
 
-    `argument` (7,) is the stylus pose at which the map is evaluated, `trace` the trace of the field.
-    """
-    asked = lend((reference, argument, trace))
-    return asked, lend((body, reference.pose, reference.velocity, reference.acceleration))
-
-
-def follow(units: IntArray, body: BodyState, followed: tuple[Any, Any]) -> None:
-    """Update the reference, and set the torques of the body that tracks it.
-
-    `units` are `follow_addresses`, `followed` is the result of `lend_followed`. For compiled code only.
+    `units` are `follow_addresses`, `argument` (7,) is the stylus pose at which the map is evaluated, `trace` the trace
+    of the field.
     """
     raise NotImplementedError("compiled code only")
 
 
-def _follow_in_physics(units: IntArray, body: Any, followed: Any) -> None:
+def _follow_in_physics(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0 or units[1] == 0:
         raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (followed[0],))
-    call_as_given(units[1], (followed[1],))
+    call_as_given(units[0], (lend(reference), argument, trace))
+    call_as_given(units[1], (lend(body), reference.pose, reference.velocity, reference.acceleration))
 
 
-def _show(units: IntArray, body: Any, followed: Any) -> None:
+def _show(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0:
         raise SimError("what updates the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (followed[0],))
+    call_as_given(units[0], (lend(reference), argument, trace))
 
 
-def _stay_away(units: IntArray, body: Any, followed: Any) -> None:
+def _stay_away(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     pass
 
 
@@ -88,7 +80,6 @@ _FOLLOWS: dict[type, Any] = {
 }  # fmt: skip
 
 
-# Inlined, since a call would pass every pointer, shape and stride of the body's and the reference's arrays.
-@overload(follow, strict=False, inline="always")
-def _follow(units: Any, body: Any, followed: Any) -> Any:
+@overload(follow, strict=False)
+def _follow(units: Any, body: Any, reference: Any, argument: Any, trace: Any) -> Any:
     return _FOLLOWS[body.instance_class]

@@ -43,7 +43,7 @@ def shorten(vector: Array, longest: float) -> bool:
     return length > longest
 
 
-@njit(forceinline=True)
+@njit
 def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """Write a* = a_r + 2ω (v_r − v) + ω² (q_r ⊖ q) to `s.acceleration`.
 

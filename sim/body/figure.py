@@ -24,7 +24,8 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from controllers.kernel_call import call_as_given, lend
+from controllers.kernel_call import call_as_given
+from controllers.lent import lend
 from models.humanoid.skeleton import (
     BODIES,
     CONTACT_RADIUS,
@@ -55,7 +56,7 @@ _MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")
 
 @entry_point
 def _update(drive: int, s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    call_as_given(drive, (lend((s, q_r, v_r, a_r)),))
+    call_as_given(drive, (lend(s), q_r, v_r, a_r))
 
 
 @dataclass(frozen=True)

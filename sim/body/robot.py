@@ -6,12 +6,11 @@ saturated at the motors' limits. c holds Coriolis, centrifugal and gravity torqu
 at −ω as long as no motor saturates (Craig, Introduction to Robotics, chapter 10).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from controllers.kernel_call import lent
 from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS
 from models.scene import ROBOT
@@ -64,18 +63,8 @@ class RobotState(NamedTuple):
 
 
 @njit
-def robot_torque(place: Any) -> None:
-    """Set the motors' torques.
-
-    `place` is the address (`controllers.kernel_call.lend`) of a tuple of: the `RobotState`, and the reference's joint
-    angles [rad], velocities [rad/s] and accelerations [rad/s²], shape (7,) each.
-    """
-    s, q_r, v_r, a_r = lent(place)
-    _act(s, q_r, v_r, a_r)
-
-
-@njit
-def _act(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
+def robot_torque(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    """Set the motors' torques for the reference's joint angles [rad], velocities and accelerations, shape (7,) each."""
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     n = s.qpos.shape[0]
     saturated = 0

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import typeof, types
 
-from controllers.kernel_call import call_as_given, lend
+from controllers.kernel_call import call_as_given
+from controllers.lent import lend
 from controllers.state import Array
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, N_JOINTS, figure_model, figure_spec, standing_com
@@ -166,7 +167,7 @@ def _simulate(
 ) -> None:  # fmt: skip
     for k in range(q.shape[0]):
         poses[k] = s.qpos
-        call_as_given(drive, (lend((s, q[k], v[k], a[k])),))
+        call_as_given(drive, (lend(s), q[k], v[k], a[k]))
         for c in range(s.points.shape[0]):
             contacts[k, c] = s.contact_pos[s.contact[c]]
             contacts[k, c, 2] -= s.radius

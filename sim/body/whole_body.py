@@ -1,11 +1,8 @@
 """Whole-body control of the physical figure, compiled; see `sim.body.figure` for the equations."""
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 
-from controllers.kernel_call import lent
 from controllers.work_array import work_array
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
@@ -32,22 +29,16 @@ _SET_BACK_SPEED = 20.0  # [m/s], [rad/s] largest speed of the target of a figure
 
 
 @njit
-def figure_torque(place: Any) -> None:
+def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """Set the motors' torques and the root's residual wrench for the reference of this control tick.
 
     Parameters
     ----------
-    place
-        Address (`controllers.kernel_call.lend`) of a tuple of: the `FigureState`, whose state and dynamics of the last
-        physics step are read, and whose `ctrl`, `applied` and `report` are written; reference pose (75), velocity (57)
-        and acceleration (57), in the conventions of qpos and qvel.
+    s : FigureState
+        Its state and dynamics of the last physics step are read, its `ctrl`, `applied` and `report` written.
+    q_r, v_r, a_r : Array
+        Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
     """
-    s, q_r, v_r, a_r = lent(place)
-    _act(s, q_r, v_r, a_r)
-
-
-@njit(forceinline=True)
-def _act(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
@@ -78,7 +69,7 @@ def _saturated(torques: Array, limits: Array) -> int:
     return count
 
 
-@njit(forceinline=True)
+@njit
 def _set_back(s: FigureState, q_r: Array) -> None:
     """Torques, and an unbounded wrench at the root, that carry a fallen figure back to the reference."""
     follow_back(s.twin_model, s.fall, q_r)
@@ -96,7 +87,7 @@ def _set_back(s: FigureState, q_r: Array) -> None:
         s.wrench[i] = inertial_force(s.mass, i, s.acceleration, s.bias[i] - s.passive[i])
 
 
-@njit(forceinline=True)
+@njit
 def _stand(s: FigureState, support: float) -> None:
     """Torques and residual wrench of a figure that is up (see `sim.body.figure`)."""
     for leg in range(2):
@@ -124,7 +115,7 @@ def _nearness(height: float, reach: float) -> float:
     return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
 
 
-@njit(forceinline=True)
+@njit
 def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     """Set the share of load of each contact point, and return the support.
 
@@ -164,7 +155,7 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     return support
 
 
-@njit(forceinline=True)
+@njit
 def _plan_contacts(s: FigureState, support: float) -> bool:
     """Plan contact forces and residual for the root's demand (M a* + c)_r, and their generalised forces.
 
@@ -203,7 +194,7 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
     return not _bound_residual(s, support)
 
 
-@njit(forceinline=True)
+@njit
 def _bound_residual(s: FigureState, support: float) -> bool:
     """Saturate the residual at its bounds, which scale with the support; returns whether it exceeded them."""
     force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
@@ -211,7 +202,7 @@ def _bound_residual(s: FigureState, support: float) -> bool:
     return force or moment
 
 
-@njit(forceinline=True)
+@njit
 def _add_contact(s: FigureState, c: int) -> None:
     """Add Jᵀ f of one contact point: the force on the root, and moments about each joint from the body to the root."""
     f = s.force[c]
@@ -226,7 +217,7 @@ def _add_contact(s: FigureState, c: int) -> None:
         body = s.parent[body]
 
 
-@njit(forceinline=True)
+@njit
 def _let_root_fall(s: FigureState, support: float) -> None:
     """Blend the root's planned acceleration with that of its free motion, M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
 
@@ -248,7 +239,7 @@ def _let_root_fall(s: FigureState, support: float) -> None:
         a[i] = support * s.wanted_root[i] + (1.0 - support) * falling[i]
 
 
-@njit(forceinline=True)
+@njit
 def _plan_torques(s: FigureState) -> bool:
     """Set the torques of the planned motion within the motors' limits; returns whether any motor saturates."""
     a, saturated = s.acceleration, False
@@ -263,7 +254,7 @@ def _plan_torques(s: FigureState) -> bool:
     return saturated
 
 
-@njit(forceinline=True)
+@njit
 def _give_way(s: FigureState) -> bool:
     """Reduce the accelerations of saturated joints to what their limits allow: M_ss Δa = −lost.
 
@@ -299,7 +290,7 @@ def _give_way(s: FigureState) -> bool:
     return True
 
 
-@njit(forceinline=True)
+@njit
 def _make_up_for_legs(s: FigureState, support: float) -> None:
     """Add to the residual what standing legs cannot give within their torque limits, by virtual work: Kᵀ lost."""
     for leg in range(2):

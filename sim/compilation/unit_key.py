@@ -11,6 +11,7 @@ A value of unknown kind is an error, since the code might depend on it.
 import dis
 import enum
 import hashlib
+import inspect
 import sys
 import types as python_types
 from collections.abc import Callable, Iterable, Iterator
@@ -27,6 +28,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.core.registry import cpu_target
 
+from controllers.lent import Lent
 from sim.compilation import deferred_codegen
 from sim.compilation.deferred_codegen import install
 from sim.errors import SimError
@@ -265,14 +267,18 @@ def _items(options: dict[str, Any]) -> list[object]:
 
 
 def _class(kind: type, name: str) -> tuple[object, ...]:
-    """Description of a class: of a library by name; of this project only NamedTuples and exceptions."""
+    """Description of a class: of a library by name; of this project NamedTuples, exceptions and numba types."""
     identity = (kind.__module__, kind.__qualname__)
     fields = getattr(kind, "_fields", None)
     if fields is not None:
         return "named tuple", *identity, fields, repr(getattr(kind, "_field_defaults", {}))
     if _is_library(kind) or issubclass(kind, BaseException):
         return "class", *identity
-    raise UnknownIngredient(f"{name} is the class {kind.__qualname__}; expected a NamedTuple or an exception")
+    if issubclass(kind, types.Type):  # its module registers how it is represented and lowered
+        return "numba type", *identity, hashlib.sha256(Path(inspect.getfile(kind)).read_bytes()).hexdigest()
+    raise UnknownIngredient(
+        f"{name} is the class {kind.__qualname__}; expected a NamedTuple, an exception or a numba type"
+    )
 
 
 def _is_library(value: object) -> bool:
@@ -322,6 +328,8 @@ def describe_type(kind: Any) -> object:
         return "tuple", [describe_type(item) for item in kind.types]
     if isinstance(kind, types.CPointer):
         return "pointer", describe_type(kind.dtype)
+    if isinstance(kind, Lent):
+        return "lent", describe_type(kind.kind)
     if isinstance(kind, _PLAIN_TYPES):
         return type(kind).__name__, str(kind)
     raise UnknownIngredient(f"the type {kind} is a {type(kind).__qualname__}; expected numbers, arrays and tuples")

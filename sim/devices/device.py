@@ -49,21 +49,17 @@ def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: 
     _ADVANCE[type(device)](device, plant, t, replay, applied)
 
 
-_INLINED: Any = {"forceinline": True}
-
-
-# Inlined: a call would pass every pointer, shape and stride of the device's arrays once more.
-@overload(sense, strict=False, jit_options=_INLINED)
+@overload(sense, strict=False)
 def _sense(device: Any, t: Any) -> Any:
     return _SENSE[device.instance_class].py_func
 
 
-@overload(actuate, strict=False, jit_options=_INLINED)
+@overload(actuate, strict=False)
 def _actuate(device: Any, force: Any) -> Any:
     return _ACTUATE[device.instance_class].py_func
 
 
-@overload(advance, strict=False, jit_options=_INLINED)
+@overload(advance, strict=False)
 def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
     return _ADVANCE[device.instance_class].py_func
 

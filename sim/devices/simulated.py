@@ -60,20 +60,20 @@ def simulated_phantom(port: PhantomPort, user: Arm | PersonState) -> SimulatedPh
     return SimulatedPhantom(port, hand, port.hand, port.torque, port.faults, hand.force)
 
 
-@njit(forceinline=True)
+@njit
 def sense_simulated(device: SimulatedPhantom, t: float) -> None:
     """Read encoders and switch at time t, unless Python has done so for this tick."""
     if device.hand[HAND_TIME] != t or not has_sensed(device.port):
         sense(device.port, t, device.user.arm.switch[0])
 
 
-@njit(forceinline=True)
+@njit
 def actuate_simulated(device: SimulatedPhantom, force: Array) -> None:
     """Command the motors."""
     actuate(device.port, force)
 
 
-@njit(forceinline=True)
+@njit
 def advance_simulated(device: SimulatedPhantom, plant: Plant, t: float, replay: bool, applied: Array) -> None:
     """Step the physics with the user's hand on the stylus."""
     advance(plant, device.port, device.user, t, replay, applied)

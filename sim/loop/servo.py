@@ -22,17 +22,17 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.borrowed import borrowed
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import evaluate
+from controllers.lent import lend
 from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array
-from sim.body.drive import BodyState, follow, follow_addresses, lend_followed
+from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
 from sim.devices.device import DeviceState, actuate, advance, link_device, sense
@@ -177,7 +177,7 @@ class FrameLog(NamedTuple):
     ground: Array
 
 
-@njit(inline="always")  # a call would pass every pointer, shape and stride of the servo's arrays as an argument
+@njit
 def field_force(servo: Servo) -> None:
     """Evaluate the field at the measured hand, and command its force within the safety limits."""
     field, device = servo.field, servo.device
@@ -189,11 +189,10 @@ def field_force(servo: Servo) -> None:
     actuate(device, field.force)
 
 
-@njit(forceinline=True)
+@njit
 def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
-    """`run_block` on borrowed arrays, without reference counting."""
-    plant, device, every = servo.plant, servo.device, servo.figure_ticks
-    followed = lend_followed(servo.figure, servo.reference, servo.argument, servo.field.memory[:TRACE_SIZE])
+    """`run_block` on a servo and logs that are lent."""
+    plant, device, every, trace = servo.plant, servo.device, servo.figure_ticks, servo.field.memory[:TRACE_SIZE]
     for k in range(n):
         t = (first + k) * plant.period
         update_figure = (first + k) % every == 0
@@ -205,13 +204,13 @@ def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames:
             sense(device, t)
             field_force(servo)
             if update_figure:
-                follow(servo.units, servo.figure, followed)
+                follow(servo.units, servo.figure, servo.reference, servo.argument, trace)
             ticks.hand[k] = device.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force
             ticks.tank[k] = servo.field.tank[TANK_ENERGY : TANK_ENERGY + 2]
             ticks.torque[k] = device.torque
-            ticks.trace[k] = servo.field.memory[:TRACE_SIZE]
+            ticks.trace[k] = trace
             ticks.ctrl[k] = plant.ctrl
             ticks.residual[k] = servo.figure.applied
             ticks.fault[k, 0] = device.faults[FAULT_CODE]
@@ -245,7 +244,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     ticks, frames : TickLog, FrameLog
         Written (or read, see `replay`) row by row.
     """
-    _run(borrowed(servo), first, n, replay, borrowed(ticks), borrowed(frames))
+    _run(lend(servo), first, n, replay, lend(ticks), lend(frames))
 
 
 def rearm_servo(servo: Servo) -> None:

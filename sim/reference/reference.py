@@ -1,124 +1,35 @@
-"""The reference of the figure: pose, velocity and acceleration of the haptic map h along the hand's motion.
-
-Where each river plays its own clip, a change of river is a change of motion: it begins at the pose and place that the
-figure is shown in (`sim.reference.river_changes`).
-"""
+"""The reference of the figure: pose, velocity and acceleration of the haptic map h along the hand's motion."""
 
 import math
-from typing import Any
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from numba import njit, typeof, types
+from numba import typeof, types
 
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, VECTOR
+from controllers.fields.instructions import VECTOR
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
-from controllers.haptic_map.river_clips import (
-    COURSE,
-    RIVER_CLIPS,
-    changing,
-    gate_passed,
-    knows_change,
-    lets_go,
-    phase_rate,
-    takes_over,
-)
-from controllers.kernel_call import call_as_given, lend, lent
+from controllers.haptic_map.river_clips import RIVER_CLIPS
+from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
+from controllers.lent import Lent, lend
 from controllers.state import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
-from sim.compilation.native import mj_differentiate_pos
 from sim.compilation.units import Unit
 from sim.errors import SimError
-from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
-from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
-from sim.reference.settling import approach, let_down, slowness
-from sim.reference.stylus_filter import smooth_hand, smooth_turn, turn_rate
-from sim.reference.transition import dwells, make_transition
+from sim.reference.reference_state import CompiledReference
+from sim.reference.stylus_filter import turn_rate
+from sim.reference.transition import make_transition
+from sim.reference.update import update_reference, update_river_reference
 
 IntArray = npt.NDArray[np.int64]
 
 
 _MATRIX = types.Array(types.float64, 2, "C")
 _ROUNDS = 8  # fixed-point iterations of `begin_in_motion`; each gains at least three digits
-
-
-@njit(forceinline=True)
-def _settle(reference: CompiledReference) -> None:
-    """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
-    s, period, transition = reference.settled, reference.period, reference.transition
-    for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
-        share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
-        let_down(transition.limbs, transition.ends, share, pose)
-
-
-@njit
-def update_reference(place: Any) -> None:
-    r"""Advance the reference by one period.
-
-    With p(s) = p + s ṗ + ½ s² p̈ and R(s) = R exp(s ω + ½ s² α) the smoothed motion x of the stylus, velocity and
-    acceleration of h∘x are central differences on the figure's configuration manifold over ±T:
-    v = ½ ((q₊ ⊖ q) − (q₋ ⊖ q)) / T and a = ((q₊ ⊖ q) + (q₋ ⊖ q)) / T².
-
-    Parameters
-    ----------
-    place
-        Address (`controllers.kernel_call.lend`) of a tuple of: the reference, which is updated (the stylus's motion,
-        memory, pose (75), velocity (57), acceleration (57)); the stylus's measured position in H and orientation wxyz,
-        shape (7,); and the trace of the field, which holds the active river and the hand's phase on it (see
-        `controllers.fields.instructions`).
-    """
-    reference, stylus, trace = lent(place)
-    _advance(reference, stylus, trace)
-
-
-@njit(forceinline=True)
-def _advance(reference: CompiledReference, stylus: Array, trace: Array) -> None:
-    hand, period = reference.hand, reference.period
-    if reference.started[0] == 0.0:
-        reference.started[0] = 1.0
-        hand[0, :] = stylus[:3]
-        reference.trail[0], reference.trail[1] = stylus[:3], stylus[:3]
-        reference.orientation[:] = stylus[3:]
-        reference.settled[0] = slowness(hand[0], hand[1], reference.clip_seconds)
-    else:
-        reference.trail[1], reference.trail[0] = reference.trail[0], hand[0]
-        smooth_hand(hand, stylus[:3], reference.smoothing, period)
-        smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
-        approach(reference.settled, slowness(hand[0], hand[1], reference.clip_seconds), period)
-    reference.transition.since[0] += period
-    follow_trail(reference)
-    kind, params = base_of(reference.kind, reference.params)
-    # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
-    plays, river = kind == RIVER_CLIPS, trace[TRACE_RIVER]
-    settled = reference.transition.since[0] >= reference.transition.lasts[0]
-    taken = plays and takes_over(params, reference.memory, river)
-    over = dwells(reference.transition, river if taken else -1.0, period)
-    change, gate = gate_passed(params, reference.memory, river) if plays else (-1, 0.0)
-    if over and settled and knows_change(params, reference.memory, river):
-        if river != reference.memory[COURSE]:
-            go_along(reference, params, river)
-        elif change >= 0 and not changing(reference.memory):
-            go_through(reference, params, change, river, gate)
-    elif over and settled and may_change(reference, params, river, trace[TRACE_PHASE]):
-        change_river(reference, params, river, trace[TRACE_PHASE])
-    elif plays:
-        rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
-        if lets_go(params, reference.memory, trace[TRACE_RIVER], reference.going, rate):
-            stop(reference, params)
-    look_around(reference, hand)
-    carry(reference)
-    if reference.clip_seconds > 0.0:
-        _settle(reference)
-    for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):
-        mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
-    for i in range(reference.velocity.shape[0]):
-        reference.velocity[i] = 0.5 * (reference.to_after[i] - reference.to_before[i]) / period
-        reference.acceleration[i] = (reference.to_after[i] + reference.to_before[i]) / period**2
 
 
 @entry_point
@@ -148,14 +59,15 @@ def poses_unit() -> Unit:
 
 
 def update_unit(reference: CompiledReference) -> Unit:
-    """The compilation unit of `update_reference`, which is called by its address."""
-    return Unit.of(update_reference, types.CPointer(types.Tuple((typeof(reference), VECTOR, VECTOR))))
+    """The compilation unit that advances a reference by one period (`sim.reference.update`), called by its address."""
+    plays = base_of.py_func(reference.kind, reference.params)[0] == RIVER_CLIPS
+    return Unit.of(update_river_reference if plays else update_reference, Lent(typeof(reference)), VECTOR, VECTOR)
 
 
 @entry_point
 def _reference_along(update: int, reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
     for i in range(points.shape[0]):
-        call_as_given(update, (lend((reference, points[i], traces[i])),))
+        call_as_given(update, (lend(reference), points[i], traces[i]))
         poses[i] = reference.pose
 
 
@@ -167,7 +79,7 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
     reference : CompiledReference
         Updated.
     points, traces : Array
-        Stylus poses and field traces that `update_reference` takes, one row per period, shapes (n, 7) and (n, 8).
+        Stylus poses and field traces that `sim.reference.update` takes, one row per period, shapes (n, 7) and (n, 8).
     poses : Array
         Written, shape (n, 75).
     """

@@ -81,7 +81,7 @@ class CompiledReference(NamedTuple):
     to_after: Array
 
 
-@njit(forceinline=True)
+@njit
 def look_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, one period before and after; `memory` is that of now."""
     period, x = reference.period, reference.scratch_x
@@ -95,7 +95,7 @@ def look_around(reference: CompiledReference, hand: Array) -> None:
         evaluate_map(reference.units, reference.kind, reference.params, x, reference.scratch_memory, pose)
 
 
-@njit(forceinline=True)
+@njit
 def follow_trail(reference: CompiledReference) -> None:
     """Backward differences of the smoothed hand's last positions, into `going`.
 

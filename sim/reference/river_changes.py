@@ -106,7 +106,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     transition.since[0] = 0.0
 
 
-@njit(forceinline=False)
+@njit
 def may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
     """Whether a change to another river's clip may begin now.
 
@@ -130,7 +130,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     return True
 
 
-@njit(forceinline=False)
+@njit
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Change to another river's clip, at a phase [s], by a transition from what is shown."""
     _show_on(reference)
@@ -138,7 +138,7 @@ def change_river(reference: CompiledReference, params: Array, river: float, phas
     _go_over(reference, params)
 
 
-@njit(forceinline=False)
+@njit
 def go_along(reference: CompiledReference, params: Array, river: float) -> None:
     """Time the hand by another river's curve, while the playing clip goes on to a gate of a precomputed change."""
     scratch, x = reference.scratch_memory, reference.scratch_x
@@ -148,7 +148,7 @@ def go_along(reference: CompiledReference, params: Array, river: float) -> None:
     take_course(params, reference.memory, river, x, scratch[SHOWN])
 
 
-@njit(forceinline=False)
+@njit
 def go_through(reference: CompiledReference, params: Array, change: int, river: float, gate: float) -> None:
     """Begin a precomputed change to another river's clip at a gate [s] just passed, where the old clip was then."""
     memory, scratch, x = reference.memory, reference.scratch_memory, reference.scratch_x
@@ -163,7 +163,7 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
     go_on(memory, phase, ahead)
 
 
-@njit(forceinline=False)
+@njit
 def stop(reference: CompiledReference, params: Array) -> None:
     """Bring the playing clip to rest, at the rest phase nearest to where it would come to a stop."""
     memory, period = reference.memory, reference.period

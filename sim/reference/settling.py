@@ -37,7 +37,7 @@ def _smooth(x: float) -> float:
     return x * x * (3.0 - 2.0 * x)
 
 
-@njit(forceinline=False)
+@njit
 def slowness(p: Array, v: Array, seconds: float) -> float:
     """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips that last `seconds`."""
     square = p[0] * p[0] + p[1] * p[1]
@@ -76,7 +76,7 @@ def clearance(limbs: Array, ends: Array, pose: Array) -> float:
     return least - _SOFTNESS * math.log(total)
 
 
-@njit(forceinline=False)
+@njit
 def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
     """Lower a pose (75,) by a share of its feet's clearance; `limbs` are `packed_steppers`, `ends` (n, 7) scratch."""
     if share <= 0.0 or limbs.shape[0] == 0:

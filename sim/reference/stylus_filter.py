@@ -31,7 +31,7 @@ def filter_gains(smoothing: float, period: float) -> tuple[float, float, float]:
     return 1.0 - smoothing**3, 1.5 * rest**2 * (1.0 + smoothing) / period, rest**3 / period**2
 
 
-@njit(forceinline=False)
+@njit
 def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -> None:
     """Advance position, velocity and acceleration, rows of `hand` (3, 3), by one period to a measured position (3,)."""
     g, h, k = filter_gains(smoothing, period)
@@ -54,7 +54,7 @@ def turn_rate(v: Array, a: Array) -> float:
     return min(rate, _FASTEST)
 
 
-@njit(forceinline=False)
+@njit
 def turned_on(q: Array, turning: Array, s: float) -> tuple[float, float, float, float]:
     """Orientation R·exp(s ω + ½ s² α) after s seconds of the turning (ω, α), shape (2, 3), in the frame of R."""
     a, b = s, 0.5 * s**2
@@ -66,7 +66,7 @@ def turned_on(q: Array, turning: Array, s: float) -> tuple[float, float, float, 
     return multiply(q[0], q[1], q[2], q[3], turn[0], turn[1], turn[2], turn[3])
 
 
-@njit(forceinline=False)
+@njit
 def smooth_turn(q: Array, turning: Array, measured: Array, smoothing: float, period: float) -> None:
     r"""Advance orientation and turning by one period to a measured orientation; the residual is a rotation vector.
 

@@ -89,7 +89,7 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
     )  # fmt: skip
 
 
-@njit(forceinline=False)
+@njit
 def dwells(transition: Transition, river: float, period: float) -> bool:
     """Whether the river that would take over (−1: none) has been active for the dwell time; call it every period."""
     rival = transition.rival
@@ -129,7 +129,7 @@ def _carry(transition: Transition, at: float, pose: Array) -> None:
     add_offset(pose, transition.offset)
 
 
-@njit(forceinline=False)
+@njit
 def carry_on(transition: Transition, s: float, pose: Array) -> None:
     """Turn a pose of the new motion, s seconds from now, into the shown pose: add offset, root depth and steps."""
     since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends

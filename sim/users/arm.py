@@ -156,7 +156,7 @@ class CompiledArm(NamedTuple):
     turns: Array
 
 
-@njit(inline="always")  # a call would count references to every array at each physics step
+@njit
 def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
     """Set the force of the hand on the stylus, in H: arm impedance plus pushes and grabs; and the switch."""
     if arm.path.shape[0] + arm.pushes.shape[0] + arm.grabs.shape[0] == 0:

@@ -6,7 +6,6 @@ delay, and her wishes. She has no access to field, phase or limiter.
 
 from numba import njit
 
-from controllers.borrowed import borrowed
 from controllers.state import Array
 from sim.users.body import REFERENCE_GRIP
 from sim.users.muscles import move
@@ -52,11 +51,6 @@ def person_step(
     switch : Array
         Set to 1 while the switch is pressed, shape (1,).
     """
-    _step(borrowed(person), dt, substep, borrowed(p), borrowed(v), borrowed(force), borrowed(switch))
-
-
-@njit(forceinline=True)
-def _step(person: PersonState, dt: float, substep: int, p: Array, v: Array, force: Array, switch: Array) -> None:
     if substep == 0:
         if person.memory[STARTED] == 0.0:
             _begin(person, p, v)

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import typeof, types
 
+from controllers.lent import Lent
 from sim.compilation.units import Unit
 from sim.users.person_state import PersonState, nobody
 from sim.users.person_step import person_step
@@ -11,7 +12,7 @@ from sim.users.person_step import person_step
 def person_unit() -> Unit:
     """The compilation unit of `person_step`."""
     number, vector = types.float64, typeof(np.zeros(3))
-    return Unit.of(person_step, typeof(nobody()), number, number, types.int64, vector, vector, vector, vector)
+    return Unit.of(person_step, Lent(typeof(nobody())), number, number, types.int64, vector, vector, vector, vector)
 
 
 def link_person(person: PersonState) -> None:

@@ -118,7 +118,7 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
     )  # fmt: skip
 
 
-@njit(forceinline=True)
+@njit
 def sense(port: PhantomPort, t: float, switch: float) -> None:
     """Fill `port.hand` from the encoders at time t (see `take_reading`)."""
     q, a, g = port.qpos, port.arm_q, port.gimbal_q
@@ -159,7 +159,7 @@ def has_sensed(port: PhantomPort) -> bool:
     return port.memory[SENSED] != 0.0
 
 
-@njit(forceinline=True)
+@njit
 def actuate(port: PhantomPort, force: Array) -> None:
     """Turn a force on the hand into motor torques (see `motor_torques`).
 
@@ -182,7 +182,7 @@ def let_go(port: PhantomPort) -> None:
         port.torque[i] = port.ctrl[port.motor[i]] = 0.0
 
 
-@njit(forceinline=True)
+@njit
 def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> None:
     """True position and velocity of the stylus in H, unquantised, as the hand feels them.
 
@@ -209,7 +209,7 @@ def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> Non
         v[k] = jacobian_H[k, 0] * rate[0] + jacobian_H[k, 1] * rate[1] + jacobian_H[k, 2] * rate[2]
 
 
-@njit(forceinline=True)
+@njit
 def true_turn(port: PhantomPort, orientation: Array, spin: Array, axes: Array) -> None:
     """True orientation and angular velocity of the stylus in H, unquantised, as the fingers feel them.
 

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.kernel_call import call_as_given
+from controllers.lent import lend
 from controllers.safety.faults import is_silent
 from controllers.state import Array
 from models.scene import PHANTOM
@@ -90,7 +91,7 @@ def hand_torques(hand: Hand) -> int:
     return 6 if len(hand.arm.turns) > 0 else 3
 
 
-@njit(forceinline=True)
+@njit
 def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
     """Step the physics from time t for one servo period.
 
@@ -118,7 +119,7 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
                 when, dt = t + i * plant.period / plant.substeps, plant.period / plant.substeps
                 call_as_given(
                     hand.person.units[0],
-                    (hand.person, when, dt, i, hand.p, hand.v, hand.force, hand.arm.switch),
+                    (lend(hand.person), when, dt, i, hand.p, hand.v, hand.force, hand.arm.switch),
                 )
             else:
                 hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)

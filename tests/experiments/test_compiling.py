@@ -115,7 +115,8 @@ def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: lis
     with pytest.raises(_Told) as told:
         wire(config, ready=_stop)
     names = _names(told.value.args[0])
-    assert names[:3] == ["run_block", "update_reference", "figure_torque"]
+    update = "update_river_reference" if config.mode.kind == "rivers" else "update_reference"
+    assert names[:3] == ["run_block", update, "figure_torque"]
     assert set(more) <= set(names)
 
 

@@ -3,6 +3,7 @@
 import dis
 import sys
 import types as python_types
+from collections import namedtuple
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from controllers.fields.higher_order import higher_order_wrench
 from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS
+from controllers.lent import Lent
 from sim.compilation import unit_key as unit_key_module
 from sim.compilation.unit_key import UnknownIngredient, UnknownName, describe_type, reached_functions, unit_key
 from sim.loop.servo import run_block
@@ -112,6 +114,13 @@ def test_types_of_arguments_and_options_are_part_of_the_key():
 def test_what_no_key_can_be_made_of_is_an_error(value: object):
     with pytest.raises(UnknownIngredient, match="scale"):
         unit_key(_scaled(value).py_func, (types.float64,), {})
+
+
+def test_a_lent_tuple_is_described_by_its_fields():
+    pair, swapped = (typeof(namedtuple("Pair", names)(1.0, 2.0)) for names in ("a b", "b a"))
+    described = [describe_type(kind) for kind in (pair, Lent(pair), Lent(swapped))]
+    assert described[0] in described[1]
+    assert described[1] != described[2]
 
 
 def test_unknown_types_and_names_are_errors():

@@ -1,0 +1,122 @@
+"""The update of the reference by one period: of a map whose rivers play one clip each, and of any other.
+
+Where each river plays its own clip, a change of river is a change of motion: it begins at the pose and place that the
+figure is shown in (`sim.reference.river_changes`). Only such a map needs that code, so the two updates are two units.
+"""
+
+from numba import njit
+
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
+from controllers.haptic_map.expressive import base_of
+from controllers.haptic_map.river_clips import (
+    COURSE,
+    changing,
+    gate_passed,
+    knows_change,
+    lets_go,
+    phase_rate,
+    takes_over,
+)
+from controllers.state import Array
+from sim.compilation.native import mj_differentiate_pos
+from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
+from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
+from sim.reference.settling import approach, let_down, slowness
+from sim.reference.stylus_filter import smooth_hand, smooth_turn
+from sim.reference.transition import dwells
+
+
+@njit
+def update_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
+    r"""Advance the reference by one period.
+
+    With p(s) = p + s ṗ + ½ s² p̈ and R(s) = R exp(s ω + ½ s² α) the smoothed motion x of the stylus, velocity and
+    acceleration of h∘x are central differences on the figure's configuration manifold over ±T:
+    v = ½ ((q₊ ⊖ q) − (q₋ ⊖ q)) / T and a = ((q₊ ⊖ q) + (q₋ ⊖ q)) / T².
+
+    Parameters
+    ----------
+    reference : CompiledReference
+        Updated: the stylus's motion, memory, pose (75), velocity (57) and acceleration (57).
+    stylus : Array
+        Measured position in H and orientation wxyz, shape (7,).
+    trace : Array
+        Trace of the field, with the active river and the hand's phase on it (see `controllers.fields.instructions`).
+        Not read; see `update_river_reference`.
+    """
+    _smooth(reference, stylus)
+    look_around(reference, reference.hand)
+    _differentiate(reference)
+
+
+@njit
+def update_river_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
+    """As `update_reference`, of a map whose rivers play one clip each: its motion changes with the active river."""
+    _smooth(reference, stylus)
+    reference.transition.since[0] += reference.period
+    follow_trail(reference)
+    _play(reference, trace)
+    look_around(reference, reference.hand)
+    carry(reference)
+    _differentiate(reference)
+
+
+@njit
+def _smooth(reference: CompiledReference, stylus: Array) -> None:
+    """Advance the tracking filter of the stylus, which starts at its first reading."""
+    hand, period = reference.hand, reference.period
+    if reference.started[0] == 0.0:
+        reference.started[0] = 1.0
+        hand[0, :] = stylus[:3]
+        reference.trail[0], reference.trail[1] = stylus[:3], stylus[:3]
+        reference.orientation[:] = stylus[3:]
+        reference.settled[0] = slowness(hand[0], hand[1], reference.clip_seconds)
+    else:
+        reference.trail[1], reference.trail[0] = reference.trail[0], hand[0]
+        smooth_hand(hand, stylus[:3], reference.smoothing, period)
+        smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
+        approach(reference.settled, slowness(hand[0], hand[1], reference.clip_seconds), period)
+
+
+@njit
+def _play(reference: CompiledReference, trace: Array) -> None:
+    """Begin a change to the clip of the active river, or to rest, where one is due."""
+    period, river = reference.period, trace[TRACE_RIVER]
+    _, params = base_of(reference.kind, reference.params)
+    # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
+    settled = reference.transition.since[0] >= reference.transition.lasts[0]
+    over = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
+    change, gate = gate_passed(params, reference.memory, river)
+    if over and settled and knows_change(params, reference.memory, river):
+        if river != reference.memory[COURSE]:
+            go_along(reference, params, river)
+        elif change >= 0 and not changing(reference.memory):
+            go_through(reference, params, change, river, gate)
+    elif over and settled and may_change(reference, params, river, trace[TRACE_PHASE]):
+        change_river(reference, params, river, trace[TRACE_PHASE])
+    else:
+        rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
+        if lets_go(params, reference.memory, river, reference.going, rate):
+            stop(reference, params)
+
+
+@njit
+def _differentiate(reference: CompiledReference) -> None:
+    """Velocity and acceleration from the poses now, one period before and one period after."""
+    period = reference.period
+    if reference.clip_seconds > 0.0:
+        _settle(reference)
+    for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):
+        mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
+    for i in range(reference.velocity.shape[0]):
+        reference.velocity[i] = 0.5 * (reference.to_after[i] - reference.to_before[i]) / period
+        reference.acceleration[i] = (reference.to_after[i] + reference.to_before[i]) / period**2
+
+
+@njit
+def _settle(reference: CompiledReference) -> None:
+    """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
+    s, period, transition = reference.settled, reference.period, reference.transition
+    for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
+        share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
+        let_down(transition.limbs, transition.ends, share, pose)
