@@ -47,8 +47,10 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
         weights[last, i], changes[last, 1, i], changes[last, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
     if owner >= 0:
-        weights[1] *= params[_SHARE]
-        changes[1] *= params[_SHARE]
+        for i in range(_CLIPS):
+            weights[1, i] *= params[_SHARE]
+            changes[1, 1, i] *= params[_SHARE]
+            changes[1, 2, i] *= params[_SHARE]
         weights[1, owner] += 1.0 - params[_SHARE]
     size = int(params[_TABLE_SIZE])
     table = params[_TABLE : _TABLE + size]

@@ -23,8 +23,9 @@ _ROOM = 0.006  # [m] x₀
 @njit
 def _raised(clearance: Array, rates: Array, change: Array) -> float:
     """S(m(h)) of clearances (limbs,); writes its derivatives `change` (k,) from those of the clearances (limbs, k)."""
-    least = clearance.min()
-    total = 0.0
+    least, total = clearance[0], 0.0
+    for h in clearance:
+        least = min(least, h)
     for h in clearance:
         total += np.exp((least - h) / _SOFTNESS)
     m = least - _SOFTNESS * np.log(total) - _ROOM
@@ -64,7 +65,8 @@ def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: 
                 rates[j, k] += changes[k, i] * value[i, j]
     lower[0] = _raised(mean, rates, lower[1:])
     for i in range(clips):
-        own[:, 0] = slope[i]
+        for j in range(limbs):
+            own[j, 0] = slope[i, j]
         height = _raised(value[i], own, change)
         lower[0] -= weights[i] * height
         lower[1] -= weights[i] * change[0]

@@ -61,7 +61,8 @@ def update_lap(memory: Array, angle: float, drift: Array) -> None:
         s = (before + angle) / (4.0 * np.pi)
         _move_frame(memory, s, last)
         _move_frame(memory, -s, drift)
-    last[:] = drift
+    for k in range(3):
+        last[k] = drift[k]
 
 
 @njit
