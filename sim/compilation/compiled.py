@@ -21,6 +21,12 @@ install()
 
 def entry_point(function: _Function) -> _Function:
     """Compile a function to run without the GIL, cached on disk: for functions of ``sim`` that Python calls."""
-    compiled: Any = njit(nogil=True)(function)
-    compiled._cache = unit_cache.UnitCache(function, compiled.targetoptions)
-    return cast(_Function, compiled)
+    compiled = cast(_Function, njit(nogil=True)(function))
+    keep_on_disk(compiled)
+    return compiled
+
+
+def keep_on_disk(compiled: Any) -> None:
+    """Cache a numba function on disk: called by Python or by address, it is compiled once."""
+    if not isinstance(compiled._cache, unit_cache.UnitCache):
+        compiled._cache = unit_cache.UnitCache(compiled.py_func, compiled.targetoptions)

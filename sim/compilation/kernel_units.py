@@ -15,9 +15,13 @@ from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
 from controllers.state import Array
+from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
 
 IntArray = npt.NDArray[np.int64]
+
+for _kernel in MAP_KERNELS.values():  # what Python asks of a map is answered by its unit
+    keep_on_disk(_kernel)
 
 
 def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from sim.compilation.compiled import entry_point
-from sim.compilation.unit_cache import UnitCache, is_sound
+from sim.compilation.compiled import keep_on_disk
+from sim.compilation.unit_cache import is_sound
 from sim.errors import SimError
 
 
@@ -47,9 +47,9 @@ class Unit(NamedTuple):
         return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 
-@cache  # keeps the compiled code alive, so that addresses stay valid
+@cache
 def unit_function(module: str, name: str) -> Any:
-    """The dispatcher of a unit's function, with `UnitCache` as its cache.
+    """The dispatcher of a unit's function, cached on disk.
 
     Raises
     ------
@@ -59,4 +59,5 @@ def unit_function(module: str, name: str) -> Any:
     found: Any = getattr(importlib.import_module(module), name, None)
     if not hasattr(found, "py_func"):
         raise SimError(f"{module}.{name} is not a compiled function of a module; expected one that is")
-    return found if isinstance(found._cache, UnitCache) else entry_point(found.py_func)
+    keep_on_disk(found)
+    return found

@@ -39,6 +39,7 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TOYS), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.syspath_prepend(str(TOYS))
     unit_function.cache_clear()
+    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # compiled for another folder
     import toy_kernels  # pyright: ignore[reportMissingImports]
 
     vector = types.Array(types.float64, 1, "C")

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +14,14 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.follow import Follow
 from controllers.fields.program import evaluate
-from controllers.haptic_map.evaluate import MAP_KERNELS, evaluate_map, kinds_of
+from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, evaluate_map, kinds_of
 from controllers.haptic_map.expressive import EXPRESSIVE
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from controllers.state import HandState
 from experiments.setups.robot_arm import robot_arm_map
 from sim.compilation import kernel_units
 from sim.compilation.kernel_units import law_units, map_units
+from sim.compilation.unit_cache import cache_folder
 from sim.reference.map_derivative import map_derivative
 from sim.reference.reference import poses_along
 
@@ -47,6 +49,16 @@ def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
     poses = np.empty((20, ARM.nq))
     poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
     np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
+
+
+def test_a_unit_answers_python_too():
+    map_units([ARM.compiled()[:2]])
+    kernel: Any = MAP_KERNELS[ROBOT_ARM]
+    units = list(kernel.overloads)
+    assert MAP_ARGUMENTS in units
+    ARM.pose(np.array([0.05, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    assert list(kernel.overloads) == units
+    assert kernel._cache.cache_path == str(cache_folder())
 
 
 def test_a_derivative_by_its_kernel_s_address_is_that_of_python_to_the_last_bit():
