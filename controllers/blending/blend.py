@@ -18,7 +18,7 @@ from controllers.work_array import work_array
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
 
 
-@njit
+@njit(forceinline=True)
 def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Array, slope: Array) -> None:
     """Channels of each clip and their derivatives by the angle, from uniform cubic B-splines."""
     channels = value.shape[1]
@@ -55,7 +55,7 @@ def blend(
     blend_corrected(params, angle, weights, changes, work_array((4, 0)), chain, memory, pose, jacobian)
 
 
-@njit
+@njit(forceinline=True)
 def blend_corrected(
     params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
     pose: Array, jacobian: Array,

@@ -40,7 +40,7 @@ def figure_channels(figure: Array) -> int:
     return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])
 
 
-@njit
+@njit(forceinline=True)
 def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
     """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
     for i in range(value.shape[0]):
@@ -133,7 +133,7 @@ def combine(
     )  # fmt: skip
 
 
-@njit
+@njit(forceinline=True)
 def _combine(
     figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
     correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,

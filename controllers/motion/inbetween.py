@@ -42,7 +42,7 @@ def table_channels(table: Array) -> int:
     return int(table[_CHANNELS])
 
 
-@njit
+@njit(forceinline=True)
 def correction(table: Array, angle: float, a: float, b: float, d: Array, slopes: bool = True) -> None:
     """Corrections D, and their derivatives if asked for.
 

@@ -21,7 +21,7 @@ from controllers.work_array import work_array
 _Normal = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@njit
+@njit(forceinline=True)
 def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
     """Entries A11, A12, A13, A22, A23, A33 of A and g1, g2, g3 of g (see the module)."""
     a11 = a12 = a13 = a22 = a23 = a33 = g1 = g2 = g3 = 0.0
@@ -55,7 +55,7 @@ def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, floa
     )
 
 
-@njit
+@njit(forceinline=True)
 def _polish(unit: Array, weights: Array, q: Quat) -> bool:
     """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; returns whether A is then positive definite."""
     e = _normal_equations(unit, weights, q)
@@ -104,7 +104,7 @@ def _dominant(unit: Array, weights: Array, q: Quat) -> None:
         q[j] = m[j, column] / np.sqrt(norm)
 
 
-@njit
+@njit(forceinline=True)
 def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
     """Weighted mean of rotations.
 
