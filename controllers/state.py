@@ -26,6 +26,9 @@ HAND_ANGULAR_VELOCITY = 11
 HAND_SWITCH = 14
 HAND_SIZE = 15
 
+LONGEST_STEP = 0.05
+"""Bound on one time step of what moves with the hand's time [s], so that it does not jump after a pause."""
+
 # Slices of the vector for use outside compiled code; a haptic map's argument is the stylus pose.
 POSITION = slice(HAND_POSITION, HAND_QUATERNION)
 STYLUS_POSE = slice(HAND_POSITION, HAND_VELOCITY)

@@ -13,9 +13,7 @@ from controllers.curves.trajectory import START, Trajectory, curve_point, curve_
 from controllers.fields.follow import follow_force
 from controllers.fields.instructions import leave_trace
 from controllers.fields.law import Law, Program
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
-
-_LONGEST_TICK = 0.05  # [s] bound on one time step, so that a waiting bunny does not jump after a pause
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, LONGEST_STEP, Array
 
 
 @njit
@@ -54,7 +52,7 @@ def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, h
         bunny = phase
     else:
         pace = gaussian(_square_to(params, curve, memory[slot + 1], p), gains.inverse_square)
-        bunny = memory[slot + 1] + pace * min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
+        bunny = memory[slot + 1] + pace * min(max(time - memory[slot + 2], 0.0), LONGEST_STEP)
     bunny = wrap_phase(params, curve, bunny)
     memory[slot + 1], memory[slot + 2] = bunny, time
     pull = gaussian(_square_to(params, curve, bunny, p), gains.inverse_square)

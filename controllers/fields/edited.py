@@ -18,11 +18,10 @@ from controllers.fields.follow import FollowGains, follow_at
 from controllers.fields.law import Law, Program
 from controllers.fields.river import River, river_flow
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_TIME, Array
+from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
 from controllers.work_array import work_array
 
 _SPACING = 0.01  # [s] between samples of a performance: short for the motion of a hand, long for encoder quantisation
-_LONGEST_TICK = 0.05  # [s] bound on one time step, so that a waiting recording does not jump after a pause
 
 
 @njit
@@ -59,7 +58,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         s = start
         if not math.isnan(memory[slot + 1]):
             s = memory[slot + 1]
-            step = min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
+            step = min(max(time - memory[slot + 2], 0.0), LONGEST_STEP)
             s += _nearness(params, performed, s, inverse_square, p) * step
         # After its end the performance returns to its start and waits there for the hand to come round.
         s = start if s > end else s

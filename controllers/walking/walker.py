@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from controllers.state import LONGEST_STEP, Array
 from controllers.walking.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.walking.walked_path import (
     PACKED_PATH,
@@ -33,7 +33,6 @@ _ARGUMENT = 7
 _DECIDED = _ARGUMENT + 5
 _PATH = _DECIDED + DECISION
 _SEARCHES = 4  # Newton steps of the search for the nearest point, warm-started
-_LONGEST_TICK = 0.05  # [s] bound on one time step, so that the walker does not jump after a pause
 _STEERING = 0.15  # [m] of path, the length constant with which the curvature follows the stylus
 MARGIN = 4  # rows of path kept in reserve, since the filter before the map may evaluate it ahead of the walker
 
@@ -246,6 +245,6 @@ def lead(follow: Following, walker: Walker, time: float, x: float, y: float) -> 
     walker.time[0] = time
     # The comparison is false for the NaN of the first tick.
     if dt > 0.0:
-        _walk(follow, walker, min(dt, _LONGEST_TICK))
+        _walk(follow, walker, min(dt, LONGEST_STEP))
         _decide_flight(follow, walker)
         _lay_path(follow, walker, x, y)

@@ -12,6 +12,7 @@ from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts import ClipMapParts
+from experiments.setups.stylus import stylus_path
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 
@@ -36,10 +37,8 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
         change_clip(memory, float(river), curve.start)
         seconds = haptic_map.loops[river].duration
     frames = max(64, round(_FPS * seconds)) + 1
-    points = curve.point(np.linspace(curve.start, curve.end, frames))
-    stylus = np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))))
-    poses = np.empty((frames, haptic_map.nq))
-    poses_along(kind, params, memory, stylus, poses)
+    points, poses = curve.point(np.linspace(curve.start, curve.end, frames)), np.empty((frames, haptic_map.nq))
+    poses_along(kind, params, memory, stylus_path(points), poses)
     return Clip(poses, (frames - 1) / seconds, "along the curve")
 
 
