@@ -231,6 +231,11 @@ def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:
     return np.concatenate([[len(groups), len(limbs)], groups, *(limb.packed() for limb in limbs)])
 
 
+def weight_groups(figure: Array) -> Array:
+    """View of the group of weights of root and each joint, in a `packed_figure` at the start of an array."""
+    return figure[_GROUPS : _GROUPS + int(figure[_ROTATIONS])]
+
+
 def fresh_lap() -> Array:
     """Memory of a blend at the start of a run."""
     memory = np.zeros(MEMORY)

@@ -1,12 +1,13 @@
 """The lifted map: every clip has its own curve, and the stylus blends the clips of nearby curves (section 8.1)."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 from numba import njit
 
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
-from controllers.blending.combination import combine, figure_channels, fresh_lap, packed_figure
+from controllers.blending.combination import combine, figure_channels, fresh_lap, packed_figure, weight_groups
 from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.curves.cylinder import cylinder
 from controllers.curves.splines import basis, basis_slope, control_points, round_lap
@@ -43,9 +44,10 @@ _LAGS = 128  # samples of λ round the lap
 _ROWS = 256  # largest number of rows of the corrections' table round the lap
 _PAIR_STEPS = 24  # phases of the lap at which neighbouring clips are searched
 (
-    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT,
-    _SOLES_AT, _FIGURE,
-) = range(13)  # fmt: skip
+    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _OWN_LEGS, _SHARE, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT,
+    _PAIRS_AT, _SOLES_AT, _FIGURE,
+) = range(15)  # fmt: skip
+_NOBODYS = 0.0  # in place of 1 + the number of the clip that gives the legs: all joints are blended
 
 
 @njit
@@ -91,11 +93,38 @@ def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chan
 
 
 @njit
+def _give_legs(owner: int, share: float, near: IntArray, count: int, w: Array, changes: Array) -> int:
+    """Weights of two groups from those of the second: the first is the owner's, of the second it gets 1 − λ more.
+
+    Returns the number of clips, which counts the owner though it may be far from the hand.
+    """
+    at = 0
+    while at < count and near[at] != owner:
+        at += 1
+    if at == count:
+        near[at], w[1, at], count = owner, 0.0, count + 1
+        for way in range(3):
+            changes[1, way, at] = 0.0
+    for i in range(count):
+        w[0, i] = 0.0
+        w[1, i] *= share
+        for way in range(3):
+            changes[0, way, i] = 0.0
+            changes[1, way, i] *= share
+    w[0, at] = 1.0
+    w[1, at] += 1.0 - share
+    return count
+
+
+@njit
 def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of `Lifted`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    total, chain = int(params[_CLIPS]), work_array((3, 6))
-    near, w, changes = work_integers(total), work_array((1, total)), work_array((1, 3, total))
-    angle, count = _weigh(params, x, chain, near, w[0], changes[0])
+    total, chain, owner = int(params[_CLIPS]), work_array((3, 6)), int(params[_OWN_LEGS]) - 1
+    groups = 2 if owner >= 0 else 1  # the last group has the weights of the hand's place
+    near, w, changes = work_integers(total), work_array((groups, total)), work_array((groups, 3, total))
+    angle, count = _weigh(params, x, chain, near, w[groups - 1], changes[groups - 1])
+    if owner >= 0:
+        count = _give_legs(owner, params[_SHARE], near, count, w, changes)
     figure = params[_FIGURE:]
     channels = figure_channels(figure)
     value, slope, drifts = work_array((count, channels)), work_array((count, channels)), work_array((count, 3))
@@ -136,6 +165,10 @@ class Lifted(ClipMap):
     lifted. They stay above the floor (`floor`), and in stance they keep their place while the mixture changes
     (`footing`).
 
+    Motions side by side are seldom alike: a hand that is pushed from a walk onto a kick would ask the figure to kick
+    within a tenth of a second. `with_legs_of` leaves root, legs and trunk to one clip, as `Cylindrical` does, and
+    blends only a share λ of the other joints.
+
     h is C² except on the axis r = 0, where the phase is not defined. Outside the box round all sites r and z are
     clamped to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
 
@@ -159,6 +192,13 @@ class Lifted(ClipMap):
     transitions : Array, shape (k, 5), optional
         Where a hand may change between clips: numbers of two clips, θ [rad], relative distances of pose and velocity.
         Stored with the map; h does not depend on them.
+
+    Attributes
+    ----------
+    legs_of : int or None
+        Clip that gives root, legs and trunk (see `with_legs_of`); None where all is blended.
+    share : float
+        λ.
 
     Raises
     ------
@@ -192,6 +232,8 @@ class Lifted(ClipMap):
         self.margin = _checked_margin(margin)
         self.sites = checked_sites(sites, names, self.margin)
         self.transitions = _checked_transitions(transitions, m)
+        self.legs_of: int | None = None
+        self.share = 1.0
         limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
         super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs, self._drifts)
 
@@ -244,8 +286,39 @@ class Lifted(ClipMap):
         result[near[:count]] = w[:count]
         return result
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Says so if only some joints are blended."""
+        if self.legs_of is None:
+            return ()
+        owner, arms = self.names[self.legs_of], "the others' arms"
+        bears = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
+        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {bears}",)
+
+    def with_legs_of(self, clip: int, upper: Sequence[int], share: float) -> "Lifted":
+        """The same map with root and all joints but `upper` (counted from 1) from one clip, and a share λ of the rest.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such clip, a joint is none of the poses' or a limb's, or the share is not from 0 to 1.
+        """
+        other = copy(self)
+        other._params = self._params.copy()
+        groups = weight_groups(other._params[_FIGURE:])
+        taken = {joint for limb in self.limbs for joint in limb.joints}
+        if not (0 <= clip < len(self.names) and 0.0 <= share <= 1.0 and set(upper) <= {*range(1, len(groups))} - taken):
+            raise ParameterError(
+                f"a lifted map takes the legs of clip 0 to {len(self.names) - 1}, other joints from 1 to "
+                f"{len(groups) - 1} that are no limb's, and a share from 0 to 1; got {clip}, {list(upper)} and {share}"
+            )
+        groups[:] = np.isin(np.arange(len(groups)), upper)
+        other._params[_OWN_LEGS], other._params[_SHARE] = 1.0 + clip, share
+        other.legs_of, other.share = clip, share
+        return other
+
     def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
+        """The map as arrays by key; `from_arrays` restores it from them bit for bit, with all joints blended."""
         arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": self.transitions}
         for name, clip in zip(self.names, self._placed, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
@@ -303,7 +376,8 @@ class Lifted(ClipMap):
             self._packed_soles(channels, limbs),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
-        return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self._placed), *at], *blocks])
+        numbers = [low[0], high[0], low[1], high[1], self.margin, len(self._placed), _NOBODYS, 1.0, *at]
+        return np.concatenate([numbers, *blocks])
 
     def _packed_soles(self, channels: list[Array], limbs: Sequence[Limb]) -> Array:
         if not limbs:

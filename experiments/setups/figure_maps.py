@@ -34,10 +34,10 @@ from experiments.setups.blendable import grounded, keeps_pace, not_blendable, of
 from experiments.setups.carried import carried
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
-from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
+from experiments.setups.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
-from experiments.setups.pushed_off import not_followed as not_carried
+from experiments.setups.pushed_off import followed_map
 from experiments.setups.rests import with_rests
 from experiments.setups.river_changes import with_changes
 from experiments.setups.river_tour import not_followed
@@ -187,7 +187,8 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = _on_lifted(part, made, clips)
         if config.user.does == "push" and config.figure.kind == "physical" and not isinstance(config.mode, Rivers):
-            parts = replace(parts, refined=lambda: (made, not_carried(made, parts.curve)))
+            followed = partial(followed_map, made, parts.curve, curve_number(made, part.curve), arms(made.limbs))
+            parts = replace(parts, refined=followed)
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
     else:

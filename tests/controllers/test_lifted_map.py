@@ -120,3 +120,49 @@ def test_a_clip_that_should_close_and_does_not_is_refused():
     assert closing_gap(poses) > 0.1
     with pytest.raises(ParameterError, match=r"clip 0 is to be closed, but its last frame is 0\.\d+ from its first"):
         Lifted([(poses, 30.0)], [True], [once_round(140)], ring(1))
+
+
+FREE = Lifted(CLIPS, CLOSED, ANGLES, ring(4), (), ("walk", "still", "turn", "cut"))
+ARMS = [2, 3]
+"""A map without limbs, of which the second and third joint are left to all clips."""
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4, 0.0])
+def test_legs_are_one_clips_wherever_the_hand_is_and_arms_have_their_share_of_the_others(share):
+    owner, rng = 1, np.random.default_rng(5)
+    owned = FREE.with_legs_of(owner, ARMS, share)
+    for r, angle, z in rng.uniform([0.03, 0.1, -0.02], [0.07, 6.2, 0.02], (60, 3)):
+        x, own = stylus(r, angle, z), FREE.site(owner, np.array(angle))
+        alone = FREE.pose(stylus(own[0], angle, own[1]))
+        pose = owned.pose(x)
+        np.testing.assert_allclose(difference(pose, alone)[:9], 0.0, atol=1e-9)
+        # The chordal mean of clips is the dominant eigenvector of their weighted sum of q qᵀ (Markley et al. 2007).
+        weights, sum_of = share * FREE.weights(x) + (1.0 - share) * np.eye(4)[owner], np.zeros((2, 4, 4))
+        for i, weight in enumerate(weights):
+            at = FREE.site(i, np.array(angle))
+            clip = FREE.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)
+            sum_of += weight * clip[:, :, None] * clip[:, None, :]
+        mean = np.linalg.eigh(sum_of)[1][:, :, -1].ravel()
+        np.testing.assert_allclose(difference(pose, np.concatenate([pose[:11], mean]))[9:], 0.0, atol=1e-6)
+
+
+def test_the_map_that_gives_its_legs_away_stays_as_it_is():
+    before, x = FREE.pose(stylus(0.05, 2.0, 0.004)), stylus(0.05, 2.0, 0.004)
+    owned = FREE.with_legs_of(2, ARMS, 0.5)
+    assert np.abs(difference(owned.pose(x), before)).max() > 0.01
+    np.testing.assert_array_equal(FREE.pose(x), before)
+    assert (FREE.remarks, FREE.legs_of) == ((), None)
+    assert owned.remarks == (
+        "legs and trunk are those of turn wherever the hand is pushed, which bear 50 % of the others' arms",
+    )
+
+
+@pytest.mark.parametrize(("clip", "upper", "share"), [(4, ARMS, 1.0), (0, [4], 1.0), (0, [0], 1.0), (0, ARMS, 1.5)])
+def test_legs_that_cannot_be_given_are_refused(clip, upper, share):
+    with pytest.raises(ParameterError, match="a lifted map takes the legs of clip 0 to 3"):
+        FREE.with_legs_of(clip, upper, share)
+
+
+def test_joints_of_a_limb_are_not_left_to_the_others():
+    with pytest.raises(ParameterError, match="no limb's"):
+        MAP.with_legs_of(0, [2], 1.0)

@@ -6,10 +6,12 @@ from clips_for_maps import stylus
 from scipy.spatial.transform import Rotation
 from test_composite_map import MAP as COMPOSITE
 from test_cylindrical_map import MOVING as CYLINDRICAL
+from test_lifted_map import ARMS, FREE
 from test_lifted_map import MAP as LIFTED
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-MAPS = {"cylindrical": CYLINDRICAL, "composite": COMPOSITE, "lifted": LIFTED}
+OWNED = FREE.with_legs_of(1, ARMS, 0.6)
+MAPS = {"cylindrical": CYLINDRICAL, "composite": COMPOSITE, "lifted": LIFTED, "lifted, legs of one clip": OWNED}
 
 
 def differences(end, start):

@@ -1,5 +1,6 @@
-"""What is said before a run of a lifted map whose hand pushes: the hand is pushed off its curve, and back."""
+"""A lifted map whose hand is pushed off its curve: how much of it the physical figure follows, and what is said."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from experiments.config.words import run_config
 from experiments.files.map_files import save_map
 from experiments.lifting.lift import lift_clips
 from experiments.setups import pushed_off
+from experiments.setups.alike import arms
 from experiments.setups.setups import map_parts
 from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
@@ -34,22 +36,53 @@ def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, mo
     assert apart.max() > 0.05
 
 
-@pytest.mark.parametrize(
-    ("verdict", "said"),
-    [
-        (Verdict(0.05, np.inf), ()),
-        (Verdict(0.2, np.inf), ("pushed off its curve to those beside it, the physical figure lacks 20 % of weight",)),
-        (Verdict(0.2, 3.0), ("pushed off its curve to those beside it, the physical figure falls at 3.0 s",)),
-    ],
-)
-def test_what_a_pushed_figure_does_not_follow_is_said(
-    verdict: Verdict, said: tuple[str, ...], lifted: Lifted, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def tried(*_: object) -> Verdict:
-        return verdict
+FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
+WHOLE = "pushed off its curve to those beside it, the physical figure {} with the whole map"
 
+
+@pytest.mark.parametrize(
+    ("verdicts", "legs", "share", "said"),
+    [
+        ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
+        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE.format("falls at 3.0 s"),)),
+        (
+            {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
+            1, 0.5, (WHOLE.format("lacks 20 % of weight"),),
+        ),
+        (
+            {"whole": FALLS, 1.0: Verdict(0.09, np.inf), 0.5: Verdict(0.08, np.inf), 0.25: Verdict(0.1, np.inf),
+             0.0: Verdict(0.1, np.inf)},
+            1, 0.5, (WHOLE.format("falls at 3.0 s"),),
+        ),
+        (
+            {"whole": FALLS, 1.0: Verdict(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
+            1, 0.5, (WHOLE.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
+        ),
+    ],
+)  # fmt: skip
+def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it_bears(
+    verdicts: dict[str | float, Verdict], legs: int | None, share: float, said: tuple[str, ...], lifted: Lifted,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    def tried(module: str, show: Callable[[], Lifted], *_: object) -> Verdict:
+        part = show()
+        return verdicts["whole" if part.legs_of is None else part.share]
+
+    monkeypatch.setattr(pushed_off, "toured", lambda part, curve: part)
     monkeypatch.setattr(pushed_off, "tried", tried)
-    assert pushed_off.not_followed(lifted, lifted.curve(0)) == said
+    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs))
+    assert (part.legs_of, part.share, told) == (legs, share, said)
+
+
+def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lifted) -> None:
+    curve = lifted.curve(1)
+    kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
+    alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
+    pushed, own = (pushed_off.toured(part, curve).poses for part in (kept, alone))
+    apart = np.abs(pose_difference(pushed, own))
+    upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
+    assert apart[:, upper].max() > 0.01
+    assert np.delete(apart, upper, axis=1).max() < 1e-6
 
 
 def test_a_curve_plays_its_clip_at_that_clips_pace_and_nobody_is_told_of_a_lap(lifted: Lifted, tmp_path: Path) -> None:
