@@ -1,10 +1,12 @@
 """Description of laws in plain data: names and values that can be hashed, compared and read."""
 
 import hashlib
+import pickle
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from types import CodeType, FunctionType
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any, cast
+from uuid import uuid4
 
 import numpy as np
 
@@ -55,8 +57,9 @@ def parts_of(value: Any) -> dict[str, object]:
 def code_digest(function: object) -> str:
     """Hash of what a function computes: its code, the constants that it reads, and the functions that it calls.
 
-    Numbers, strings, tuples, arrays and Python functions that the code reads enter with their content; of anything else
-    only the name is in the hash.
+    Python functions enter with their code, modules, classes and built-in functions with their names, every other value
+    with its content, as pickled. A value that cannot be pickled, as an open file, makes the hash another one each time:
+    what was found out about such a law is never taken for what runs.
     """
     return digest(*_told(function, set()))
 
@@ -74,7 +77,17 @@ def _told(value: object, seen: set[int]) -> Iterator[bytes]:
             read = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
             for cell in (*(value.__defaults__ or ()), *(c.cell_contents for c in value.__closure__ or ()), *read):
                 yield from _told(cell, seen)
-    elif value is None or isinstance(value, int | float | str | tuple):
-        yield repr(value).encode()
-    elif isinstance(value, np.ndarray):
-        yield digest(np.asarray(value, dtype=np.float64)).encode()
+    elif isinstance(value, _NAMED):
+        yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
+    else:
+        yield _content(value)
+
+
+_NAMED = (ModuleType, type, BuiltinFunctionType, np.ufunc)
+
+
+def _content(value: object) -> bytes:
+    try:
+        return pickle.dumps(value, protocol=4)
+    except (pickle.PicklingError, TypeError, AttributeError, ValueError):
+        return uuid4().bytes

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.certificates.loop.added_laws import with_added
+from controllers.certificates.loop.added_laws import exert_moments, with_added
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW
@@ -120,7 +120,7 @@ def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:
     leading = [law for law in program.laws if isinstance(law, Follow | Bunny)]
     added = tuple(law for law in program.laws if isinstance(law, FunctionLaw))
     governors = [law for law in program.laws if isinstance(law, Governor)]
-    if any(isinstance(law, Orientation) for law in program.laws):
+    if any(isinstance(law, Orientation) for law in program.laws) or exert_moments(added):
         assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
     known = (Follow, Bunny, FunctionLaw, Governor, Orientation)
     others = [type(law).__name__ for law in program.laws if not isinstance(law, known)]

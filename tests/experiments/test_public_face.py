@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hvf
+from controllers.certificates.loop.hand import NO_HANDS
 from experiments.cli import main
 from experiments.sweep import with_values
 
@@ -99,6 +100,48 @@ def test_what_cannot_be_certified_is_unknown_and_named() -> None:
     assert (branching.verdict, gated.verdict) == ("unknown", "unknown")
     assert "law floor" in branching.reason
     assert "gated" in gated.reason
+
+
+@hvf.law
+def of_time(hand, k=1e6):
+    return k * hand.t * hand.p[0], 0.0, 0.0
+
+
+@hvf.law
+def of_turn(hand, k=10.0):
+    return k * hand.q[1] * hand.p[0], k * hand.w[2], 0.0
+
+
+@hvf.law
+def of_switch(hand, k=1e6):
+    return k * hand.switch * hand.p[0], 0.0, 0.0
+
+
+@hvf.law
+def with_moment(hand, k=100.0):
+    return -k * hand.p[0], 0.0, 0.0, -0.1 * hand.w[0], 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("own", "says"),
+    [
+        (of_time, "depends on the time of the hand"),
+        (of_turn, "depends on the orientation and the angular velocity of the hand"),
+        (of_switch, "depends on the switch of the hand"),
+    ],
+)
+def test_nothing_is_certified_of_a_law_that_depends_on_more_than_position_and_velocity(own: hvf.Law, says: str) -> None:
+    found = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + own), NO_HANDS)
+    assert found.stability.verdict in ("unknown", "refuted")
+    assert f"the force of law {own.name} " in found.stability.reason
+    assert says in found.stability.reason
+    assert found.passivity.verdict == "unknown"
+
+
+def test_a_moment_of_a_law_of_ones_own_is_assumed_not_to_be_felt() -> None:
+    told = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + with_moment), NO_HANDS).stability
+    assert told.verdict == "certified"
+    assert any("moment on the stylus is not felt" in assumed for assumed in told.assumptions)
 
 
 def test_clips_and_version_are_told(capsys: pytest.CaptureFixture[str]) -> None:

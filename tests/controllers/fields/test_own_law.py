@@ -1,6 +1,7 @@
 """Laws of one's own: the same to the last bit in Python and compiled, with parameters that have names."""
 
 import math
+import threading
 
 import casadi
 import numpy as np
@@ -11,6 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra import Weight
 from controllers.fields.compiled_law import CompiledLaw
+from controllers.fields.description import code_digest
 from controllers.fields.follow import Follow
 from controllers.fields.own_law import law
 from controllers.state import HandState
@@ -146,6 +148,27 @@ def test_the_hash_of_the_code_knows_constants_and_functions_that_it_reads():
 
     assert made(1.0, 2.0) == made(1.0, 2.0)
     assert len({made(1.0, 2.0), made(1.5, 2.0), made(1.0, 2.5)}) == 3
+
+
+def test_the_hash_knows_what_lists_objects_and_tables_hold_and_trusts_nothing_that_it_cannot_read():
+    gains, table = [1.0], {"k": np.array([1.0, 2.0])}
+
+    def own(hand):
+        return 0.0, 0.0, gains[0] * table["k"][1] * hand.p[2]
+
+    before = code_digest(own)
+    assert code_digest(own) == before
+    gains[0] = 2.0
+    between = code_digest(own)
+    table["k"][1] = 3.0
+    assert len({before, between, code_digest(own)}) == 3
+    out = threading.Lock()
+
+    def locked(hand):
+        with out:
+            return 0.0, 0.0, hand.p[2]
+
+    assert code_digest(locked) != code_digest(locked)
 
 
 def test_a_composed_field_is_described_by_its_operations_and_laws():
