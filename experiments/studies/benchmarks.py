@@ -14,6 +14,7 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.curves.closest_point import closest_phase
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import Compiled, evaluate
@@ -23,11 +24,10 @@ from controllers.state import Array, HandState
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
 from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs
 from experiments.setups.session import Session
-from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
 from experiments.studies.bench_figures import Figure, tell
