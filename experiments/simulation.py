@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from rich.console import Console
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.law import Law
@@ -24,7 +25,6 @@ from experiments.setups.figure_maps import Place, composite_parts, cylindrical_p
 from experiments.setups.hands import intent_of, participant
 from experiments.setups.parts import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
-from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import assemble, check_rates
 from models.mocap.clip import Clip
 from models.scene import SceneConfig

@@ -18,7 +18,7 @@ from controllers.fields.leading import Leading
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip

@@ -16,7 +16,7 @@ class Command:
 
     def __call__(self) -> int:
         """Measure."""
-        from experiments.studies.benchmarks import bench
+        from experiments.bench.benchmarks import bench
 
         with working("measuring speed"):
             return bench(self.json, self.check)

@@ -22,11 +22,11 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip, there_and_back
 from experiments.config.maps import MAP_SUFFIX
 from experiments.files.map_files import save_map
+from experiments.fitting.blendable import not_blendable
+from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
-from experiments.setups.blendable import not_blendable
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.state import Array
-from experiments.setups.figure_legs import packed_legs
+from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.session import Session
-from experiments.setups.stylus import stylus_path
 from sim.reference.reference import make_reference, poses_along, reference_along
 
 

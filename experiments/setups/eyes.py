@@ -6,8 +6,8 @@ to the motion that she has in mind (`sim.users.eye`).
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.state import Array
-from experiments.setups.stylus import stylus_path
 from models.mocap.clip import pose_difference
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo

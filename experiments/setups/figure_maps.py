@@ -28,19 +28,19 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
-from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joints
-from experiments.setups.balance import balanced
-from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
-from experiments.setups.carried import carried
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.alike import arms, carries_alike, moves_alike, upper_joints
+from experiments.fitting.balance import balanced
+from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.fitting.carried import carried
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.pushed_off import followed_map
+from experiments.fitting.rests import with_rests
+from experiments.fitting.river_changes import with_changes
+from experiments.fitting.river_tour import not_followed
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
-from experiments.setups.pushed_off import followed_map
-from experiments.setups.rests import with_rests
-from experiments.setups.river_changes import with_changes
-from experiments.setups.river_tour import not_followed
 from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip

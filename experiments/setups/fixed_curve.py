@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.law import Law, Program
 from controllers.fields.orientation import Orientation
@@ -16,7 +17,6 @@ from experiments.results.summary import RunSummary
 from experiments.setups.budget import tank_for
 from experiments.setups.hands import handled, resolved_user, turning_remark, user_hand
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
-from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from sim.users.intent import Push
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.governor import Governor
 from controllers.fields.law import Law, Program
@@ -12,7 +13,6 @@ from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts import ClipMapParts
-from experiments.setups.stylus import stylus_path
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 

@@ -17,13 +17,13 @@ from controllers.state import Array
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.led_balance import balanced_on_ground, led_gains
 from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import participant
-from experiments.setups.led_balance import balanced_on_ground, led_gains
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
@@ -31,7 +32,6 @@ from experiments.setups.hands import (
 )
 from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
-from experiments.setups.stylus import stylus_path
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from sim.users.intent import Grab

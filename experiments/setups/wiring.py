@@ -6,20 +6,20 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from controllers.curves.stylus import UPRIGHT, stylus_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, Array
 from experiments.config.run_config import NOBODY_LED, RunConfig
 from experiments.files.device_files import linkage_of
+from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.defaults import resolved
 from experiments.setups.eyes import POSES, with_eyes
-from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
 from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
-from experiments.setups.stylus import UPRIGHT, stylus_path
 from models.humanoid.skeleton import rest_pose
 from models.mocap.clip import Clip
 from models.scene import FIGURE

@@ -1,1 +1,1 @@
-"""Experiments that could refute a claim, benchmarks, and the pictures of the docs."""
+"""Experiments that could refute a claim, and the pictures of the docs."""

@@ -10,16 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import Array
+from experiments.fitting.figure_legs import figure_legs, packed_legs
+from experiments.fitting.rests import with_rests
 from experiments.lifting.in_betweens import largest_slide, soles
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs, packed_legs
-from experiments.setups.rests import with_rests
 from experiments.setups.rivers import river_bundle
-from experiments.setups.stylus import stylus_path
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along

@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from controllers.curves.stylus import stylus_path
 from controllers.rotations import logarithm, multiply, rotate
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.results.figures import AXES, STYLE
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.run import run
-from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE
 from models.scene import FIGURE, world_model

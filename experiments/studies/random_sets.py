@@ -24,11 +24,11 @@ from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
+from experiments.fitting.alike import motion_of
+from experiments.fitting.blendable import grounded, led_by, not_blendable, off_pace
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clips
-from experiments.setups.alike import motion_of
-from experiments.setups.blendable import grounded, led_by, not_blendable, off_pace
 from experiments.setups.wiring import wire
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from experiments.studies.bench_figures import Figure, tell
-from experiments.studies.tick_cost import MODES
+from experiments.bench.figures import Figure, tell
+from experiments.bench.tick_cost import MODES
 
 FIGURES = (
     Figure("a tick", 1.4, "mj_steps", at_most=1.5),

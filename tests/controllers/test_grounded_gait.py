@@ -6,7 +6,7 @@ from figure_soles import slide, soles
 
 from controllers.haptic_map.led import Led
 from controllers.legs.grounded import runs
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference

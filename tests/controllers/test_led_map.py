@@ -8,7 +8,7 @@ from figure_soles import slide, soles
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from controllers.walking.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference

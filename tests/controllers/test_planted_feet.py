@@ -13,7 +13,7 @@ from controllers.legs.planted import levels, planted_ends, window
 from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
 from experiments.config.modes import Lead
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.clip import Clip
@@ -132,7 +132,7 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
     assert 0.4 < led.pace < 0.8
     assert gait.speed == pytest.approx(led.pace * led.stride / led.duration)
     shown = soles(figure, [led.pose(walker(s)) for s in np.arange(0.0, gait.stride, 0.01)])
-    # Within what the physical figure is led with takes for touching (`experiments.setups.led_balance`).
+    # Within what the physical figure is led with takes for touching (`experiments.fitting.led_balance`).
     assert shown[..., 2].min(axis=1).max() < 0.012
     standing = shown[..., 2].min(axis=1) < 0.003
     assert standing.mean() > 0.6

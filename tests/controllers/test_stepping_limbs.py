@@ -7,7 +7,7 @@ import pytest
 from controllers.legs.footsteps import FLOOR, STEP, limb_end
 from controllers.legs.stepping_limbs import put_limb, shortfall
 from controllers.rotations import multiply
-from experiments.setups.figure_legs import packed_legs
+from experiments.fitting.figure_legs import packed_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 

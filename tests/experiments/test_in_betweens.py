@@ -8,7 +8,7 @@ import pytest
 
 from experiments.config.maps import Cylindrical
 from experiments.config.words import run_config
-from experiments.setups.balance import nearest_supported
+from experiments.fitting.balance import nearest_supported
 from experiments.setups.clips import load_clips
 from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire

@@ -12,11 +12,11 @@ from experiments.cli import main
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
 from experiments.results.lead_measures import LeadSummary, _Retrace, support_at
 from experiments.results.soles import Soles
 from experiments.setups import clips
-from experiments.setups.figure_legs import figure_legs
 from experiments.setups.lead import gait_remark, leading, leading_hand, led_clips, led_map, s_curve, walker_argument
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose

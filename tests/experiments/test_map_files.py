@@ -18,8 +18,8 @@ from experiments.config.words import run_config
 from experiments.files.archives import read_archive, write_archive
 from experiments.files.field_files import save_field
 from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
+from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import RECORDING
-from experiments.setups.figure_legs import figure_legs
 from experiments.setups.wiring import wire
 from models.mocap.library import embedded
 from models.scene import SceneConfig

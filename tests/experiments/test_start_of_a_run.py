@@ -7,7 +7,7 @@ import pytest
 
 from controllers.haptic_map.lifted import Lifted
 from experiments.files.map_files import save_map
-from experiments.setups.figure_legs import figure_legs
+from experiments.fitting.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 from tests.experiments.own_process import RUNS, TELLS, compiled, process

@@ -8,8 +8,8 @@ import pytest
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
 from controllers.haptic_map.lifting.room import Room
+from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
-from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, rest_pose
 from models.mocap.clip import Clip, pose_difference

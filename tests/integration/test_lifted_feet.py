@@ -6,10 +6,10 @@ import pytest
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from controllers.motion.lap import MEMORY
+from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.in_betweens import measure_motion
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.map_quality import in_between, neighbours
-from experiments.setups.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names

@@ -7,18 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
 from experiments.config.words import run_config
-from experiments.setups import river_changes, river_tour
+from experiments.fitting import river_changes, river_tour
+from experiments.fitting.figure_legs import figure_legs, packed_legs
+from experiments.fitting.rests import with_rests
+from experiments.fitting.verdict import Verdict
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs, packed_legs
-from experiments.setups.rests import with_rests
 from experiments.setups.rivers import river_bundle
 from experiments.setups.setups import map_parts
-from experiments.setups.stylus import stylus_path
-from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip, pose_difference
 from sim.reference.reference import make_reference, poses_along, reference_along

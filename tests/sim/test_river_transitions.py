@@ -6,16 +6,16 @@ import mujoco
 import numpy as np
 import pytest
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
+from experiments.fitting.balance import nearest_supported
+from experiments.fitting.figure_legs import figure_legs, packed_legs
+from experiments.fitting.rests import with_rests
 from experiments.lifting.in_betweens import soles
-from experiments.setups.balance import nearest_supported
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs, packed_legs
-from experiments.setups.rests import with_rests
 from experiments.setups.rivers import river_bundle
-from experiments.setups.stylus import stylus_path
 from experiments.studies.change_trials import (
     BLEND,
     LAP,

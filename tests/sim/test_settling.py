@@ -4,15 +4,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.hands import edited_until
 from experiments.setups.stretch import flight_remarks
-from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference

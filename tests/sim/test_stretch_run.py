@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from controllers.curves.closest_point import closest_phases
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
@@ -15,7 +16,6 @@ from experiments.results.stretch_figure import draw_stretch
 from experiments.results.stretch_summary import stretch_summary
 from experiments.setups.session import Session
 from experiments.setups.stretch import stretch_grabs, stretch_parts
-from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError

@@ -2,18 +2,18 @@
 
 Curves lie some 10 mm apart, and 2.5 N push a hand by 8: at any moment of the lap, not only where motions agree, and
 within 0.15 s. Where the figure does not follow the whole map, its legs and trunk stay with the curve's own clip, and it
-carries as large a share of the others' arms as it can, as on the cylinder (`experiments.setups.carried`).
+carries as large a share of the others' arms as it can, as on the cylinder (`experiments.fitting.carried`).
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
-from experiments.setups.carried import SHARES, WELL, push_profile
-from experiments.setups.stylus import stylus_path
-from experiments.setups.verdict import Verdict, tried
+from experiments.fitting.carried import SHARES, WELL, push_profile
+from experiments.fitting.verdict import Verdict, tried
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 

@@ -18,8 +18,8 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
-from experiments.setups.alike import motion_of
-from experiments.setups.verdict import Verdict, tried
+from experiments.fitting.alike import motion_of
+from experiments.fitting.verdict import Verdict, tried
 from models.mocap.clip import Clip
 from models.mocap.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.river_clips import RIVER, RiverClips
-from experiments.setups.balance import nearest_supported
-from experiments.setups.stylus import stylus_path
+from experiments.fitting.balance import nearest_supported
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import poses_along
 

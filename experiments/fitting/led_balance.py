@@ -1,11 +1,11 @@
-"""Balance of led figures: a sway for captured clips and for gaits too slow to fly (`experiments.setups.balance`)."""
+"""Balance of led figures: a sway for captured clips and for gaits too slow to fly (`experiments.fitting.balance`)."""
 
 import mujoco
 import numpy as np
 
 from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
-from experiments.setups.balance import measured_laps, nearest_supported, sway_of
+from experiments.fitting.balance import measured_laps, nearest_supported, sway_of
 from sim.body.figure import FigureGains
 from sim.reference.reference import poses_along
 

@@ -3,7 +3,7 @@
 import pytest
 from rich.console import Console
 
-from experiments.studies.trial_cost import grown, overhead, start_seconds
+from experiments.bench.trial_cost import grown, overhead, start_seconds
 
 QUIET = Console(quiet=True)
 

@@ -11,14 +11,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
 from controllers.state import Array
 from experiments.files.kept import is_kept, kept_array
-from experiments.setups.figure_legs import packed_legs
-from experiments.setups.stylus import stylus_path
+from experiments.fitting.figure_legs import packed_legs
 from experiments.working import working
 from models.mocap import quaternions
 from models.mocap.clip import Clip

@@ -10,7 +10,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.motion.loops import checked_clip, closed_loop
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.setups.blendable import grounded, keeps_pace, not_blendable
+from experiments.fitting.blendable import grounded, keeps_pace, not_blendable
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from experiments.setups import carried as rule
-from experiments.setups.alike import arms
-from experiments.setups.carried import carried, sound, toured, verdict_on
-from experiments.setups.figure_legs import figure_legs
-from experiments.setups.verdict import Verdict
+from experiments.fitting import carried as rule
+from experiments.fitting.alike import arms
+from experiments.fitting.carried import carried, sound, toured, verdict_on
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 

@@ -1,6 +1,6 @@
 """Costs of a study besides its trials: overhead, scaling over threads, memory, and start-up time.
 
-``python -m experiments.studies.trial_cost 10000`` prints the overhead, and how memory grows over 10000 short trials.
+``python -m experiments.bench.trial_cost 10000`` prints the overhead, and how memory grows over 10000 short trials.
 """
 
 import subprocess
@@ -85,7 +85,7 @@ class _Watched(Threads):
 
 def start_seconds() -> float:
     """Time from the start of a new process to the first row of its study [s]."""
-    code, begin = "from experiments.studies.trial_cost import first_row; first_row()", time.perf_counter()
+    code, begin = "from experiments.bench.trial_cost import first_row; first_row()", time.perf_counter()
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.readline()

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config.run_config import Figure
-from experiments.setups.figure_legs import packed_legs
-from experiments.setups.stylus import stylus_path
-from experiments.setups.verdict import tried
+from experiments.fitting.figure_legs import packed_legs
+from experiments.fitting.verdict import tried
 from models.mocap.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 

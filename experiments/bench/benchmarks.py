@@ -14,29 +14,29 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.curves.closest_point import closest_phase
+from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, HandState
+from experiments.bench.field_cost import heaviest_field, tick_microseconds
+from experiments.bench.figure_cost import figure_cost
+from experiments.bench.figures import Figure, tell
+from experiments.bench.page_cost import picture_microseconds
+from experiments.bench.recorder_cost import recorder_cost
+from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
+from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
 from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_legs import figure_legs
 from experiments.setups.session import Session
-from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
-from experiments.studies.bench_figures import Figure, tell
-from experiments.studies.field_cost import heaviest_field, tick_microseconds
-from experiments.studies.figure_cost import figure_cost
-from experiments.studies.page_cost import picture_microseconds
-from experiments.studies.recorder_cost import recorder_cost
-from experiments.studies.tick_cost import MODES, STEP, prepared, tick_cost
-from experiments.studies.trial_cost import trial_cost
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
@@ -54,7 +54,7 @@ _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 
 
 def bench(as_json: bool = False, check: bool = False) -> int:
-    """Measure and print all figures; see `experiments.studies.bench_figures.tell` for the arguments and the result."""
+    """Measure and print all figures; see `experiments.bench.figures.tell` for the arguments and the result."""
     return tell(figures(), as_json, check)
 
 

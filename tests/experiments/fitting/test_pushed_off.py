@@ -10,11 +10,11 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
+from experiments.fitting import pushed_off
+from experiments.fitting.alike import arms
+from experiments.fitting.verdict import Verdict
 from experiments.lifting.lift import lift_clips
-from experiments.setups import pushed_off
-from experiments.setups.alike import arms
 from experiments.setups.setups import map_parts
-from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 

@@ -1,0 +1,1 @@
+"""What `hvf bench` measures: speed, as ratios within one run."""
