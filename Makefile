@@ -57,7 +57,7 @@ gate: $(READY)
 
 fuzz: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
-	$(BIN)/python tests/models/mocap/fuzz_readers.py -max_total_time=300
+	$(BIN)/python tests/models/mocap/readers/fuzz_readers.py -max_total_time=300
 
 # Injects every fault, and writes the table of docs/validation/fault-matrix.md.
 fault-table: $(READY)

@@ -29,19 +29,19 @@ from controllers.state import HandState, Wrench
 from experiments.certify.certify_simulation import certify
 from experiments.config.run_config import Clock, Figure, Phantom
 from experiments.public import circle, clips, load, version
-from experiments.run_result import Run
-from experiments.simulation import Composite, Cylindrical, Simulation, Tick, User
-from experiments.sweep import Swept, sweep
+from experiments.runs.run_result import Run
+from experiments.runs.simulation import Composite, Cylindrical, Simulation, Tick, User
+from experiments.runs.sweep import Swept, sweep
 from experiments.trials.study import Study
 from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
 from models.humanoid.skeleton import rest_pose
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.users import intents
-from sim.users.intent import Grab, Push, Turn
-from sim.users.person import Person
-from sim.users.population import persona, population
+from sim.users.hand.actions import Grab, Push, Turn
+from sim.users.person.person import Person
+from sim.users.person.population import persona, population
 
 __version__ = version()
 __all__ = [

@@ -9,6 +9,7 @@ f departs from the identity at a with f' = 1 and f'' = 0, and is constant, a + m
 import numpy as np
 from numba import njit
 
+from controllers.easing import cubic_step
 from controllers.state import Array
 
 
@@ -20,8 +21,8 @@ def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, fl
         return x, 1.0
     edge, sign = (high, 1.0) if x > high else (low, -1.0)
     u = min(beyond / margin, 1.0)
-    # Integral of 1 − 3u² + 2u³, which leaves 1 and reaches 0 without a kink.
-    return edge + sign * margin * (u - u**3 + 0.5 * u**4), 1.0 - u * u * (3.0 - 2.0 * u)
+    # Integral of 1 − S₃(u), which leaves 1 and reaches 0 without a kink.
+    return edge + sign * margin * (u - u**3 + 0.5 * u**4), 1.0 - cubic_step(u)
 
 
 @njit

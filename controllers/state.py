@@ -13,6 +13,7 @@ from numba import njit
 
 Array: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
+Mask: TypeAlias = npt.NDArray[np.bool_]
 Vec3: TypeAlias = npt.NDArray[np.float64]
 Quat: TypeAlias = npt.NDArray[np.float64]
 Pose: TypeAlias = npt.NDArray[np.float64]

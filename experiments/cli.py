@@ -1,6 +1,6 @@
 """The ``hvf`` command: haptic vector fields from the command line."""
 
-from experiments import started  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
+from experiments.console import started  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
 
 # isort: split
 
@@ -22,8 +22,8 @@ import tyro
 
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
+from experiments.console.welcome import WELCOME, next_step
 from experiments.results.folder import RECORDING
-from experiments.welcome import WELCOME, next_step
 from models.errors import ModelError
 from sim.errors import SimError
 

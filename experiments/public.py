@@ -4,8 +4,8 @@ from importlib.metadata import version as installed
 from pathlib import Path
 
 from controllers.curves.trajectory import Trajectory
-from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names, load_clip
+from models.mocap.motion.clip import Clip
 
 
 def clips(*names: str) -> tuple[Clip, ...]:

@@ -1,4 +1,4 @@
-"""Type alias of float64 arrays."""
+"""Type aliases of arrays; `controllers.state` has its own, since neither package knows the other."""
 
 from typing import TypeAlias
 
@@ -6,3 +6,5 @@ import numpy as np
 import numpy.typing as npt
 
 Array: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+Mask: TypeAlias = npt.NDArray[np.bool_]

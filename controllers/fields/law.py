@@ -228,19 +228,6 @@ class Program(Law):
             memory[slot:first] = haptic_map.pose(stylus, kept)
             memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
 
-    def slot_of(self, law: Law) -> int:
-        """Offset of one of the field's laws in the memory.
-
-        Raises
-        ------
-        ParameterError
-            If the law is not part of this field.
-        """
-        for row, own in zip(self.ops[self.ops[:, 0] >= 0], self.laws, strict=True):
-            if own is law:
-                return int(row[2])
-        raise ParameterError(f"{law!r} is no law of this field; it has {', '.join(map(repr, self.laws))}")
-
     def composition(self) -> Iterator[tuple[Law | Join, Array]]:
         """Laws and operations in postfix order, each with the operation's parameters (none for a law)."""
         laws = iter(self.laws)

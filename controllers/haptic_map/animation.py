@@ -35,8 +35,6 @@ class ClipMap(HapticMap):
         Names of the clips, all different.
     limbs : sequence of Limb
         Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
-    drifts : Array, shape (m, 3)
-        ξ of each clip (see `loops`).
     """
 
     def __init__(
@@ -47,12 +45,11 @@ class ClipMap(HapticMap):
         clips: Sequence[tuple[Array, float]],
         names: Sequence[str],
         limbs: Sequence[Limb],
-        drifts: Array,
     ) -> None:
         self._kind, self._kernel, self._params = kind, kernel, params
         # Stored as given, so that a map made of them again is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
-        self.names, self.limbs, self._travels = tuple(names), tuple(limbs), bool(drifts.any())
+        self.names, self.limbs = tuple(names), tuple(limbs)
 
     @property
     def nq(self) -> int:
@@ -68,11 +65,6 @@ class ClipMap(HapticMap):
     def lap_seconds(self) -> float:
         """Duration of a lap at which the clips run on average at their own pace [s]."""
         return float(np.mean([(len(poses) - 1) / fps for poses, fps in self.clips]))
-
-    @property
-    def travels(self) -> bool:
-        """Whether a lap moves or turns the figure, so that h depends on the number of laps done."""
-        return self._travels
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with the memory of a new run."""
@@ -151,9 +143,8 @@ class AnimationMap(ClipMap):
         frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in self.loops)
         samples = int(np.clip(np.ceil(frames), 64, 2048))
         params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
-        drifts = np.stack([loop.drift for loop in self.loops])
         self._lap_seconds = float(np.mean([loop.duration for loop in self.loops]))
-        super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs, drifts)
+        super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs)
 
     @property
     def lap_seconds(self) -> float:

@@ -21,7 +21,7 @@ from numba import njit
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.legs.grounded import Mask, grounded, hastened, runs
+from controllers.legs.grounded import grounded, hastened, runs
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
@@ -29,7 +29,7 @@ from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
 from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
 from controllers.rotations import multiply, relative
-from controllers.state import Array, Pose
+from controllers.state import Array, Mask, Pose
 from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,

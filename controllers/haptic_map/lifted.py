@@ -235,7 +235,7 @@ class Lifted(ClipMap):
         self.legs_of: int | None = None
         self.share = 1.0
         limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
-        super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs, self._drifts)
+        super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs)
 
     @property
     def _drifts(self) -> Array:
@@ -254,12 +254,6 @@ class Lifted(ClipMap):
     def angles(self) -> tuple[Array, ...]:
         """θ_i(t_k) of each clip [rad]."""
         return tuple(clip.angles for clip in self._placed)
-
-    @property
-    def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Intervals of r and z [m] that contain all sites; beyond them the stylus is clamped."""
-        low, high = box(self.sites)
-        return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
     def placed(self, i: int) -> Array:
         """Poses of clip i (n, nq) after its displacement to the origin: h along its curve, from the first lap on."""

@@ -25,7 +25,7 @@ from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import turned
 from controllers.state import Array
 
-_CLEAR, _TOUCHES = 0.005, 0.004  # [m] h_c, and the height below which a moving point counts fully as dragged
+_CLEAR, _DRAGGED_FULLY = 0.005, 0.004  # [m] h_c, and the height below which a moving point counts fully as dragged
 _LEAST, _MOST = 0.0265, 0.029  # D_0, D_1 [m]
 _DEEP = 0.005  # h_d [m]
 _FAST = 0.3  # v [m per lap]
@@ -95,7 +95,7 @@ def _lacking(end: MeanEnd, levers: Array, d: Array, ground: Array) -> Array:
     place = (end.place[..., :2] + d[..., :2])[..., None, :] + turned(d[..., 3:], levers[..., :2])
     place = turned(end.angle[..., None], np.concatenate([place, place[:1]])) + end.shift[..., None, :]
     way = np.linalg.norm(np.diff(place, axis=0), axis=-1)
-    touches = smooth_steps(low / (_CLEAR - _TOUCHES))
+    touches = smooth_steps(low / (_CLEAR - _DRAGGED_FULLY))
     moment = max(1, round(_MOMENT * n))
     on_ground = way * np.minimum(touches, np.roll(touches, -1, axis=0))
     dragged = moment * uniform_filter1d(on_ground, moment, axis=0, mode="wrap")

@@ -31,9 +31,9 @@ from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 _SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights
-_FREE = 0.008  # h_0 [m], height from which the foot moves freely
-STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] height up to which it does not move; at most this share of the largest lift
-_SHARE_FREE = 0.5  # h_0 is at most this share of the largest lift of the lap
+_SWING_HEIGHT = 0.008  # h_0 [m], height from which the foot moves freely
+_STANCE_HEIGHT, _SHARE_STANCE = 0.003, 0.2  # [m] height up to which it does not move; share of the lap's lift at most
+_SHARE_SWING = 0.5  # h_0 is at most this share of the largest lift of the lap
 _LIFTED = 0.002  # [m] a foot that is never lifted by more than this is not held
 _RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap, at least
@@ -208,8 +208,8 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     raised = np.maximum(0.0, _raise(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    least = np.minimum(STANDS, _SHARE_STANDS * highest)
-    free = smooth_steps((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
+    least = np.minimum(_STANCE_HEIGHT, _SHARE_STANCE * highest)
+    free = smooth_steps((up - least) / np.maximum(np.minimum(_SWING_HEIGHT, _SHARE_SWING * highest) - least, 1e-6))
     # A foot that the clips do not lift follows the mean.
     held = smooth_steps(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)

@@ -25,11 +25,11 @@ from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-_STANDS, _FREE = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
+_STANCE_HEIGHT, _SWING_HEIGHT = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
 _MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0
 _FADE, _FADE_ALONE = 5.0, 1.0  # κ [1/rad], and the additional rate where a clip is alone
 _MOST, _MOST_TURN = 0.15, 0.8  # [m], [rad] largest offset
-_TOUCH = 1e-3  # [m] scale of heights in the weights of the touching points
+_CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
 _TURNED = 0.15  # [rad] way back after which the hand's direction counts as reversed
 _JUMP = 1.0  # [rad] larger than any step of the hand's angle in one tick
 _WAY, _BEHIND, _ANGLE, _ENDS = range(4)
@@ -136,7 +136,7 @@ def keep_footing(
     turn = _yawed(frame[2] + state[_OFFSET + 2], q)
     low = _levers(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stands = _step_down(end[2] + low - ground, _STANDS, _FREE)
+    stands = _step_down(end[2] + low - ground, _STANCE_HEIGHT, _SWING_HEIGHT)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MOST**2 + (state[_OFFSET + 2] / _MOST_TURN) ** 2
     held = stands * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0
@@ -150,7 +150,7 @@ def keep_footing(
         turned_c, turned_s = np.cos(back), np.sin(back)
         total, moved_x, moved_y = 0.0, 0.0, 0.0
         for i in range(points):
-            touch = np.exp((low - levers[i, 2]) / _TOUCH) + np.exp((low_before - before[i, 2]) / _TOUCH)
+            touch = np.exp((low - levers[i, 2]) / _CONTACT_SCALE) + np.exp((low_before - before[i, 2]) / _CONTACT_SCALE)
             moved_x += touch * (turned_c * levers[i, 0] - turned_s * levers[i, 1] - before[i, 0])
             moved_y += touch * (turned_s * levers[i, 0] + turned_c * levers[i, 1] - before[i, 1])
             total += touch

@@ -13,16 +13,13 @@ root is lowered, smoothly over the lap, until both legs reach the ground.
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
 
 from controllers.curves.splines import round_lap
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import extension, shortfall
-from controllers.state import Array
-
-Mask = npt.NDArray[np.bool_]
+from controllers.state import Array, Mask
 
 _AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: their excess over 1 gives a double support of a tenth of the flight
 _LOWEST = 0.3  # [m] largest lowering of the root: a leap that needs more cannot become a step

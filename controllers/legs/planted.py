@@ -25,17 +25,17 @@ from scipy.spatial.transform import Rotation
 from controllers.curves.splines import round_lap
 from controllers.easing import smooth_steps
 from controllers.legs.footfalls import gap
-from controllers.legs.grounded import Mask, runs
+from controllers.legs.grounded import runs
 from controllers.legs.limb_ends import contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import reached, shortfall
 from controllers.motion.loops import plane_exponential, turned, yawed
-from controllers.state import Array
+from controllers.state import Array, Mask
 
-_SWINGS = 0.35  # share of a swing at each end over which g rises
-_STANDS = 0.01  # share of a stance at each end over which h rises: feet touch down and lift off with a small slip
-_RESTS, _LONGEST_REST = 0.15, 0.03  # share of a stance at each end, and at most [s], in which its height settles
-_LIFTS = 0.12  # share of a swing at each end over which the least clearance is reached
+_SWING_EDGE = 0.35  # share of a swing at each end over which g rises
+_STANCE_EDGE = 0.01  # share of a stance at each end over which h rises: feet touch down and lift off with a small slip
+_LEVEL_EDGE, _LEVEL_SECONDS = 0.15, 0.03  # share of a stance at each end, and at most [s], in which its height settles
+_LIFT_EDGE = 0.12  # share of a swing at each end over which the least clearance is reached
 _SMOOTH = 0.0025  # [m] smoothing of a maximum of heights
 _CLEAR = 0.01  # h_0 [m], least height of a foot in swing
 _CATCH_UP = 8.0  # κ ∫ g over a lap
@@ -84,7 +84,7 @@ def planted_ends(
     ends : Array, shape (n, 5)
         Position (3), λ, height of the lowest point.
     """
-    n, stays, free = len(channels), window(stands, _STANDS), window(~stands, _SWINGS)
+    n, stays, free = len(channels), window(stands, _STANCE_EDGE), window(~stands, _SWING_EDGE)
     if stands.all() or not stands.any():
         # Without swing, or without stance, the phase advances uniformly.
         free = np.ones(n)
@@ -105,8 +105,8 @@ def planted_ends(
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
-    low = (1.0 - window(stands, _RESTS, _LONGEST_REST * n / duration)) * _above(0.0, heights - level)
-    ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
+    low = (1.0 - window(stands, _LEVEL_EDGE, _LEVEL_SECONDS * n / duration)) * _above(0.0, heights - level)
+    ends[:, 2] += low + window(~stands, _LIFT_EDGE) * (_above(_CLEAR, low) - low) - heights
     return quaternions, ends
 
 

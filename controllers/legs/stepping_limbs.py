@@ -24,7 +24,7 @@ from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-_TOUCHES = 0.12  # [m] height of a foot above which the root is not lowered for it
+_REACHED_FOR = 0.12  # [m] height of a foot above which the root is not lowered for it
 _EASE = 0.95  # extension of a limb over its length that the root is lowered for
 _BENT, _GIVES = 0.01, 0.1  # b and g, in lengths of the limb
 _ROLL, _LEVER = 0.7, 0.15  # [rad] largest roll of a sole over its edge, [m] gain of reach per radian
@@ -77,7 +77,7 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
     # The root is not lowered for a foot that is far behind.
     short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
-    return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES)
+    return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _REACHED_FOR)
 
 
 @njit

@@ -51,7 +51,7 @@ TRANSITIONS: dict[tuple[State, Event], State] = {
 _NEXT = np.array([[TRANSITIONS.get((state, event), state) for event in Event] for state in State], dtype=np.int64)
 
 # Plain integers: numba freezes globals, but would look up a member of an enumeration in each kernel.
-DISARMED, ARMING, RAMPING, ACTIVE, FAULT = (int(state) for state in State)
+DISARMED, ARMING, RAMPING, ACTIVE, _ = (int(state) for state in State)
 ARM, QUIET, RAMPED, RELEASED, DISARM, FAULTED, CLEAR = (int(event) for event in Event)
 NO_REQUEST = -1
 

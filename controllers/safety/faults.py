@@ -84,7 +84,7 @@ _WORDS = {
     Fault.TOO_FAST: "the stylus moved at {:.3g} m/s",
     Fault.MOTORS_HOT: "the motors have used {:.0%} of what they can dissipate",
     Fault.SERVO_LATE: "the servo was {:.3g} s late",
-    Fault.CONTROL_LOST: "who controls the run has not been heard for {:.3g} s",
+    Fault.CONTROL_LOST: "the process that controls the run has not been heard for {:.3g} s",
     Fault.MOTORS_OFF: "the device left its motors off for {:.3g} s after it was told to switch them on",
     Fault.CLOCK_BACK: "the device's clock went back by {:.3g} s",
 }

@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.state import Array
+from controllers.state import Array, Mask
 
 _PERIOD, _PASS, _THRESHOLD, _LEAK, _MOST, _DOWN, _UP, _FORGET, _LONGEST = range(9)
 OSCILLATION_LAST, OSCILLATION_COUNT, OSCILLATION_GAIN, OSCILLATION_TIME, OSCILLATION_SIZE = 3, 6, 7, 8, 9
@@ -126,7 +125,7 @@ class OscillationDetector:
         return memory
 
 
-def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> npt.NDArray[np.bool_]:
+def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> Mask:
     """Ticks of a recorded force at which the detector finds an oscillation, with the gain kept at 1; shape (n,).
 
     Parameters

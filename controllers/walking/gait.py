@@ -13,13 +13,12 @@ first share `WITHIN` of the stance, so that the figure pushes off as in its clip
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.checks import checked
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
-from controllers.state import Array
+from controllers.state import Array, IntArray
 
 # A decision: u, u_0 at the entry of the stance, u_1, and the end of the stance at which it was entered
 # (0: begin, 1: end, when going backwards; −1 in flight).
@@ -98,7 +97,7 @@ class Gait:
 
     stride: float
     speed: float
-    support: npt.NDArray[np.int64]
+    support: IntArray
     reach: float
     grounded: bool = False
 

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.curves.closest_point import closest_phase
@@ -20,7 +19,7 @@ from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array, HandState
+from controllers.state import Array, HandState, IntArray
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
 from experiments.bench.figures import Figure, tell
@@ -38,15 +37,13 @@ from experiments.setups.session import Session
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.loop.servo import run_block
-
-IntArray = npt.NDArray[np.int64]
 
 ROUNDS = 7
 _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"

@@ -9,7 +9,7 @@ import viser
 
 from experiments.live.messages import SLICE_SIDE
 from experiments.setups.session import Session
-from models.scene import P_WH
+from models.world.scene import P_WH
 from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Shown

@@ -15,12 +15,12 @@ import psutil
 from rich.console import Console
 
 from experiments.config.part import to_json
-from experiments.trials.database import Database
-from experiments.trials.drive import run_missing, warm
-from experiments.trials.plan import Trial, planned
-from experiments.trials.run_trial import SHELF, Row, Task
-from experiments.trials.study_config import StudyConfig, study_from
-from experiments.trials.threads import Threads
+from experiments.trials.design.plan import Trial, planned
+from experiments.trials.design.study_config import StudyConfig, study_from
+from experiments.trials.execution.database import Database
+from experiments.trials.execution.drive import run_missing, warm
+from experiments.trials.execution.threads import Threads
+from experiments.trials.trial.run_trial import SHELF, Row, Task
 
 _THREADS, _SHORT, _MANY = 2, 0.02, 2_000  # simultaneous trials; duration of a short trial [s]; number of short trials
 

@@ -1,4 +1,4 @@
-"""Figures of flights: a clip compared with free fall, and trials of the physical figure at many playback rates.
+"""Trials of flights: the physical figure flies the longest flight of clips at many playback rates.
 
 ``python -m experiments.certify.ballistic_figures docs/pictures ../shared/mocap`` flies the embedded jump and backflip
 and two captured jumps, draws the picture of the docs and prints its table.
@@ -15,36 +15,10 @@ from matplotlib.figure import Figure
 
 from controllers.certificates.flight.ballistic import FlightJudgement
 from controllers.certificates.flight.flight_fit import best_fall
-from controllers.certificates.flight.tolerance import GRAVITY
 from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 
-_COLORS = {"certified": "#2a7f4f", "refuted": "#c2473b", "unknown": "#b98a1d"}
 _RATES = 13  # number of rates flown by the physical figure
-
-
-def flights_figure(ballistics: ClipBallistics) -> Figure:
-    """Height of the centre of mass with the best-fitting free fall of each flight, and admissible rates by frame."""
-    motion = ballistics.motion
-    times = np.arange(len(ballistics.bounds.low)) / motion.fps
-    drawing = Figure(figsize=(7.2, 4.8), layout="constrained")
-    height, rate = drawing.subplots(2, 1, sharex=True)
-    height.plot(times, motion.com[: len(times), 2], color="#566072", label="centre of mass")
-    for flight in ballistics.flights:
-        a, b = flight.fit.start, flight.fit.end
-        _, (p, v) = best_fall(motion.com[a : b + 1], motion.fps, 1.0)
-        t = np.linspace(0.0, flight.fit.duration, 40)
-        color = _COLORS[flight.verdict]
-        height.axvspan(a / motion.fps, b / motion.fps, color=color, alpha=0.15, lw=0)
-        height.plot(a / motion.fps + t, p[2] + v[2] * t - GRAVITY / 2 * t**2, color=color, ls="--", label="free fall")
-    height.set(ylabel="height [m]", title="flights: green certified, red refuted, yellow unknown")
-    height.legend(*_once(height), frameon=False, fontsize=8)
-    rate.fill_between(
-        times, ballistics.bounds.low, np.minimum(ballistics.bounds.high, 3.0), color="#dbe7f4", step="mid"
-    )
-    rate.axhline(1.0, color="#566072", lw=0.8)
-    rate.set(ylabel="admissible rate σ", xlabel="time [s]", ylim=(0.0, 3.0), xlim=(times[0], times[-1]))
-    return drawing
 
 
 class FlownClip(NamedTuple):
@@ -114,12 +88,6 @@ def _draw_rates(
     ax.set_ylabel("distance of centres of mass [cm]")
     ax.set_ylim(bottom=0)
     ax.legend(frameon=False, fontsize=7)
-
-
-def _once(ax: Axes) -> tuple[list[object], list[str]]:
-    handles, labels = ax.get_legend_handles_labels()
-    named = dict(zip(labels, handles, strict=True))
-    return list(named.values()), list(named)
 
 
 def main(folder: Path, mocap: Path) -> None:

@@ -13,7 +13,7 @@ from experiments.flights.ballistics import clip_ballistics
 from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.results.measures import SETTLING
 from experiments.setups.setups import clips_for
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 
 PLAYED = "as played"

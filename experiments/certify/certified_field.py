@@ -22,7 +22,7 @@ from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
 from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, left_out
 from experiments.setups.defaults import resolved
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
 _Timed = Callable[[Trajectory], Trajectory]

@@ -21,7 +21,7 @@ from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 QUARTERS = 0.25 * np.pi * np.arange(4)
 _ASSUMPTIONS = (
@@ -123,7 +123,7 @@ def leading_energy(field: Leading) -> Verdict:
         f"{force / field.b:.3g} m/s; ahead and aside they can do so for as long as it goes round in a loop"
     )
     figures: dict[str, object] = {"power_bound": power, "speed_bound": force / field.b}
-    assumptions = ("damping by the hand's own velocity: what sampling, filter and delay add is told by passivity",)
+    assumptions = ("damping by the hand's own velocity: passivity judges what sampling, filter and delay add",)
     return Verdict("certified", reason, None, assumptions, {}, figures)
 
 

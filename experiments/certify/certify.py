@@ -39,7 +39,7 @@ from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, left_out
 from experiments.setups.clips import load_clips
 from experiments.setups.defaults import resolved
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
 _MOMENT = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"

@@ -24,7 +24,7 @@ from controllers.fields.orientation import Orientation
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.executed_field import seen
 from experiments.files.device_files import linkage_of
-from experiments.simulation import Simulation
+from experiments.runs.simulation import Simulation
 
 
 @dataclass(frozen=True)

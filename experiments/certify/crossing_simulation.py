@@ -12,7 +12,7 @@ from controllers.fields.program import evaluate
 from controllers.state import POSITION, Array
 from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense, sensed_before
 from sim.world.world import phantom_angles
 

@@ -14,7 +14,7 @@ from controllers.safety.limiter import ForceLimiter
 from experiments.config.run_config import RunConfig
 from experiments.setups.parts import Parts
 from experiments.setups.setups import map_parts, parts_of
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.world.world import World
 
 REACH = 0.025  # [m] for maps that define no reach

@@ -10,7 +10,6 @@ from types import FunctionType
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.certificates.loop.hand import HandImpedance
@@ -25,15 +24,13 @@ from controllers.fields.program import Compiled, evaluate
 from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
-from models.scene import PHANTOM, R_WP
+from models.world.scene import PHANTOM, R_WP
 from sim.compilation.compiled import entry_point
 from sim.errors import SimError
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense, sensed_before
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
-
-IntArray = npt.NDArray[np.int64]
 
 LAP = 1e6  # [s] of a lap: so slow that a trial is about one configuration
 START = 1e-6  # [m] distance from the curve at which a trial begins

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.run_config import ArmConfig
-from experiments.saying import Json, say
+from experiments.console.saying import Json, say
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Command:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.run_arm import run_arm
+        from experiments.runs.run_arm import run_arm
 
         say(run_arm(self.config, self.out, self.overwrite), self.json)
         return 0

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from experiments.saying import Json
-from experiments.working import working
+from experiments.console.saying import Json
+from experiments.console.working import working
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
 from experiments.config.words import Options, RunOptions, config_of_options
-from experiments.saying import Json, say
-from experiments.working import working
-from models.mocap.clip import Clip
+from experiments.console.saying import Json, say
+from experiments.console.working import working
+from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 ASKED = "asked.json"

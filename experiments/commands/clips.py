@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from experiments.saying import Json, say
+from experiments.console.saying import Json, say
 
 
 @dataclass(frozen=True)

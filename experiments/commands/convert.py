@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.saying import Json, say
+from experiments.console.saying import Json, say
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,8 @@ class Command:
     """The file's axis that points up, such as +Y, where the motion does not tell."""
     rest_frame: int | None = None
     """A frame in which the body stands upright with level feet, where the motion does not tell."""
+    roles: Path | None = None
+    """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
     overwrite: bool = False
     """Replace the target if it exists."""
     json: Json = False
@@ -31,7 +33,7 @@ class Command:
         from models.mocap.readers.own_bvh import write_bvh
         from models.mocap.retargeting.retarget import Hints
 
-        hints, writers = Hints(self.up, self.rest_frame), {".bvh": write_bvh, ".glb": write_gltf}
+        hints, writers = Hints(self.up, self.rest_frame, self.roles), {".bvh": write_bvh, ".glb": write_gltf}
         report = convert(self.source, self.target, self.overwrite, hints, writers).report
         own = "the figure's own skeleton: nothing to retarget"
         say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.saying import Json, say
-from experiments.started import STARTED
+from experiments.console.saying import Json, say
+from experiments.console.started import STARTED
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class Command:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.demo import demo_config
-        from experiments.run import run
+        from experiments.runs.demo import demo_config
+        from experiments.runs.run import run
 
         say(run(demo_config(), self.out, self.overwrite, STARTED), self.json)
         return 0

@@ -1,4 +1,4 @@
-"""What ``hvf figures`` is told."""
+"""``hvf figures``: the figures of the paper, drawn from runs."""
 
 import time
 from dataclasses import dataclass

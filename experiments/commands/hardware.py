@@ -28,7 +28,7 @@ class ListDevices:
             return 0
         for device in devices:
             print(f"{device.name or '-':24} {device.where()}")
-            print(f"{'':24} {device.who()}: {device.note}")
+            print(f"{'':24} {device.maker_and_product()}: {device.note}")
         if not devices:
             print("no device found; `hvf hardware doctor` says what may be missing")
         return 0
@@ -69,7 +69,7 @@ class Doctor:
             return 0
         for device in devices:
             print(f"device   {device.name or '-'}: {device.where()}")
-            print(f"{'':9}{device.who()}: {device.note}")
+            print(f"{'':9}{device.maker_and_product()}: {device.note}")
         for finding in looked:
             print("\n".join(finding.lines()))
         print(

@@ -1,4 +1,4 @@
-"""What ``hvf live`` is told."""
+"""``hvf live``: a run in the browser."""
 
 from pathlib import Path
 from typing import Annotated

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.working import working
+from experiments.console.working import working
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What ``hvf prepare`` is told."""
+"""``hvf prepare``: a motion file made a well-formed clip."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Annotated
 
 import tyro
 
-from experiments.saying import Json, say
-from experiments.working import working
+from experiments.console.saying import Json, say
+from experiments.console.working import working
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,8 @@ class Command:
     """The file's axis that points up, such as +Y, where the motion does not tell."""
     rest_frame: int | None = None
     """A frame in which the body stands upright with level feet, where the motion does not tell."""
+    roles: Path | None = None
+    """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
     report: Path | None = None
     """Folder for a page that shows what was done."""
     overwrite: bool = False
@@ -38,10 +40,13 @@ class Command:
         from models.mocap.retargeting.retarget import Hints
 
         with working("preparing"):
-            outcome = prepare_file(
-                self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
-                self.overwrite,
-            )  # fmt: skip
-        told = {"well_formed": outcome.measures, "followed": outcome.followed, "faults": outcome.faults()}
-        say({"lines": [summary(outcome)], **told}, self.json)
+            hints = Hints(self.up, self.rest_frame, self.roles)
+            outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
+        told = {
+            "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,
+            "faults": outcome.faults(),
+        }  # fmt: skip
+        report = outcome.made.report
+        lines = [*(report.notes() if report else ()), summary(outcome)]
+        say({"lines": lines, **told}, self.json)
         return 0

@@ -1,4 +1,4 @@
-"""What ``hvf render`` is told."""
+"""``hvf render``: a film of a run."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from experiments.saying import Json, say
+from experiments.console.saying import Json, say
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.saying import Json, say
-from experiments.working import working
+from experiments.console.saying import Json, say
+from experiments.console.working import working
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from experiments.console.saying import Json, say
+from experiments.console.working import working
 from experiments.results.folder import REPORT
-from experiments.saying import Json, say
-from experiments.working import working
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Command:
 
     def __call__(self) -> int:
         """Draw."""
-        from experiments.finish import finish
+        from experiments.runs.finish import finish
 
         with working("drawing the report"):
             lines = finish(self.folder)

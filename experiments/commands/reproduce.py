@@ -5,8 +5,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.saying import Json, say
-from experiments.working import working
+from experiments.console.saying import Json, say
+from experiments.console.working import working
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Command:
 
     def __call__(self) -> int:
         """Exit code 0 if every tick is the same, 1 if not."""
-        from experiments.reproduce import reproduce
+        from experiments.runs.reproduce import reproduce
 
         with working("reproducing"):
             found = reproduce(self.folder)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.config.words import Options, config_of_options
-from experiments.saying import Json, say
-from experiments.started import STARTED
+from experiments.console.saying import Json, say
+from experiments.console.started import STARTED
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Command:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.run import run
+        from experiments.runs.run import run
 
         say(run(config_of_options(self.options), self.out, self.overwrite, STARTED, self.view), self.json)
         return 0

@@ -5,7 +5,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from experiments.config.part import above, at_least, part
-from experiments.saying import Json, say
+from experiments.console.saying import Json, say
 from sim.body.figure_state import CLIP_GAINS
 
 
@@ -27,7 +27,7 @@ class Command:
 
     def __call__(self) -> int:
         """Track."""
-        from experiments.track import track_clips
+        from experiments.runs.track import track_clips
 
         reports = track_clips(self.clips, self.seconds, self.raw, (self.residual_force, self.residual_moment))
         say(reports, self.json, [f"{name}: {report}" for name, report in reports.items()])

@@ -6,8 +6,8 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import part, whole
-from experiments.saying import Json
-from experiments.trials.where import Where
+from experiments.console.saying import Json
+from experiments.trials.execution.where import Where
 
 
 @part

@@ -6,8 +6,8 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import part, whole
-from experiments.saying import Json
-from experiments.trials.where import Where
+from experiments.console.saying import Json
+from experiments.trials.execution.where import Where
 
 
 @part
@@ -26,7 +26,7 @@ class Command(Where):
         """Tune, and say what was chosen."""
         from dataclasses import replace
 
-        from experiments.trials.errors import StudyError
+        from experiments.trials.design.errors import StudyError
         from experiments.tuning.tune_config import read_tuning
 
         config = read_tuning(self.tuning)

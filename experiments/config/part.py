@@ -116,7 +116,7 @@ def one_line(error: ValidationError, cls: type) -> str:
         return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
-    if kind == "value_error" and not place:  # what parts of a configuration say of each other
+    if kind == "value_error" and isinstance(context["error"], ParameterError):  # what parts say of each other
         return str(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):

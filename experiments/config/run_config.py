@@ -1,18 +1,18 @@
 """The configuration of a run: pure data, that goes to and from one JSON file and lies beside the results."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Map
 from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
 from sim.errors import SimError
-from sim.users.intent import Grab, Push, Turn
-from sim.users.person import Person
+from sim.users.hand.actions import Grab, Push, Turn
+from sim.users.person.person import Person
 from sim.world.world import FigureKind
 
 PERSONAL = ("exaggerate", "cut", "change", "resist", "lost")
@@ -55,11 +55,27 @@ class User:
             raise ParameterError(
                 "a person lets the stylus swing and does not turn it; leave out the person or the turn"
             )
+        for name in ("pushes", "turns", "grabs"):
+            if self.does == "lead" and getattr(self, name):
+                raise ParameterError(f"a hand that leads follows its own path; leave out its {name}")
+        if self.person is not None and self.pushes and self.traces:
+            raise ParameterError(f"a person either pushes or has the intent {self.does!r}; leave out one of them")
+        if self.person is not None and self.pushes and self.grabs:
+            raise ParameterError("a person either pushes or grabs; choose --user relaxed where a curve is bent")
+        if self.traces and self.grabs:
+            raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
 
     @property
     def traces(self) -> bool:
         """Whether the hand moves along a way of its own."""
         return self.does == "trace" or self.does in PERSONAL
+
+
+_FILTERED, _RESIDUAL = ("smoothing", "blend"), ("residual_force", "residual_moment")
+MEANINGLESS: dict[FigureKind, tuple[str, ...]] = {
+    "physical": (), "kinematic": _RESIDUAL, "none": (*_FILTERED, *_RESIDUAL)
+}  # fmt: skip
+"""Numbers of a figure that have no meaning for its kind."""
 
 
 @part
@@ -95,6 +111,20 @@ class Figure:
     blend: float = at_least(0.0, default=0.4, unit="s")
     residual_force: float = at_least(0.0, default=FigureGains().force_bound)
     residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
+
+    def __post_init__(self) -> None:
+        for name in MEANINGLESS[self.kind]:
+            value = getattr(self, name)
+            if value != FIGURE_DEFAULTS[name]:
+                others = ", ".join(kind for kind, names in MEANINGLESS.items() if name not in names)
+                raise ParameterError(
+                    f"--{name.replace('_', '-')} {value:g} has no meaning with --figure {self.kind}; "
+                    f"it belongs to --figure {others}"
+                )
+
+
+FIGURE_DEFAULTS = {name: field.default for name, field in cast(Any, Figure).__pydantic_fields__.items()}
+"""Default of each number of a figure."""
 
 
 @part

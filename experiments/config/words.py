@@ -16,8 +16,19 @@ import tyro
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
 from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
-from experiments.config.run_config import NOBODY_LED, PERSONAL, Clock, Figure, Phantom, RunConfig, User, load_config
-from sim.users.population import PERSONAS, persona
+from experiments.config.run_config import (
+    MEANINGLESS,
+    NOBODY_LED,
+    PERSONAL,
+    Clock,
+    Figure,
+    Phantom,
+    RunConfig,
+    User,
+    load_config,
+)
+from sim.users.person.population import PERSONAS, persona
+from sim.world.world import FigureKind
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
@@ -279,7 +290,10 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
         left |= _names(type(config.map)) | _names(Circle) | {"map"}
     if leads:
-        left |= {"user"}
+        left |= {"user", "pushes", "turns", "grabs"}
+    figure = words.get("figure", config.figure.kind)
+    if figure != config.figure.kind:
+        left |= set(MEANINGLESS.get(cast(FigureKind, figure), ()))
     kept = {name: value for name, value in kept.items() if name not in left}
     return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
 

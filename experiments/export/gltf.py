@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.viewer.shapes import body_shapes, coarser
 
 _TO_FILE = [1, 2, 0]
@@ -114,7 +114,7 @@ def _rotations(poses: Array, index: int) -> Array:
 def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjModel, rest: Array) -> None:
     """Add a mesh of the visible shapes of the figure at rest; each vertex is bound to one joint."""
     bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
-    by_color: dict[tuple[float, ...], list[tuple[int, Array, npt.NDArray[np.int64]]]] = {}
+    by_color: dict[tuple[float, ...], list[tuple[int, Array, IntArray]]] = {}
     for shape in coarser(body_shapes(model, ""), _CELL):
         by_color.setdefault(shape.rgba, []).append((bodies[shape.body], shape.vertices, shape.faces))
     primitives: list[Any] = []

@@ -7,7 +7,7 @@ from pathlib import Path
 from controllers.certificates.flight.tolerance import Judging
 from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
 from experiments.files.json_text import json_text
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.compilation.sources import sources_hash
 
 

@@ -9,7 +9,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.files.archives import read_archive, write_archive
 from models.humanoid.skeleton import N_POSE
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 _KINDS = {"Cylindrical": Cylindrical, "Composite": Composite, "Lifted": Lifted}

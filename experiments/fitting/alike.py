@@ -16,7 +16,7 @@ from controllers.legs.limbs import Limb
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
@@ -57,18 +57,14 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     from models.mocap.preparation.feasible import contact_residual
     from models.mocap.preparation.poses import smoothed, sole_points
     from models.mocap.preparation.stances import stances
+    from models.mocap.preparation.well_formed import stance_slides
 
     clip, points = Clip(poses, fps, "blend"), sole_points(poses)
     schedule = stances(clip, smoothed(clip, 8.0))
     heights = points[:, :, 2] - CONTACT_RADIUS
-    stands, ways = schedule.standing & (heights < _ON_FLOOR), [0.0]
-    for sphere in range(points.shape[1]):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], stands[:, sphere].astype(int), [0]))))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
-            stand = points[start:end, sphere, :2]
-            ways.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
+    slides = stance_slides(points, schedule.standing & (heights < _ON_FLOOR))
     residual = contact_residual(clip, schedule) if dynamics else 0.0
-    return Motion(residual, float(heights.min()), float(np.quantile(ways, 0.95)), max(ways))
+    return Motion(residual, float(heights.min()), float(np.quantile(slides, 0.95)), float(slides.max()))
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:

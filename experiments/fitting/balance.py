@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
@@ -24,12 +23,10 @@ from models.mocap.authoring.balance import GRAVITY
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
-Mask = npt.NDArray[np.bool_]
-
 _ROWS = 96  # samples of a lap
 _ROUNDS = 3
 _CUTOFF = 6.0  # highest frequency of the sway [Hz]
-_TOUCH = 0.008  # height below which a contact point counts as support [m]
+_SUPPORT_HEIGHT = 0.008  # height below which a contact point counts as support [m]
 _SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
 _FARTHEST = 0.2  # largest sway [m]
 
@@ -113,7 +110,7 @@ def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
     Array, shape (..., 2)
         The point itself where it lies inside, or where nothing touches the floor.
     """
-    touching = contacts[..., 2] < _TOUCH
+    touching = contacts[..., 2] < _SUPPORT_HEIGHT
     count = touching.sum(axis=-1)[..., None]
     middle = (contacts[..., :2] * touching[..., None]).sum(axis=-2) / np.maximum(count, 1)
     # Points that do not touch are put at the middle, so that every polygon has the same number of corners.

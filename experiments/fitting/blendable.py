@@ -7,7 +7,7 @@ import numpy as np
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import sole_points
 
 FLIES = 0.02  # [m] over the floor: if both soles are higher, the figure is in flight

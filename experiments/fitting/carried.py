@@ -14,14 +14,15 @@ from typing import TypeVar
 
 import numpy as np
 
+from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from experiments.fitting.alike import motion_of
 from experiments.fitting.verdict import Verdict, tried
-from models.mocap.clip import Clip
-from models.mocap.ranges import beyond_ranges
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
@@ -71,8 +72,8 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
 def push_profile(times: Array) -> Array:
     """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
     phase = times / _EVERY % 2.0
-    ramp = np.clip(np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN, 0.0, 1.0)
-    return np.asarray(ramp**2 * (3.0 - 2.0 * ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0))
+    ramp = np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
 def sound(made: Cylindrical | Composite, lap: float) -> bool:

@@ -14,7 +14,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
 from experiments.fitting.carried import SHARES, WELL, push_profile
 from experiments.fitting.verdict import Verdict, tried
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.reference.reference import poses_along
 
 _SECONDS, _FPS = 20.0, 120.0

@@ -7,11 +7,11 @@ import numpy.typing as npt
 from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.river_clips import RIVER, RiverClips
 from experiments.fitting.balance import nearest_supported
+from experiments.results.soles import CONTACT_HEIGHT
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import poses_along
 
 _ROWS = 96  # samples of a lap
-_TOUCH = 0.003  # height below which a contact point counts as support [m]
 _SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
 _FLIES = 1.0  # [m] distance assigned to phases in flight: larger than any other
 
@@ -44,7 +44,7 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
             mujoco.mj_comPos(figure, data)
             centre[i], contacts[i] = data.subtree_com[1, :2], data.geom_xpos[feet]
         contacts[..., 2] -= CONTACT_RADIUS
-        touch = contacts[..., 2] < _TOUCH
+        touch = contacts[..., 2] < CONTACT_HEIGHT
         missing = np.linalg.norm(nearest_supported(centre, contacts, _SHARE) - centre, axis=1)
         missing[~touch.any(axis=1)] = _FLIES
         # FOOT_CONTACTS begins with the four points of the left foot.

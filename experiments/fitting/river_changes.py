@@ -17,11 +17,11 @@ from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
 from controllers.state import Array
+from experiments.console.working import working
 from experiments.files.kept import is_kept, kept_array
 from experiments.fitting.figure_legs import packed_legs
-from experiments.working import working
-from models.mocap import quaternions
-from models.mocap.clip import Clip
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.feasible import Feasible, contact_residual, feasible
 from models.mocap.preparation.stances import Stances, stances
 from sim.compilation.side_by_side import side_by_side
@@ -73,7 +73,7 @@ class _Passage(NamedTuple):
         """Stances of the transition, detected with the context."""
         whole, own = Clip(self.poses, FPS, "change"), self.own
         told = stances(whole, whole)
-        return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own])
+        return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own], told.kept[own])
 
 
 class _Gate(NamedTuple):

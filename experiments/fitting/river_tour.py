@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 
 from controllers.curves.stylus import stylus_path
-from controllers.easing import smooth_step
+from controllers.easing import smooth_steps
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
 from experiments.fitting.verdict import tried
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 
 _FPS = 120.0
@@ -27,7 +27,7 @@ def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     times = np.arange(round((_SECONDS + 2.0) * _FPS)) / _FPS - 1.0
     stay = np.clip(times // _STAY, 0, len(_WAY) - 1).astype(int)
     way = np.array(_WAY)
-    share = np.array([smooth_step.py_func(x) for x in (times - _STAY * stay) / _GLIDE])[:, None]
+    share = smooth_steps((times - _STAY * stay) / _GLIDE)[:, None]
     phases = np.array([curve.start + times % curve.duration for curve in made.curves])
     points = np.array([curve.point(phase) for curve, phase in zip(made.curves, phases, strict=True)])
     rows = np.arange(len(times))

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
+from experiments.console.working import working
 from experiments.files.kept import kept_array
-from experiments.working import working
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.compilation.unit_workers import compile_units
 

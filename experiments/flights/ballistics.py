@@ -21,10 +21,10 @@ from controllers.certificates.report import Certificate, Verdict, hash_of, hashe
 from controllers.state import Array
 from experiments.files.certificate_files import clip_inputs
 from models.humanoid.skeleton import N_POSE
-from models.mocap import quaternions
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.poses import sole_points
 from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL

@@ -13,9 +13,9 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from controllers.state import Array
-from models.mocap import quaternions
-from models.mocap.clip import Clip
 from models.mocap.dynamics.momentum import Momentum, momentum
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
 
 ROUNDS = 4  # iterations: momentum by finite differences also changes with the rotation of neighbouring frames
 

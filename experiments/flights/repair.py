@@ -4,20 +4,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
-from controllers.state import Array
+from controllers.state import Array, Mask
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved import with_constant_momentum
-from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
 from models.mocap.library import check_target, load_clip, writing
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 
@@ -119,9 +118,7 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
     return Repaired(done, before, clip_ballistics(done, judging), plan)
 
 
-def _carried_out(
-    clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: npt.NDArray[np.bool_]
-) -> Clip:
+def _carried_out(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: Mask) -> Clip:
     """The clip with the plan's timing and displacement of the body, planted feet kept, at the clip's frame rate."""
     n, step = clip.n_frames, 1.0 / clip.fps
     times: Array = np.arange(n, dtype=np.float64) * step
@@ -174,7 +171,7 @@ def over_the_floor(clip: Clip) -> Clip:
     return Clip(poses, clip.fps, clip.name)
 
 
-def _planted(times: Array, standing: npt.NDArray[np.bool_]) -> Array:
+def _planted(times: Array, standing: Mask) -> Array:
     """Weight of a planted foot: 1 while it stands, fading to 0 before and after, shape (n,)."""
     if not standing.any():
         return np.zeros(len(times))

@@ -9,13 +9,13 @@ from experiments.files.device_files import calibrated_json, linkage_from, read_d
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import EMULATED, CalibrateHardware
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.driver import Driver
 from sim.devices.exchange import READING_SIZE, READING_THETA
 from sim.devices.hardware_list import open_device
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 
 STILL = 5e-3
 """Largest motion of a joint while it is read [rad], about a millimetre at the tip: allows tremor but no motion."""

@@ -93,4 +93,4 @@ def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
         unit = _UNITS[name.rstrip("123")]
         known = "" if margin < abs(value) else "  (not told apart from zero)"
         said.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{known}")
-    return [*said, "offset1    is told by no motion, only by hvf hardware calibrate."]
+    return [*said, "offset1    does not show in motions; hvf hardware calibrate measures it."]

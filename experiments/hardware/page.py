@@ -16,7 +16,7 @@ from experiments.hardware.link import link_now
 from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from models.scene import P_WH
+from models.world.scene import P_WH
 from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.recorder_process import TOLD_FORCE, TOLD_SIZE
 from sim.hardware.shared import SharedNumbers

@@ -12,7 +12,7 @@ from experiments.files.device_files import Calibration
 from experiments.hardware.permit import check_device
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from models.scene import P_WH, PHANTOM, SceneConfig
+from models.world.scene import P_WH, PHANTOM, SceneConfig
 from sim.devices.device import DeviceState
 from sim.devices.driver import Driver
 from sim.devices.exchange import exchange

@@ -11,7 +11,7 @@ from experiments.files.certificate_files import changed_options, verify_certific
 from experiments.files.device_files import Calibration, linkage_of
 from experiments.hardware.run_options import RunHardware
 from experiments.setups.certified_law import of_clips
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 

@@ -12,9 +12,10 @@ from typing import Any
 from rich.console import Console
 
 from controllers.safety.gate import Gate
-from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
+from experiments.console.compiling import compile_once
+from experiments.console.saying import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.attend import attend
@@ -24,10 +25,9 @@ from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_
 from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
-from experiments.saying import say
 from experiments.setups.defaults import resolved
 from experiments.setups.session import Session
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.hardware_list import check_there
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun

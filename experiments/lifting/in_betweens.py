@@ -7,6 +7,7 @@ import numpy as np
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights
 from controllers.state import Array
+from experiments.results.soles import CONTACT_HEIGHT
 from models.humanoid.skeleton import (
     CONTACT_RADIUS,
     FOOT_CONTACTS,
@@ -15,11 +16,9 @@ from models.humanoid.skeleton import (
     joint_range,
     rest_pose,
 )
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-
-TOUCH = 0.003  # [m] height below which a contact point of a sole counts as standing
+from models.mocap.motion.clip import Clip, pose_difference
 
 
 class MotionMeasure(NamedTuple):
@@ -81,7 +80,7 @@ def largest_slide(points: Array) -> float:
     """Largest horizontal distance of a point of `soles` from its touch-down while within 3 mm of the floor [m]."""
     came_down, worst = np.full((points.shape[1], 2), np.nan), 0.0
     for places in points:
-        touches = places[:, 2] < TOUCH
+        touches = places[:, 2] < CONTACT_HEIGHT
         fresh = touches & np.isnan(came_down[:, 0])
         came_down[fresh] = places[fresh, :2]
         came_down[~touches] = np.nan

@@ -29,8 +29,8 @@ from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_we
 from experiments.setups.clips import load_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import around
 from sim.errors import SimError
 from sim.world.world import phantom_angles

@@ -11,7 +11,7 @@ from controllers.haptic_map.animation import ClipMap
 from controllers.state import Array
 from experiments.lifting.in_betweens import MotionMeasure, measure_motion
 from models.humanoid.skeleton import figure_model, rest_pose
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 SAMPLES = 96  # samples of the lap
 _PROBES = 400  # random places at which smoothness is measured

@@ -19,7 +19,7 @@ from sim.loop.bends import redo_bend, undo_bend
 from sim.loop.loop import make_logs
 from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import KeptState, kept_state, put_back
-from sim.users.dragged import dragged, relaxed, tremor
+from sim.users.hand.dragged import dragged, relaxed, tremor
 
 BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short for a pause of the hand to be seen
 STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force

@@ -4,7 +4,6 @@ import os
 import queue
 import time
 from collections.abc import Callable, Sequence
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from experiments.live.messages import (
     Undo,
 )
 from experiments.live.takes import Take
-from experiments.live.workers import start_undisturbed
+from experiments.live.workers import PageProcess
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
@@ -55,35 +54,15 @@ IDLE = 0.01  # [s] between two polls of the page while nothing runs
 LATE = 0.1  # [s] of delay from which it is not made up for
 
 
-class EngineProcess:
+class EngineProcess(PageProcess):
     """The page's handle of the engine's process: boards to read and write, and a queue in each direction."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
         shown, held = Board.memory(SHOWN), Board.memory(HELD)
         self.shown, self.held = Board(shown, SHOWN), Board(held, HELD)
         self.held.write({"pace": 1.0})
-        self._orders: Any = context.Queue()
-        self._told: Any = context.Queue()
         # Not a daemon, as it starts compiler processes.
-        self._process = context.Process(target=_main, args=(shown, held, self._orders, self._told), name="hvf-servo")
-        start_undisturbed(self._process)
-
-    def ask(self, order: object) -> None:
-        """Send an order."""
-        self._orders.put(order)
-
-    def told(self, seconds: float = 0.0) -> object | None:
-        """Next message of the process, waiting for at most `seconds` [s]; None if there is none."""
-        try:
-            return self._told.get(timeout=seconds) if seconds > 0.0 else self._told.get_nowait()
-        except queue.Empty:
-            return None
-
-    @property
-    def alive(self) -> bool:
-        """Whether the process is running."""
-        return self._process.is_alive()
+        super().__init__(_main, (shown, held), daemon=False, name="hvf-servo")
 
     def close(self) -> None:
         """End the process; a take in progress is saved."""
@@ -92,9 +71,7 @@ class EngineProcess:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-        for line in (self._orders, self._told):
-            line.close()
-            line.cancel_join_thread()
+        self._close_queues()
 
 
 def _main(shown: Any, held: Any, orders: Any, told: Any) -> None:

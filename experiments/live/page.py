@@ -28,7 +28,7 @@ from experiments.live.status import FIRST_STEPS, status_html
 from experiments.live.takes_panel import TakesPanel
 from experiments.live.uploads_panel import UploadsPanel
 from models.errors import ModelError
-from models.scene import P_WH, SceneConfig
+from models.world.scene import P_WH, SceneConfig
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from sim.viewer.courses import courses

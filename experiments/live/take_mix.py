@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.state import Array
 from experiments.results.folder import RECORDING
-from models.mocap import quaternions
-from models.mocap.clip import Clip
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -130,9 +131,8 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
             raise ParameterError(f"the region lasts {end - start:.2f} s; expected {2.0 * ease:g} s or more")
         rows = np.flatnonzero((times >= start) & (times <= end))
         theirs = _at(other.poses, other.frames_at(np.maximum.accumulate(take.phase)[rows]))
-        edge = np.clip(np.minimum(times[rows] - start, end - times[rows]) / ease, 0.0, 1.0)
-        share = edge**3 * (10.0 - 15.0 * edge + 6.0 * edge**2)
-        poses[rows] = between(poses[rows], theirs, share)
+        edge = np.minimum(times[rows] - start, end - times[rows]) / ease
+        poses[rows] = between(poses[rows], theirs, smooth_steps(edge))
     return poses
 
 

@@ -13,7 +13,7 @@ from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder,
 from experiments.results.measures import summarise
 from experiments.results.stretch_summary import stretch_summary
 from experiments.results.summary_parts import SpeedSummary
-from experiments.run import write_animations
+from experiments.runs.run import write_animations
 from experiments.setups.default_animation import default_poses
 from sim.errors import SimError
 from sim.loop.loop import groups, record_into

@@ -23,7 +23,55 @@ def start_undisturbed(process: Any) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class Worker:
+class PageProcess:
+    """A process beside the page's, with a queue in each direction.
+
+    Parameters
+    ----------
+    main : callable
+        What runs in the process, called with the arguments and the queues of requests and of answers.
+    arguments : tuple
+        Its first arguments.
+    daemon : bool
+        Whether it ends with the page's process; if so, it cannot start processes itself.
+    name : str, optional
+        Name of the process.
+    """
+
+    def __init__(
+        self, main: Callable[..., None], arguments: tuple[object, ...], daemon: bool = True, name: str | None = None
+    ):
+        context = get_context("spawn")
+        self._asked: Any = context.Queue()
+        self._told: Any = context.Queue()
+        queues = self._asked, self._told
+        self._process = context.Process(target=main, args=(*arguments, *queues), daemon=daemon, name=name)
+        start_undisturbed(self._process)
+
+    def ask(self, what: object) -> None:
+        """Send a request."""
+        self._asked.put(what)
+
+    def told(self, seconds: float = 0.0) -> Any:
+        """The next answer, waiting for at most `seconds` [s]; None if there is none."""
+        try:
+            return self._told.get(timeout=seconds) if seconds > 0.0 else self._told.get_nowait()
+        except queue.Empty:
+            return None
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process is running."""
+        return self._process.is_alive()
+
+    def _close_queues(self) -> None:
+        """Close both queues without waiting for what they still hold."""
+        for line in (self._asked, self._told):
+            line.close()
+            line.cancel_join_thread()
+
+
+class Worker(PageProcess):
     """A process that answers requests; only the newest pending request counts.
 
     Parameters
@@ -33,35 +81,13 @@ class Worker:
     """
 
     def __init__(self, does: Callable[[Any, Any], None]):
-        context = get_context("spawn")
-        self._asked: Any = context.Queue()
-        self._told: Any = context.Queue()
-        self._process = context.Process(target=_main, args=(does, self._asked, self._told), daemon=True)
-        start_undisturbed(self._process)
-
-    def ask(self, what: object) -> None:
-        """Send a request."""
-        self._asked.put(what)
-
-    def told(self) -> Any:
-        """The next answer, or None."""
-        try:
-            return self._told.get_nowait()
-        except queue.Empty:
-            return None
-
-    @property
-    def alive(self) -> bool:
-        """Whether the process is running."""
-        return self._process.is_alive()
+        super().__init__(_main, (does,))
 
     def close(self) -> None:
         """End the process, whatever it is doing."""
         self._process.terminate()
         self._process.join()
-        for line in (self._asked, self._told):
-            line.close()
-            line.cancel_join_thread()
+        self._close_queues()
 
 
 def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:

@@ -21,7 +21,7 @@ from experiments.paper_figures.sources import (
 )
 from experiments.paper_figures.space import path, workspace
 from experiments.results.folder import clips_of, config_of
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 

@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 
 from controllers.state import Array
 from models.humanoid.skeleton import figure_model
-from models.scene import FIRST_HIDDEN_GROUP
+from models.world.scene import FIRST_HIDDEN_GROUP
 
 Paint = Callable[[str, Array], str | tuple[float, ...]]
 

@@ -9,7 +9,7 @@ from controllers.state import Array
 from experiments.config.maps import Composite, RiverClips
 from experiments.config.modes import Rivers, StretchThenFollow
 from experiments.config.run_config import RunConfig, User
-from experiments.demo import demo_config
+from experiments.runs.demo import demo_config
 from sim.recording.recording import Recording
 
 CYLINDER, COMPOSITE, STRETCH, RIVERS = "cylinder", "composite", "stretch", "rivers"

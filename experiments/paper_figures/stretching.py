@@ -77,7 +77,5 @@ def performance_start(recording: Recording) -> float:
     """
     told = (recording.summary or {}).get("performance")
     if not isinstance(told, dict):
-        raise RecordingError(
-            "a run that stretches and then performs was to be drawn; its summary tells of no performance"
-        )
+        raise RecordingError("the summary has no performance; expected that of a run in the mode stretch-then-follow")
     return float(cast(dict[str, float], told)["start"])

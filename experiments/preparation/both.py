@@ -9,7 +9,7 @@ import viser
 
 from controllers.state import Array
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import followed

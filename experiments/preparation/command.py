@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.files.html_page import html_page, image
+from experiments.flights.ballistics import clip_ballistics
 from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
 from experiments.preparation.followed import Followed, followed
@@ -30,15 +31,23 @@ class PreparedFile(NamedTuple):
         Measures of the clip.
     followed : Followed
         How the physical figure follows it.
+    flights : tuple of str
+        Flights that the certificate refutes, and why, a line each.
     """
 
     made: Prepared
     measures: WellFormed
     followed: Followed
+    flights: tuple[str, ...]
 
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
-        return (*self.measures.faults(), *self.followed.faults(self.measures.flights > 0))
+        return (
+            *self.measures.faults(),
+            *self.made.fidelity.faults(),
+            *self.flights,
+            *self.followed.faults(self.measures.flights > 0),
+        )
 
 
 def prepare_file(
@@ -71,7 +80,8 @@ def prepare_file(
     """
     check_target(target, overwrite)
     made = prepared(source, loop, mirror, hints)
-    outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip))
+    refuted = tuple(flight.reason for flight in clip_ballistics(made.clip).flights if flight.verdict == "refuted")
+    outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip), refuted)
     with writing(target):
         write_bvh(made.clip, target)
         if report is not None:
@@ -82,11 +92,10 @@ def prepare_file(
 
 def summary(outcome: PreparedFile) -> str:
     """One line for the terminal."""
-    made, measures, follows = outcome
-    faults = outcome.faults()
+    made, faults = outcome.made, outcome.faults()
     return (
-        f"{made.clip.name}: {'; '.join(changes(made))}; contact lacks {100 * measures.residual:.1f} % of weight; "
-        f"{follows.line()}; "
+        f"{made.clip.name}: {'; '.join(changes(made))}; "
+        f"contact lacks {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
         f"{made.seconds:.0f} s of processor time; "
         + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
         + "".join(f"; {line}" for line in advice(made))
@@ -97,7 +106,7 @@ def changes(made: Prepared) -> tuple[str, ...]:
     """Changes made to the capture, a line each."""
     part, pace, change = made.looped, made.paced, made.feasible
     words = {
-        "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s",
+        "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s, whose ends were {np.rad2deg(part.gap):.1f}° apart",
         "half stride": f"half a stride, {part.start:.2f} to {part.end:.2f} s, and its mirror image",
         "way back": "the whole, and a way back",
         "open": "the whole, at rest at both ends",
@@ -113,8 +122,8 @@ def changes(made: Prepared) -> tuple[str, ...]:
     if not made.near:
         return (*lines, "dynamics and feet as captured")
     lines.append(
-        f"joints moved {np.rad2deg(change.turned):.1f}°, root {100 * change.moved:.1f} cm RMS; at most {change.joint} "
-        f"by {np.rad2deg(change.most_turned):.0f}° at {change.when:.2f} s, root by {100 * change.furthest:.0f} cm"
+        f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.moved:.1f} cm RMS; "
+        + made.fidelity.line()
     )
     return tuple(lines)
 
@@ -127,20 +136,20 @@ def advice(made: Prepared) -> tuple[str, ...]:
     return (
         f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and moves the "
         f"root {100 * change.moved:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
-        f"most is wrong at {change.when:.1f} s ({change.joint}): try --loop START:END without it, --loop open if it "
+        "try --loop START:END for a part without what is not feasible, --loop open if it "
         "does not repeat, or a capture whose support is feet alone",
     )
 
 
 def page(outcome: PreparedFile) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
-    made, after, follows = outcome
+    made = outcome.made
     before = well_formed(made.captured)
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     rows = "".join(
         f"<tr><th>{name}</th><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
         for name, was, now in zip(
-            ("soles", "ends", "continuity", "dynamics"), before.lines(), after.lines(), strict=True
+            ("soles", "ends", "continuity", "dynamics"), before.lines(), outcome.measures.lines(), strict=True
         )
     )
 
@@ -150,7 +159,7 @@ def page(outcome: PreparedFile) -> str:
 
     well = "Well-formed." if made.near and not outcome.faults() else "Not well-formed."
     body = (
-        f'<p>{well} {escape(follows.line().capitalize())}.</p><div class="wide"><table>'
+        f'<p>{well} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
         + listed("What is not within bounds", (*outcome.faults(), *advice(made)))

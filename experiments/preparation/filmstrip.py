@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from controllers.state import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGMENTS, figure_model
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
 _APART = 1.0  # distance between two pictures [m]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.mocap.clip import Clip, pose_difference
+from models.mocap.motion.clip import Clip, pose_difference
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.state import Array
+from experiments.console.working import working
 from experiments.files.kept import is_kept, kept_array
-from experiments.working import working
-from models.mocap.clip import Clip
 from models.mocap.library import Loaded, load
+from models.mocap.motion.clip import Clip
 from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 

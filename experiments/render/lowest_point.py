@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
-from models.scene import FIRST_HIDDEN_GROUP
+from models.world.scene import FIRST_HIDDEN_GROUP
 
 _GEOM = mujoco.mjtGeom
 

@@ -12,7 +12,7 @@ from experiments.render.shown_world import SHADOW_REACH, STAGE, ShownWorld, show
 from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
 from models.humanoid.skeleton import N_POSE
-from models.mocap.clip import PlanarDisplacement
+from models.mocap.motion.clip import PlanarDisplacement
 from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0

@@ -12,7 +12,7 @@ import numpy as np
 from controllers.state import Array
 from experiments.results.folder import scene_of
 from models.humanoid.skeleton import N_POSE, figure_spec
-from models.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
+from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, TUBE, rgb

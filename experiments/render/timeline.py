@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from experiments.render.shown_world import ShownWorld
 from experiments.results.folder import DEFAULT
 from models.mocap.library import load_clip
@@ -15,7 +14,6 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.framing import followed
 
-Rows = npt.NDArray[np.int64]
 Ghost = Literal["default", "animation", "none"]
 """Animation that the ghost shows: that of the unedited curve, that of the hand's path, or none."""
 
@@ -32,7 +30,7 @@ class Timeline:
     t : array (n,)
         Time in the recording [s].
     ticks, frames : array (n,)
-        Rows of the recording's two groups.
+        IntArray of the recording's two groups.
     ghost : array (n, 75) or None
         Poses of the ghost.
     kind : Ghost
@@ -44,8 +42,8 @@ class Timeline:
     """
 
     t: Array
-    ticks: Rows
-    frames: Rows
+    ticks: IntArray
+    frames: IntArray
     ghost: Array | None
     kind: Ghost
     floor: Array
@@ -94,7 +92,7 @@ def timeline(
     return Timeline(t, ticks, frames, *_ghost(recording, folder, frames, ghost), path + middle, heading)
 
 
-def _ghost(recording: Recording, folder: Path, frames: Rows, wanted: Ghost) -> tuple[Array | None, Ghost]:
+def _ghost(recording: Recording, folder: Path, frames: IntArray, wanted: Ghost) -> tuple[Array | None, Ghost]:
     """Poses of the ghost at rows of the recording's frames, and its kind."""
     if wanted == "none":
         return None, wanted

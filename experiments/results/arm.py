@@ -11,7 +11,7 @@ from controllers.state import Array
 from experiments.config.run_config import ArmConfig
 from experiments.results.oscillation import OscillationSummary, oscillation_summary
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_limits
-from models.scene import PEDESTAL, ROBOT
+from models.world.scene import PEDESTAL, ROBOT
 from sim.body.robot import REPORT_SATURATED
 from sim.loop.loop import groups, tick_channels
 from sim.loop.servo import FrameLog, Servo, TickLog
@@ -78,8 +78,8 @@ def arm_groups(servo: Servo) -> dict[str, Group]:
     return {"ticks": Group(every["ticks"].rate, ticks), "frames": Group(every["frames"].rate, frames)}
 
 
-def record_arm(recorder: Recorder, servo: Servo, world: RobotWorld) -> Callable[[TickLog, FrameLog, int], None]:
-    """An observer that appends every block to a recorder made with `arm_groups`."""
+def arm_channels(servo: Servo, world: RobotWorld) -> Callable[[TickLog, FrameLog, int], dict[str, dict[str, Array]]]:
+    """A function that gives the channels of `arm_groups` of a block of n ticks."""
     first = int(world.model.joint(ROBOT + ARM_JOINTS[0]).qposadr[0])
     data = mujoco.MjData(world.arm)
 
@@ -92,19 +92,26 @@ def record_arm(recorder: Recorder, servo: Servo, world: RobotWorld) -> Callable[
         places[:, 2] += PEDESTAL
         return places
 
-    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
-        channels = tick_channels(ticks, n)
-        del channels["residual"]
-        recorder.append("ticks", channels)
-        m = -(-n // servo.figure_ticks)
+    def channels(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
+        of_ticks, m = tick_channels(ticks, n), -(-n // servo.figure_ticks)
+        del of_ticks["residual"]
         joints, reference = frames.qpos[:m, first : first + len(ARM_JOINTS)], frames.reference[:m]
-        recorder.append(
-            "frames",
-            {
-                "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joints": joints,
-                "tool": tools(joints), "led": tools(reference), "saturated": frames.report[:m, REPORT_SATURATED],
-            },
-        )  # fmt: skip
+        of_frames = {
+            "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joints": joints,
+            "tool": tools(joints), "led": tools(reference), "saturated": frames.report[:m, REPORT_SATURATED],
+        }  # fmt: skip
+        return {"ticks": of_ticks, "frames": of_frames}
+
+    return channels
+
+
+def record_arm(recorder: Recorder, servo: Servo, world: RobotWorld) -> Callable[[TickLog, FrameLog, int], None]:
+    """An observer that appends every block to a recorder made with `arm_groups`."""
+    channels = arm_channels(servo, world)
+
+    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        for group, block in channels(ticks, frames, n).items():
+            recorder.append(group, block)
 
     return observe
 

@@ -9,10 +9,8 @@ from controllers.state import Array
 from experiments.results.summary_parts import FigureSummary
 from models.humanoid.skeleton import N_TANGENT
 from sim.body.falls import UP
-from sim.body.residual import ResidualMeasure
+from sim.body.residual import SUPPORTS, ResidualMeasure
 from sim.recording.recording import Recording
-
-TOUCH = 1.0  # [N] vertical ground reaction force above which the figure counts as in contact
 
 
 class MeanSquare:
@@ -55,7 +53,7 @@ class FigureMeasure:
         falls = ~up & np.concatenate(([self._was_up], up[:-1]))
         self._falls += frames["t"][falls].tolist()
         self._was_up, self._seen, self._up = bool(up[-1]), self._seen + len(up), self._up + int(np.sum(up))
-        flies, bears = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > TOUCH
+        flies, bears = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > SUPPORTS
         residual = frames["residual"][up]
         self._joints.add(frames["joint_error"][up])
         self._root.add(frames["root_error"][up])

@@ -14,13 +14,12 @@ from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from controllers.state import Array
+from controllers.state import Array, Mask
 from experiments.results.changes import river_changes
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
@@ -234,7 +233,7 @@ def _mark_changes(ax: Axes, recording: Recording) -> None:
         )  # fmt: skip
 
 
-def _shade(ax: Axes, t: Array, where: npt.NDArray[np.bool_], color: str, label: str) -> None:
+def _shade(ax: Axes, t: Array, where: Mask, color: str, label: str) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     for i, (start, stop) in enumerate(edges.reshape(-1, 2)):
         ax.axvspan(float(t[start]), float(t[stop - 1]), color=color, lw=0, label=label if i == 0 else None)

@@ -7,19 +7,21 @@ import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
 import mujoco
 
 from controllers.errors import ParameterError
 from experiments.config.part import from_dict
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import ArmConfig, RunConfig
 from experiments.files.curve_files import CURVE_FILE
-from models.mocap.clip import Clip
-from models.scene import SceneConfig
+from models.mocap.motion.clip import Clip
+from models.world.scene import SceneConfig
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.world.world import FigureKind, World
+
+_Config = TypeVar("_Config")
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
@@ -74,15 +76,43 @@ def clear_folder(out: Path) -> None:
 
 
 def config_of(recording: Recording) -> RunConfig:
-    """The configuration of a recording.
+    """The configuration of a recording of a figure.
+
+    Raises
+    ------
+    SimError
+        If it is of the robot arm, of a `Simulation` put together in Python, or recorded by an incompatible version of
+        the program.
+    """
+    if of_arm(recording):
+        raise SimError(f"{recording.path}: is of the robot arm; expected the run of a figure")
+    if "simulation" in recording.config:
+        raise SimError(
+            f"{recording.path}: is of a simulation put together in Python, whose parts a recording does not hold; "
+            "expected the run of a configuration, or run the script again that made it"
+        )
+    return _stored(RunConfig, recording)
+
+
+def arm_config_of(recording: Recording) -> ArmConfig:
+    """The configuration of a recording of the robot arm.
 
     Raises
     ------
     SimError
         If it was recorded by an incompatible version of the program.
     """
+    return _stored(ArmConfig, recording)
+
+
+def of_arm(recording: Recording) -> bool:
+    """Whether a recording is of the robot arm."""
+    return "arm_ticks" in recording.config
+
+
+def _stored(cls: type[_Config], recording: Recording) -> _Config:
     try:
-        return from_dict(RunConfig, recording.config, "the recording's configuration")
+        return from_dict(cls, recording.config, "the recording's configuration")
     except ParameterError as error:
         raise SimError(f"{error}; it was recorded by another version of the program, which can run it again") from None
 

@@ -4,17 +4,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.fields.leading import Leading
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from experiments.results.soles import Soles
 from models.humanoid.skeleton import N_POSE
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
-
-IntArray = npt.NDArray[np.int64]
 
 BLOCK_FRAMES = 2000
 _FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] weighted equally in the search for the nearest earlier pose

@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from controllers.state import Array
+from controllers.state import Array, Mask
 from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
 from experiments.results.figure_measure import FigureMeasure, MeanSquare
@@ -23,7 +22,7 @@ from experiments.results.summary_parts import (
     TankSummary,
     TraceSummary,
 )
-from models.mocap.clip import pose_difference
+from models.mocap.motion.clip import pose_difference
 from sim.recording.recording import Recording
 
 Span = tuple[float, float]
@@ -129,7 +128,7 @@ class PathMeasure:
         self._pushes: list[PushSummary] = []
         self._pushing = False
 
-    def add(self, ticks: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
+    def add(self, ticks: Mapping[str, Array]) -> Mask:
         """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
         at_work = size > HAND_AT_WORK
@@ -162,7 +161,7 @@ class PathMeasure:
         self._turned += float(np.sum(steps))
         self._phase, self._time = float(phase[-1]), float(t[-1])
 
-    def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: npt.NDArray[np.bool_]) -> None:
+    def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
         edges = np.flatnonzero(np.diff(np.concatenate(([0], at_work.astype(int), [0]))))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
             block = slice(int(first), int(last))
@@ -208,7 +207,7 @@ class AnimationMeasure:
         self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
         self._pushed, self._unpushed = 0.0, 0.0
 
-    def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
+    def add(self, frames: Mapping[str, Array], default: Array, pushed: Mask) -> None:
         """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
         self._soles.add(frames["reference"][self._next :: self._stride])
         self._next = (self._next - len(default)) % self._stride

@@ -15,10 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.oscillation import OscillationDetector, shaken
-from controllers.state import Array
+from controllers.state import Array, Mask
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
@@ -148,7 +147,7 @@ class _Fast:
         self._turns, self._shaken, self._last = 0, 0, np.zeros(3)
         self._moved: list[Array] = []
 
-    def add(self, force: Array, place: Array, away: Array, found: npt.NDArray[np.bool_]) -> None:
+    def add(self, force: Array, place: Array, away: Array, found: Mask) -> None:
         from scipy.signal import sosfilt
 
         given = (force, place, away)

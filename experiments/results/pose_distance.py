@@ -5,8 +5,8 @@ import numpy as np
 
 from controllers.state import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS
-from models.mocap import quaternions
-from models.mocap.clip import global_rotations, pose_difference
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import global_rotations, pose_difference
 
 METRE = 1.0  # [rad/m] weight of the root's displacement in the product metric
 

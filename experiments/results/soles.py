@@ -5,9 +5,9 @@ import numpy as np
 
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 
-TOUCH = 0.003  # [m] height below which a point of a sole counts as in contact
+CONTACT_HEIGHT = 0.003  # [m] height below which a point of a sole counts as in contact
 
 
 class Soles:
@@ -21,7 +21,7 @@ class Soles:
         Least height of a point above the floor [m]; infinite before the first pose.
     """
 
-    def __init__(self, scene: SceneConfig, touch: float = TOUCH):
+    def __init__(self, scene: SceneConfig, touch: float = CONTACT_HEIGHT):
         self._touch = touch
         self._model = figure_model(scene.stature, scene.mass)
         self._data = mujoco.MjData(self._model)

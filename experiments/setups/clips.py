@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from controllers.errors import ParameterError
 from experiments.preparation.prepared_clip import PreparedClip, prepared_clips
 from models.errors import ModelError
-from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
+from models.mocap.motion.clip import Clip
 
 
 def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
@@ -31,16 +30,3 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
     files = iter(prepared_clips([Path(name) for name in names if name not in embedded_names()], raw))
     clips = [PreparedClip(embedded(name), ()) if name in embedded_names() else next(files) for name in names]
     return tuple(each.clip for each in clips), tuple(remark for each in clips for remark in each.remarks)
-
-
-def only(clips: tuple[Clip, ...]) -> Clip:
-    """The single clip of a run that takes exactly one.
-
-    Raises
-    ------
-    ParameterError
-        If there are more, or none.
-    """
-    if len(clips) != 1:
-        raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
-    return clips[0]

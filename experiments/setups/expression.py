@@ -5,7 +5,7 @@ import numpy as np
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint
 from models.humanoid.skeleton import BODIES, JOINTS, joint_range
-from sim.users.intent import Turn
+from sim.users.hand.actions import Turn
 
 # Share of the stylus's rotation about x (roll), y (pitch) and z (yaw) that each joint takes. In pitch and yaw the
 # shares add up to 1, so gaze follows one to one, with a leading trunk as in people; roll leans the trunk only.

@@ -1,20 +1,20 @@
 """A simulated person's internal model of the figure: its poses along the intended motion, and inverse Jacobians.
 
 From the pose of the figure that the person sees and from what her hand feels, she estimates the stylus's place relative
-to the motion that she has in mind (`sim.users.eye`).
+to the motion that she has in mind (`sim.users.person.eye`).
 """
 
 import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.state import Array
-from models.mocap.clip import pose_difference
+from models.mocap.motion.clip import pose_difference
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
 from sim.reference.reference import poses_along
-from sim.users.eye import Eye
 from sim.users.participant import Participant
-from sim.users.wishes import ENGAGED, PLACE
+from sim.users.person.eye import Eye
+from sim.users.person.wishes import ENGAGED, PLACE
 
 POSES = 128  # poses along a motion: some 3 degrees of a lap apart
 _BESIDE = 2e-3  # [m] step of the stylus for finite differences of the figure's pose

@@ -43,7 +43,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
 

@@ -18,7 +18,7 @@ from experiments.setups.budget import tank_for
 from experiments.setups.hands import handled, resolved_user, turning_remark, user_hand
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from experiments.setups.walls import figure_walls
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
 
 TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
 

@@ -13,7 +13,7 @@ from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts import ClipMapParts
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from sim.reference.reference import poses_along
 
 _FPS = 120.0  # [1/s] frame rate of the animation whose flights are judged

@@ -5,12 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.errors import ParameterError
 from controllers.state import Array
 from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
-from sim.users.arm import Arm
-from sim.users.intent import Grab, Push
+from sim.users.hand.actions import Grab, Push
+from sim.users.hand.arm import Arm
 from sim.users.intents import (
     Bend,
     ChangeOver,
@@ -25,7 +24,7 @@ from sim.users.intents import (
 )
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
-from sim.users.person import Person
+from sim.users.person.person import Person
 
 PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' continuous limit
 RIVER_PUSH = 1.0  # [N] of a push into another river: midway between too weak to get there and thrown out of it
@@ -94,11 +93,9 @@ def resolved_user(
     Raises
     ------
     ParameterError
-        If a hand that traces is also to grab.
+        If the default grabs are for a hand that does not grab (see `User`).
     """
     grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
-    if user.traces and grabs:
-        raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
     if user.does == "turn" and not turns:
         laps = range(1, max(2, int(seconds / lap)))
         turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))

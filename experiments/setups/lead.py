@@ -6,14 +6,15 @@ import mujoco
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
+from controllers.easing import cubic_steps
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait, Leading
 from controllers.haptic_map.led import Led
-from controllers.legs.grounded import Mask, runs
+from controllers.legs.grounded import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
+from controllers.state import Array, Mask
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
@@ -26,10 +27,10 @@ from experiments.setups.clips import load_clips
 from experiments.setups.hands import participant
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import Contacts, contacts
-from models.mocap.laps import CLOSES, lap_of
-from sim.users.arm import Arm
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation.laps import CLOSES, lap_of
+from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
@@ -215,6 +216,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
 def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     """Parts of a run in the mode "lead"."""
     field, course = leading(mode, maps.gait), s_curve()
+    config = replace(config, mode=replace(mode, floor_scale=field.scale))
     limiter = ForceLimiter(config.clock.servo_period)
     tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
     gait = field.gait
@@ -282,7 +284,5 @@ def walker_argument(s: Array) -> Array:
 def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
     """Progress from 0 to 1, sampled every `period` [s], at a constant rate with ramps of `ease` [s] at both ends."""
     t = np.arange(period, seconds + ease, period)
-    pace = np.clip(np.minimum(t, seconds + ease - t) / ease, 0.0, 1.0)
-    pace = pace * pace * (3.0 - 2.0 * pace)
-    total = np.cumsum(pace)
+    total = np.cumsum(cubic_steps(np.minimum(t, seconds + ease - t) / ease))
     return total / total[-1]

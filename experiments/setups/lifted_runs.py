@@ -15,7 +15,7 @@ from experiments.setups.pace import paced
 from experiments.setups.parts import RiverChoice
 from experiments.setups.rivers import BESIDE, river_time
 from sim.body.figure import FigureGains
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
 from sim.world.world import phantom_angles
 
 _SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed

@@ -18,12 +18,12 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import Clock, Figure, Phantom
 from experiments.results.summary import RunSummary
 from experiments.setups.expression import expressive_figure
-from models.mocap.clip import Clip
-from models.scene import SceneConfig
+from models.mocap.motion.clip import Clip
+from models.world.scene import SceneConfig
 from sim.body.figure import FigureGains
 from sim.recording.recording import Recording
-from sim.users.arm import Arm
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
+from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
 
 Map = TypeVar("Map", bound=HapticMap, covariant=True)

@@ -16,14 +16,14 @@ from experiments.config.run_config import ArmConfig
 from experiments.setups.budget import fastest, tank_for
 from experiments.setups.hands import lap_pushes
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.body.robot import robot_state
 from sim.compilation.units import Unit
 from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.reference import check_reference, poses_along, unlinked_reference
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.robot_world import RobotWorld

@@ -14,9 +14,9 @@ from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
 from experiments.setups.parts import Parts, Settings
 from models.humanoid.skeleton import N_POSE, standing_com
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import P_WH
+from models.world.scene import P_WH
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
 from sim.users.participant import Participant

@@ -15,7 +15,7 @@ from experiments.setups.lead import lead_parts, led_clips, led_parts
 from experiments.setups.parts import MapParts, Parts
 from experiments.setups.rivers import rivers_parts
 from experiments.setups.stretch import stretch_parts, stretch_then_follow_parts
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
     "follow": follow_parts,

@@ -32,9 +32,9 @@ from experiments.setups.hands import (
 )
 from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
-from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
-from sim.users.intent import Grab
+from models.mocap.motion.clip import Clip
+from sim.users.hand.actions import Grab
 
 REACH = 1.8  # [s] time of the default hand to get to a place: a quarter of a lap at about the curve's own pace
 # Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
@@ -142,11 +142,11 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
     remarks: list[str] = []
     if flying:
         remarks.append(
-            f"nobody hovers: where the hand is slower than the clips, the flights of {', '.join(flying)} are let down "
-            "to the floor, and a run may fall there"
+            f"where the hand is slower than the clips, the flights of {', '.join(flying)} are lowered to the floor, "
+            "and the figure may fall there"
         )
     if over:
-        remarks.append(f"who turns over in the air ({', '.join(over)}) and is held there falls")
+        remarks.append(f"a figure that is held upside down in the air, as in {', '.join(over)}, falls")
     return tuple(remarks)
 
 

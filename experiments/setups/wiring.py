@@ -21,8 +21,8 @@ from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import rest_pose
-from models.mocap.clip import Clip
-from models.scene import FIGURE
+from models.mocap.motion.clip import Clip
+from models.world.scene import FIGURE
 from sim.body.drive import BodyState
 from sim.body.figure import Figure
 from sim.body.unsimulated import kinematic_figure, no_figure
@@ -42,7 +42,7 @@ from sim.reference.reference import (
 )
 from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
@@ -51,7 +51,7 @@ from sim.world.world import World
 MOST_PACE = 1.4  # ratio of played to recorded pace, or its inverse, beyond which a remark is made
 
 Ready = Callable[[tuple[Unit, ...]], None]
-"""Called before compiled code is needed, with its units (see `experiments.compiling`)."""
+"""Called before compiled code is needed, with its units (see `experiments.console.compiling`)."""
 
 MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]
 """Maps configuration, figure and clips to the map's parts."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
+from controllers.easing import smooth_steps
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import Array
@@ -21,7 +22,7 @@ from experiments.lifting.in_betweens import largest_slide, soles
 from experiments.setups.clips import load_clips
 from experiments.setups.rivers import river_bundle
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import pose_difference
+from models.mocap.motion.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
@@ -77,9 +78,8 @@ def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
 def played_change(rivers: RiverClips, first: int, second: int | None, moment: float, period: float = PERIOD) -> Array:
     """Poses from the moment [s] at which the hand changes to the second river, or, if it is None, is thrown off."""
     figure = figure_model()
-    t = np.arange(round((moment + _AFTER) / period)) * period
-    s = np.clip((t - moment) / _GLIDE + (0.0 if second is None else 0.5), 0.0, 1.0)[:, None]
-    s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    t = period * np.arange(round((moment + _AFTER) / period), dtype=np.float64)
+    s = smooth_steps((t - moment) / _GLIDE + (0.0 if second is None else 0.5))[:, None]
     there = rivers.curves[first].point(t % LAP)
     away = _THROWN if second is None else rivers.curves[second].point(t % LAP) - there
     traces = np.zeros((len(t), TRACE_SIZE))

@@ -27,14 +27,13 @@ from experiments.config.modes import Rivers
 from experiments.setups.defaults import river_gains
 from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
 from experiments.studies.field_figures import SPEED, straight_river
-from models.scene import PHANTOM, SceneConfig
-from sim.users.arm import Arm
-from sim.users.intent import Push
+from models.world.scene import PHANTOM, SceneConfig
+from sim.users.hand.actions import Push
+from sim.users.hand.arm import Arm
 from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import place_stylus
 
-IntArray = npt.NDArray[np.int64]
 Form = Literal["discrete", "smooth"]
 
 ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)

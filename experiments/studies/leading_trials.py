@@ -26,7 +26,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP, Conditions, Trial
 from experiments.setups.lead import s_curve
 from experiments.studies.trial_onset import observed, predicted
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 
 SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials, with which the walker's motion is negligible
 EXCESS = 1e-4  # [m] distance of the stylus from the edge, on the side where the spring acts

@@ -22,10 +22,10 @@ from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.results.figures import AXES, STYLE
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
-from experiments.run import run
+from experiments.runs.run import run
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE
-from models.scene import FIGURE, world_model
+from models.world.scene import FIGURE, world_model
 from sim.recording.recording import Recording
 from sim.reference.reference import poses_along
 

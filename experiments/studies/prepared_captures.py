@@ -18,7 +18,7 @@ from models.mocap.preparation.well_formed import WellFormed, well_formed
 SECONDS = 20.0  # [s] for which the figure follows each clip
 HEAD = (
     "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
-    "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root moved RMS | most "
+    "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root from the capture, RMS | most "
     "| processor time: s, times the clip, times simulating |\n"
     "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 )
@@ -28,7 +28,8 @@ def row(name: str, made: Prepared) -> str:
     """A line of the table."""
     was, now = well_formed(made.captured), well_formed(made.clip)
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
-    change, seconds = made.feasible, made.clip.duration
+    change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
+    most = kept.extremes[0]
     why = "" if after.stands else "motion" if not made.near or change.residual > LEAPING / 2 else "figure"
     cells = (
         name,
@@ -44,8 +45,8 @@ def row(name: str, made: Prepared) -> str:
         f"{was.seam:.1f} → {now.seam:.1f}",
         f"{was.falling:.1f} → {now.falling:.1f}",
         f"{np.rad2deg(was.excess):.0f} → {np.rad2deg(max(now.excess, 0.0)):.0f}",
-        f"{np.rad2deg(change.turned):.1f}°, {100 * change.moved:.1f} cm",
-        f"{change.joint} {np.rad2deg(change.most_turned):.0f}°, {100 * change.furthest:.0f} cm",
+        f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
+        f"{most.joint} {np.rad2deg(most.angle):.0f}°",
         f"{made.seconds:.1f}, {made.seconds / seconds:.1f}, {made.seconds / (seconds * after.cost):.0f}",
     )
     return "| " + " | ".join(cells) + " |"

@@ -30,10 +30,10 @@ from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.setups.wiring import wire
-from experiments.trials.trial_log import TrialLog
+from experiments.trials.trial.trial_log import TrialLog
 from models.errors import ModelError
-from models.mocap.clip import Clip
-from models.mocap.ranges import beyond_ranges
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from sim.body.falls import UP
 from sim.loop.loop import Loop
 

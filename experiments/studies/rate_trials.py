@@ -30,7 +30,7 @@ from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
 from sim.world.phantom_port import sense_in_motion

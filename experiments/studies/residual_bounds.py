@@ -16,10 +16,10 @@ from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.wiring import wire
-from experiments.trials.trial_log import TrialLog
+from experiments.trials.trial.trial_log import TrialLog
 from models.humanoid.skeleton import DEFAULT_MASS
-from models.mocap.clip import Clip
 from models.mocap.library import embedded_names
+from models.mocap.motion.clip import Clip
 from sim.body.falls import UP
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, track

@@ -18,14 +18,14 @@ from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
 from controllers.state import Array
-from experiments.compiling import compile_once
 from experiments.config.run_config import ArmConfig, RunConfig
 from experiments.config.words import run_config
+from experiments.console.compiling import compile_once
 from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.body.figure_state import REPORT_DOWN
 from sim.compilation.units import Unit
 from sim.loop.loop import Loop, pose_errors, tick_channels

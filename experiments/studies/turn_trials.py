@@ -21,7 +21,7 @@ from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 _STEP = 5e-5  # of the simulation [s]
 _FOOT = 1.0  # mass of the foot [kg], radius of its sole 0.1 m

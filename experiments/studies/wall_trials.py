@@ -13,11 +13,11 @@ from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import JOINTS, N_POSE, joint_range
-from models.mocap.clip import Clip
 from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
 BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits

@@ -14,17 +14,17 @@ from experiments.config.part import to_json
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.tidy import table, write_table
-from experiments.trials.code_hash import code_hash
-from experiments.trials.database import Database
-from experiments.trials.drive import run_missing, warm
-from experiments.trials.errors import StudyError
-from experiments.trials.executors import executor
-from experiments.trials.measures import MEASURES, OF_CONDITIONS, measures_of
-from experiments.trials.plan import Trial, planned
-from experiments.trials.recordings_place import check_place
-from experiments.trials.run_trial import SHELF, Row
-from experiments.trials.study_config import StudyConfig, read_toml, study_from
-from experiments.trials.where import Where
+from experiments.trials.design.code_hash import code_hash
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.plan import Trial, planned
+from experiments.trials.design.study_config import StudyConfig, read_toml, study_from
+from experiments.trials.execution.database import Database
+from experiments.trials.execution.drive import run_missing, warm
+from experiments.trials.execution.executors import executor
+from experiments.trials.execution.recordings_place import check_place
+from experiments.trials.execution.where import Where
+from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
+from experiments.trials.trial.run_trial import SHELF, Row
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -109,7 +109,7 @@ class Study:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """All planned trials; see `experiments.trials.plan.planned`."""
+        """All planned trials; see `experiments.trials.design.plan.planned`."""
         return planned(self.config)
 
     def run(

@@ -8,13 +8,13 @@ import numpy as np
 from controllers.state import Array
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
-from experiments.trials.database import Database
-from experiments.trials.drive import Executor
-from experiments.trials.errors import StudyError
-from experiments.trials.participants import participants
-from experiments.trials.plan import key_of
-from experiments.trials.run_trial import Row, Task
-from experiments.trials.study_config import Users
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.participants import participants
+from experiments.trials.design.plan import key_of
+from experiments.trials.design.study_config import Users
+from experiments.trials.execution.database import Database
+from experiments.trials.execution.drive import Executor
+from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning.tune_config import MARGIN, TuneConfig
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from controllers.certificates.report import hash_of
 from controllers.errors import ParameterError
 from experiments.certify.certify_simulation import certify
-from experiments.run_result import Run
-from experiments.simulation import Simulation, User
-from experiments.sweep import with_values
+from experiments.runs.run_result import Run
+from experiments.runs.simulation import Simulation, User
+from experiments.runs.sweep import with_values
 
 Cost = Callable[[Run], float | Sequence[float]]
 

@@ -10,10 +10,10 @@ from pydantic import Field
 from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.trials.errors import StudyError
-from experiments.trials.measures import MEASURES, OF_CONDITIONS, measures_of
-from experiments.trials.participants import participants
-from experiments.trials.study_config import Users, Words, read_toml
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.participants import participants
+from experiments.trials.design.study_config import Users, Words, read_toml
+from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
 
 MARGIN = "margin"
 """Objective that is not a measure of trials: the certificate's margin (critical k_r)/k_r − 1, to be maximised."""
@@ -47,8 +47,8 @@ class TuneConfig:
     space : mapping
         Range of each tuned parameter, by word of a run.
     objectives : tuple of str
-        Measures of trials (see `experiments.trials.measures`), each the mean over the panel, or "margin"; for more than
-        one a Pareto front is sought.
+        Measures of trials (see `experiments.trials.trial.measures`), each the mean over the panel, or "margin"; for
+        more than one a Pareto front is sought.
     run : mapping
         Words of a run that all candidates share.
     users : Users

@@ -14,12 +14,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from experiments.certify.certify import certify_into
 from experiments.config.part import to_json
 from experiments.files.json_text import json_text
-from experiments.trials.database import Database
-from experiments.trials.drive import warm
-from experiments.trials.errors import StudyError
-from experiments.trials.executors import executor
-from experiments.trials.run_trial import SHELF
-from experiments.trials.where import Where
+from experiments.trials.design.errors import StudyError
+from experiments.trials.execution.database import Database
+from experiments.trials.execution.drive import warm
+from experiments.trials.execution.executors import executor
+from experiments.trials.execution.where import Where
+from experiments.trials.trial.run_trial import SHELF
 from experiments.tuning.contenders import Contender, contenders, interval, wins
 from experiments.tuning.page import tuning_page
 from experiments.tuning.panel import Panel, panel_runs

@@ -17,11 +17,10 @@ import numpy.typing as npt
 from models.errors import ModelError
 
 Pose = npt.NDArray[np.float64]
-Tangent = npt.NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
-DEFAULT_STATURE = 1.75
-DEFAULT_MASS = 75.0
+DEFAULT_STATURE = 1.75  # [m]
+DEFAULT_MASS = 75.0  # [kg]
 
 
 class Segment(NamedTuple):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from models.errors import ModelError
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic
@@ -15,6 +15,7 @@ from models.mocap.readers.motion_file import MotionFileError, numbered_lines
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.retarget import Hints, RetargetReport, retarget
+from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 
 _FORMATS = "BVH, AMC (with its ASF beside it) or DeepMimic JSON"
@@ -86,11 +87,13 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     motion = read_motion(path)
     if (clip := own_clip(motion)) is not None:
         return Loaded(clip, None)
-    roles = roles_of(motion.joints, motion.parents)
+    hints = hints or Hints()
+    roles = roles_of(motion.joints, motion.parents) if hints.roles is None else stated_roles(hints.roles, motion)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
-        raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", "the skeleton of a human")
-    return Loaded(*retarget(motion, roles, hints or Hints()), motion.loops)
+        expected = "the skeleton of a human, or --roles FILE that says which joint is which"
+        raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", expected)
+    return Loaded(*retarget(motion, roles, hints), motion.loops)
 
 
 def read_motion(path: Path) -> SourceMotion:

@@ -48,8 +48,6 @@ class PhantomParameters:
         Capstan ratios: motor turns per joint turn [C].
     rotor_inertia : float
         Rotor inertia of one motor [kg m²] [O]; public models of the RE 25 have 1.03e-6 and 1.07e-6.
-    torque_constant : float
-        Torque constant of the motors [N m/A] [M].
     continuous_motor_torque, stall_motor_torque : float
         Continuous and stall torque at the motor shaft [N m] [M].
     encoder_counts : int
@@ -88,7 +86,6 @@ class PhantomParameters:
     inertia_base_yy: float
     capstan: Triple
     rotor_inertia: float
-    torque_constant: float
     continuous_motor_torque: float
     stall_motor_torque: float
     encoder_counts: int
@@ -144,7 +141,6 @@ PREMIUM_1_5 = PhantomParameters(
     inertia_base_yy=11.87e-4,
     capstan=(13.3, 11.2, 11.2),
     rotor_inertia=1.08e-6,
-    torque_constant=0.0234,
     continuous_motor_torque=0.0286,
     stall_motor_torque=0.129,
     encoder_counts=4096,

@@ -5,7 +5,7 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-from models.phantom.parameters import GRAVITY, PREMIUM_1_5, Pair, Triple
+from models.phantom.parameters import PREMIUM_1_5, Pair, Triple
 
 MOTOR_JOINTS = ("theta1", "theta2", "theta3")
 CLOSING_JOINTS = ("elbow", "twin")
@@ -70,11 +70,3 @@ def phantom_spec() -> mujoco.MjSpec:
         item.armature, item.damping = p.gimbal_inertia[axis], np.array([p.gimbal_damping, 0.0, 0.0])
         _set_range(spec, joint, p.gimbal_limit[axis])
     return spec
-
-
-def phantom_model() -> mujoco.MjModel:
-    """The Phantom alone, compiled, with gravity along −y of its own frame P, which is the world's here."""
-    spec = phantom_spec()
-    spec.option.gravity = np.array([0.0, -GRAVITY, 0.0])
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    return spec.compile()

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 _MARGIN = 8  # frames of the neighbouring laps that the spline is fitted to beyond both ends
 _SEAM = 1e-3  # [rad], [m]: largest gap between last and first frame of a clip that is repeated

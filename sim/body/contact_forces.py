@@ -22,8 +22,8 @@ from controllers.work_array import work_array
 from sim.body.stance import factor, substitute
 
 N_EDGES = 4  # edges of a linearised friction cone
-_STEPS = 40
-_TOLERANCE = 1e-10
+_STEPS = 40  # most Newton steps; a handful is usual
+_TOLERANCE = 1e-10  # of the gradient's norm, in units of b, which is of order one: far below a residual that matters
 
 
 @njit

@@ -3,7 +3,8 @@
 import numpy as np
 from numba import njit
 
-from sim.body.figure_state import Array, FigureState
+from controllers.state import Array
+from sim.body.figure_state import FigureState
 
 
 @njit

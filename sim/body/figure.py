@@ -26,6 +26,7 @@ import numpy as np
 
 from controllers.kernel_call import call_as_given
 from controllers.lent import lend
+from controllers.state import Array
 from models.humanoid.skeleton import (
     BODIES,
     CONTACT_RADIUS,
@@ -40,7 +41,7 @@ from models.humanoid.skeleton import (
 from sim.body.contact_forces import N_EDGES
 from sim.body.drive import drive_unit
 from sim.body.falls import fall_state
-from sim.body.figure_state import REPORT_SIZE, Array, FigureGains, FigureState
+from sim.body.figure_state import REPORT_SIZE, FigureGains, FigureState
 from sim.body.mass_matrix import mass_matrix
 from sim.body.whole_body import figure_torque
 from sim.compilation.compiled import entry_point

@@ -2,14 +2,10 @@
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.body.falls import FallState
 from sim.body.mass_matrix import MassMatrix
 
-IntArray = npt.NDArray[np.int64]
 N_FOOT = 4  # contact points of a foot
 
 REPORT_SUPPORT, REPORT_SATURATED, REPORT_RESIDUAL, REPORT_FLIES, REPORT_DOWN, REPORT_SIZE = 0, 1, 2, 8, 9, 10

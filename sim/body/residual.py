@@ -13,7 +13,8 @@ import numpy as np
 
 from controllers.state import Array
 
-FORCE, MOMENT = 0.05, 0.01
+FORCE, MOMENT = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h
+SUPPORTS = 1.0  # [N] vertical ground reaction force from which the ground supports the figure
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numba import njit
 
 from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS
-from models.scene import ROBOT
+from models.world.scene import ROBOT
 from sim.compilation.native import mj_full_m
 from sim.errors import SimError
 from sim.world.robot_world import RobotWorld

@@ -13,13 +13,10 @@ flat.
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from controllers.work_array import work_array
-
-IntArray = npt.NDArray[np.int64]
 
 _ADHERENCE = 300.0  # κ, weight of contact points at rest against small δ
 _SETTLING = 40.0  # η [1/s], rate at which a foot is to come to rest on the floor

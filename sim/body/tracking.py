@@ -6,30 +6,26 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from numba import typeof, types
 
 from controllers.kernel_call import call_as_given
 from controllers.lent import lend
-from controllers.state import Array
+from controllers.state import Array, Mask
 from models.floor import add_floor
-from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, N_JOINTS, figure_model, figure_spec, standing_com
-from models.mocap.clip import Clip, pose_difference
+from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
+from models.mocap.motion.clip import Clip, pose_difference
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
-from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, REPORT_SIZE
-from sim.body.residual import Residual, ResidualMeasure
+from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SIZE
+from sim.body.residual import SUPPORTS, Residual, ResidualMeasure
 from sim.compilation.compiled import entry_point
 from sim.compilation.native import mj_step
 from sim.compilation.units import Unit
 from sim.errors import SimError
 
-Flags = npt.NDArray[np.bool_]
-
 _PREFIX = "figure/"
-_BEARS = 1.0  # [N] vertical ground reaction force from which the ground supports the figure
 
 
 @dataclass(frozen=True)
@@ -123,8 +119,6 @@ class TrackingReport:
         Share of the reference's time out of flight in which the ground supports the figure.
     slide : float
         Foot skate: largest distance that a contact point slid over the floor while in contact [m].
-    saturation : float
-        Share of motors at their limits, mean over time.
     warnings : int
         Number of MuJoCo's warnings.
     """
@@ -143,7 +137,6 @@ class TrackingReport:
     without_ground_force: Residual
     grounded: float
     slide: float
-    saturation: float
     warnings: int
 
     def __str__(self) -> str:
@@ -247,14 +240,14 @@ def report(motion: TrackedMotion) -> TrackingReport:
     period = float(times[1] - times[0]) if len(times) > 1 else 0.0
     up = motion.reports[:, REPORT_DOWN] == UP
     falls = times[~up & np.concatenate(([True], up[:-1]))]
-    flies, bears = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > _BEARS
+    flies, bears = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > SUPPORTS
     wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
     difference = pose_difference(motion.poses[up], motion.reference.poses[up])
     angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)
     root = np.linalg.norm(difference[:, :3], axis=1)
-    touches: Flags = np.less(motion.contacts[:, :, 2], 0.0) & up[:, None]
+    touches: Mask = np.less(motion.contacts[:, :, 2], 0.0) & up[:, None]
 
-    def residual(rows: Flags) -> Residual:
+    def residual(rows: Mask) -> Residual:
         measure = ResidualMeasure(motion.weight, motion.com_height, period)
         measure.add(wrench[up & rows])
         return measure.summary()
@@ -275,7 +268,6 @@ def report(motion: TrackedMotion) -> TrackingReport:
         without_ground_force=residual(~bears),
         grounded=float(np.mean(bears[stands])) if stands.any() else 1.0,
         slide=_slide(motion.contacts, touches),
-        saturation=float(motion.reports[up, REPORT_SATURATED].mean()) / (3 * N_JOINTS) if up.any() else 0.0,
         warnings=motion.warnings,
     )
 
@@ -284,7 +276,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def _slide(contacts: Array, touches: Flags) -> float:
+def _slide(contacts: Array, touches: Mask) -> float:
     """Largest horizontal distance of a point in contact from where the contact began [m]."""
     largest = 0.0
     for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):

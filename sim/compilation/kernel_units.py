@@ -8,17 +8,14 @@ function that Python calls.
 from collections.abc import Callable, Iterable
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
-
-IntArray = npt.NDArray[np.int64]
 
 for _kernel in MAP_KERNELS.values():  # what Python asks of a map is answered by its unit
     keep_on_disk(_kernel)

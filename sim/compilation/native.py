@@ -15,7 +15,6 @@ from sim.errors import SimError
 
 _address = types.uintp
 _double = types.CPointer(types.float64)
-_int = types.intc
 _void = types.void
 
 
@@ -35,20 +34,11 @@ _load_library()
 mj_step = types.ExternalFunction("mj_step", _void(_address, _address))
 """mj_step(m, d): advance one physics step."""
 
-mj_forward = types.ExternalFunction("mj_forward", _void(_address, _address))
-"""mj_forward(m, d): everything but the integration."""
-
 mj_kinematics = types.ExternalFunction("mj_kinematics", _void(_address, _address))
 """mj_kinematics(m, d): positions of bodies, geoms and sites."""
 
 mj_full_m = types.ExternalFunction("mj_fullM", _void(_address, _address, _double))
 """mj_fullM(m, d, M): dense mass matrix, shape (nv, nv)."""
-
-mj_rne = types.ExternalFunction("mj_rne", _void(_address, _address, _int, _double))
-"""mj_rne(m, d, with_acceleration, result): M a + c (or c alone), without armature and passive forces."""
-
-mj_jac = types.ExternalFunction("mj_jac", _void(_address, _address, _double, _double, _double, _int))
-"""mj_jac(m, d, jacp, jacr, point, body): Jacobians (3, nv) of a point of a body."""
 
 mj_differentiate_pos = types.ExternalFunction(
     "mj_differentiatePos", _void(_address, _double, types.float64, _double, _double)

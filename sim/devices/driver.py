@@ -47,7 +47,7 @@ class DeviceIdentity(NamedTuple):
     forces : bool
         Whether it has motors.
     watchdog : bool
-        Whether its firmware switches the motors off when commands stop. The user is told where there is none.
+        Whether its firmware switches the motors off when commands stop; if not, the user is warned.
     calibrated : bool
         Whether the zero of its encoders is known.
     power_up : int

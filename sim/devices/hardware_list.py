@@ -27,7 +27,7 @@ from sim.devices.hidapi_node import HidapiNode
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
-_TOUCH = (0x2988, 0x0304)
+_TOUCH_IDS = (0x2988, 0x0304)  # USB vendor and product of the Touch
 _CONNEXION, _LOGITECH = 0x256F, 0x046D
 _GENERIC_DESKTOP, _MULTI_AXIS = 0x01, 0x08
 _BUSES = {1: "usb", 2: "bluetooth", 3: "i2c", 4: "spi"}  # hidapi's hid_bus_type
@@ -76,7 +76,7 @@ class FoundDevice:
         ids = f"{self.vendor_id:04x}:{self.product_id:04x}" if self.vendor_id else "-"
         return f"{self.bus or '-':9} {ids:9} {self.transport:7} {self.path}"
 
-    def who(self) -> str:
+    def maker_and_product(self) -> str:
         """Vendor and product, as the device reports them."""
         return " ".join(filter(None, (self.vendor, self.product)))
 
@@ -120,7 +120,7 @@ def _hid_device(row: dict[str, Any]) -> FoundDevice:
     ids, usage = (row["vendor_id"], row["product_id"]), (row["usage_page"], row["usage"])
     serial = row["serial_number"] or ""
     name, kind, note = "", "other", "not a device that moves a stylus"
-    if ids == _TOUCH:
+    if ids == _TOUCH_IDS:
         kind = "touch"
         note = "its HID reports are not public, so nothing is sent to it; use hdapi, with OpenHaptics installed"
     elif usage == (protocol.USAGE_PAGE, protocol.USAGE):

@@ -130,7 +130,7 @@ class HdapiDevice:
                 "set-up, and the device switched on"
             )
         self.telemetry = fresh_telemetry()
-        self.identity = self._who(self._calibrated())
+        self.identity = self._identity(self._calibrated())
         functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
         addresses = [address_of(function) for function in functions]
         memory = HdMemory.fresh(addresses, self._device, self._nominal_force(), self.telemetry)
@@ -175,7 +175,7 @@ class HdapiDevice:
             self._hd.hdUpdateCalibration(self._integer(_CALIBRATION_STYLE))
         return self._hd.hdCheckCalibration() == _CALIBRATION_OK
 
-    def _who(self, calibrated: bool) -> DeviceIdentity:
+    def _identity(self, calibrated: bool) -> DeviceIdentity:
         name, serial = (self._hd.hdGetString(which) or b"" for which in (_MODEL, _SERIAL))
         # The library documents no watchdog of the device, so none is assumed.
         return DeviceIdentity(

@@ -98,18 +98,18 @@ class HidPhantom:
             raise DriverFault(Fault.UNPLUGGED) from None
 
     def _take_identity(self) -> None:
-        who = self._feature(protocol.IDENTITY)
-        if int(who["magic"]) != protocol.MAGIC:
+        identity = self._feature(protocol.IDENTITY)
+        if int(identity["magic"]) != protocol.MAGIC:
             raise SimError(
-                f"{self._transport} answers with the mark {int(who['magic']):#x}; expected {protocol.MAGIC:#x}"
+                f"{self._transport} answers with the mark {int(identity['magic']):#x}; expected {protocol.MAGIC:#x}"
             )
-        if int(who["major"]) != protocol.VERSION[0]:
-            raise DriverFault(Fault.VERSION_WRONG, int(who["major"]))
-        self._who, numbers = who, self._hid.numbers
-        numbers[N_BOOT] = int(who["boot"])
-        numbers[N_WATCHDOG] = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
-        self._hid.peak[:] = who["peak_torque"] * protocol.PEAK_UNIT
-        self._capabilities = int(who["capabilities"])
+        if int(identity["major"]) != protocol.VERSION[0]:
+            raise DriverFault(Fault.VERSION_WRONG, int(identity["major"]))
+        self._identity_report, numbers = identity, self._hid.numbers
+        numbers[N_BOOT] = int(identity["boot"])
+        numbers[N_WATCHDOG] = min(round(WATCHDOG * 1e6), int(identity["watchdog_max_us"]))
+        self._hid.peak[:] = identity["peak_torque"] * protocol.PEAK_UNIT
+        self._capabilities = int(identity["capabilities"])
 
     def _take_calibration(self) -> None:
         found = self._feature(protocol.CALIBRATION)
@@ -120,11 +120,11 @@ class HidPhantom:
                 f"{turns.tolist()}; expected none to be 0"
             )
         self._hid.zero[:], self._hid.angle[:], self._hid.turns[:] = found["zero"], 2.0 * np.pi / counts, turns
-        who = self._who
+        given = self._identity_report
         motors, watchdog = (bool(self._capabilities & able) for able in (protocol.HAS_MOTORS, protocol.HAS_WATCHDOG))
         self.identity = DeviceIdentity(
-            who["name"].decode(errors="replace"), self._transport, who["serial"].decode(errors="replace"),
-            who["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
+            given["name"].decode(errors="replace"), self._transport, given["serial"].decode(errors="replace"),
+            given["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
             watchdog and int(self._hid.numbers[N_WATCHDOG]) > 0, bool(found["flags"] & protocol.CALIBRATED),
             int(self._hid.numbers[N_BOOT]),
         )  # fmt: skip

@@ -6,9 +6,9 @@ from numba import njit
 
 from controllers.state import HAND_TIME, Array
 from sim.compilation.units import Unit
-from sim.users.arm import Arm
-from sim.users.person_state import PersonState
-from sim.users.person_unit import link_person, person_unit
+from sim.users.hand.arm import Arm
+from sim.users.person.person_state import PersonState
+from sim.users.person.person_unit import link_person, person_unit
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
 

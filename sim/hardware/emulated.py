@@ -11,12 +11,12 @@ import numpy as np
 from controllers.state import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.devices.driver import READ, DeviceIdentity, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
 from sim.errors import SimError
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.linkage import Linkage
 from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_hand, make_plant

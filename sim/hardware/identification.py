@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
-from controllers.state import Array
+from controllers.state import Array, Mask
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
@@ -105,7 +105,7 @@ class Identified:
     unexplained: float
 
 
-def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: npt.NDArray[np.bool_]) -> list[Motion]:
+def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: Mask) -> list[Motion]:
     """Split a recording into stretches of consecutive usable ticks, each longer than three windows.
 
     Parameters
@@ -137,8 +137,8 @@ class _Equations(NamedTuple):
     torque: Array  # torques of the intervals at shifts of −2 … 1 periods [N m], shape (windows, length, 4, 3)
     period: float  # [s]
     grain: Array  # standard deviation of the readings' noise [rad], shape (3,)
-    usable: npt.NDArray[np.bool_]  # whether a joint moved throughout a window, shape (windows, 3)
-    breaks: npt.NDArray[np.bool_]  # whether a window is the first of a motion, shape (windows,)
+    usable: Mask  # whether a joint moved throughout a window, shape (windows, 3)
+    breaks: Mask  # whether a window is the first of a motion, shape (windows,)
 
 
 def identify_linkage(motions: Sequence[Motion]) -> Identified:

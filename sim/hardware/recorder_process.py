@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import CHANNELS, ROW_SIZE, columns
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin

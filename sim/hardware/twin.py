@@ -22,21 +22,18 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import PHANTOM, SceneConfig
+from models.world.scene import PHANTOM, SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.world.phantom_port import ARM_JOINTS, MOTORS
 from sim.world.plant import Plant, make_plant, step
 from sim.world.world import World
-
-IntArray = npt.NDArray[np.int64]
 
 BANDWIDTH = 2.0 * math.pi * 30.0
 """ω of the observer [rad/s]: above a hand's motion, below the noise of the encoders' differences."""

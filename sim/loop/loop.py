@@ -19,7 +19,7 @@ from controllers.state import (
     HandState,
 )
 from models.humanoid.skeleton import N_POSE
-from models.mocap.clip import pose_difference
+from models.mocap.motion.clip import pose_difference
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
 from sim.body.robot import RobotState
 from sim.body.unsimulated import KinematicFigure, NoFigure

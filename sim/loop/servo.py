@@ -19,7 +19,6 @@ steps 1–5 and of the user's hand are then taken from the recording, so a run i
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.fields.instructions import TRACE_SIZE
@@ -31,7 +30,7 @@ from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
@@ -39,8 +38,6 @@ from sim.devices.device import DeviceState, actuate, advance, link_device, sense
 from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
 from sim.world.plant import Plant
-
-IntArray = npt.NDArray[np.int64]
 
 
 class Field(NamedTuple):

@@ -111,6 +111,8 @@ class Recording:
 
     Attributes
     ----------
+    path : Path
+        Its file.
     config : dict
         Configuration of the run.
     seed : int
@@ -133,7 +135,7 @@ class Recording:
     """
 
     def __init__(self, path: Path):
-        self._path = path
+        self.path = path
         try:
             self._file = _opened(path)
         except OSError as error:
@@ -173,7 +175,7 @@ class Recording:
         for name, node in nodes.items():
             n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
             self.groups[name] = {
-                key: Channel(dataset_of(node, key), n, self._path) for key in _names(node) if key not in RESERVED
+                key: Channel(dataset_of(node, key), n, self.path) for key in _names(node) if key not in RESERVED
             }
 
     def channel(self, group: str, name: str) -> Channel:
@@ -186,11 +188,9 @@ class Recording:
         """
         channels = self.groups.get(group, {})
         if name not in channels:
-            raise RecordingError(f"{self._path}: no channel {group}/{name}; {group} has {sorted(channels)}")
+            raise RecordingError(f"{self.path}: no channel {group}/{name}; {group} has {sorted(channels)}")
         if len(channels[name]) == 0:
-            raise RecordingError(
-                f"{self._path}: {group}/{name} has no rows; the run ended before the first was written"
-            )
+            raise RecordingError(f"{self.path}: {group}/{name} has no rows; the run ended before the first was written")
         return channels[name]
 
     def array(self, name: str) -> Array:
@@ -202,7 +202,7 @@ class Recording:
             If there is no array of that name.
         """
         if name not in self.arrays:
-            raise RecordingError(f"{self._path}: no array {name}; there are {sorted(self.arrays)}")
+            raise RecordingError(f"{self.path}: no array {name}; there are {sorted(self.arrays)}")
         return self.arrays[name]
 
     @property

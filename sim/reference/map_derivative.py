@@ -1,18 +1,15 @@
 """The derivative of a haptic map at one stylus pose, from Python, with the same compiled kernels as the servo."""
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 
 from controllers.fields.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.units import Unit
-
-IntArray = npt.NDArray[np.int64]
 
 
 @entry_point

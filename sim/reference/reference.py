@@ -4,7 +4,6 @@ import math
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from numba import typeof, types
 
 from controllers.fields.instructions import VECTOR
@@ -15,7 +14,7 @@ from controllers.haptic_map.river_clips import RIVER_CLIPS
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
 from controllers.lent import Lent, lend
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.units import Unit
@@ -24,9 +23,6 @@ from sim.reference.reference_state import CompiledReference
 from sim.reference.stylus_filter import turn_rate
 from sim.reference.transition import make_transition
 from sim.reference.update import update_reference, update_river_reference
-
-IntArray = npt.NDArray[np.int64]
-
 
 _MATRIX = types.Array(types.float64, 2, "C")
 _ROUNDS = 8  # fixed-point iterations of `begin_in_motion`; each gains at least three digits

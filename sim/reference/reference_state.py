@@ -2,16 +2,12 @@
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from sim.reference.stylus_filter import turned_on
 from sim.reference.transition import Transition, carry_on
-
-IntArray = npt.NDArray[np.int64]
 
 
 class CompiledReference(NamedTuple):

@@ -17,6 +17,7 @@ import math
 import numpy as np
 from numba import njit, types
 
+from controllers.easing import cubic_step
 from controllers.legs.footsteps import lever, limb_end
 from controllers.legs.limbs import LIMB
 from controllers.state import Array
@@ -31,20 +32,13 @@ _ROUND = 4e-3  # r [m], rounds the onset of S
 
 
 @njit
-def _smooth(x: float) -> float:
-    """The smooth step 3x² − 2x³, with x clamped to 0 … 1."""
-    x = min(max(x, 0.0), 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
-@njit
 def slowness(p: Array, v: Array, seconds: float) -> float:
     """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips that last `seconds`."""
     square = p[0] * p[0] + p[1] * p[1]
     if square == 0.0:
         return 1.0
     pace = abs(p[0] * v[1] - p[1] * v[0]) / square * seconds / (2.0 * math.pi)
-    return _smooth((_FLOWN - pace) / (_FLOWN - _HELD))
+    return cubic_step((_FLOWN - pace) / (_FLOWN - _HELD))
 
 
 @njit
@@ -84,7 +78,7 @@ def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
     above = clearance(limbs, ends, pose)
     upright = 1.0 - 2.0 * (pose[4] ** 2 + pose[5] ** 2)
     if above > 0.0:
-        pose[2] -= min(share, 1.0) * _smooth(2.0 * upright) * above**3 / (above**2 + _ROUND**2)
+        pose[2] -= min(share, 1.0) * cubic_step(2.0 * upright) * above**3 / (above**2 + _ROUND**2)
 
 
 @entry_point

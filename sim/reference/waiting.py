@@ -10,7 +10,8 @@ from controllers.state import Array
 from sim.reference.settling import clearance
 from sim.reference.transition import DWELL, Transition
 
-_STANDS, _LEAPS = 0.01, 0.05  # [m] clearance of the feet: below the first it stands, above the second it is in a leap
+_FEET_DOWN = 0.01  # [m] clearance of the feet below which the figure stands
+_FEET_UP = 0.05  # [m] clearance of the feet above which it is in a leap
 _RISES = 0.6  # [m/s] vertical speed of the root from which the figure is about to take off
 _PATIENCE = 1.0  # [s] for which a change waits at most
 
@@ -18,13 +19,13 @@ _PATIENCE = 1.0  # [s] for which a change waits at most
 @njit
 def stands(transition: Transition, pose: Array, rise: float) -> bool:
     """Whether a figure is on the floor and not about to take off, given the vertical speed of its root [m/s]."""
-    return clearance(transition.limbs, transition.ends, pose) < _STANDS and rise < _RISES
+    return clearance(transition.limbs, transition.ends, pose) < _FEET_DOWN and rise < _RISES
 
 
 @njit
 def leaps(transition: Transition, pose: Array) -> bool:
     """Whether a pose is in the middle of a flight, where no new motion may begin."""
-    return clearance(transition.limbs, transition.ends, pose) > _LEAPS
+    return clearance(transition.limbs, transition.ends, pose) > _FEET_UP
 
 
 @njit

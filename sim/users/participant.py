@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.errors import SimError
-from sim.users import person_state as at
-from sim.users.body import arm_matrices, check_steps
-from sim.users.chance import fresh_chance
-from sim.users.eye import LOOKS, no_eye
 from sim.users.intents.own import Own
-from sim.users.person import Person
-from sim.users.person_state import PersonState
-from sim.users.wishes import Wishes
+from sim.users.person import person_state as at
+from sim.users.person.body import arm_matrices, check_steps
+from sim.users.person.chance import fresh_chance
+from sim.users.person.eye import LOOKS, no_eye
+from sim.users.person.person import Person
+from sim.users.person.person_state import PersonState
+from sim.users.person.wishes import Wishes
 
 LONGEST_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
 _QUALITY = 4.0  # quality factor of the tremor's resonance: a peak some 2 Hz wide

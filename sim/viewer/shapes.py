@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import trimesh
 from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
-from controllers.state import Array
-from models.scene import FIRST_HIDDEN_GROUP
+from controllers.state import Array, IntArray
+from models.world.scene import FIRST_HIDDEN_GROUP
 
 TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 
@@ -34,7 +33,7 @@ class Shape(NamedTuple):
 
     body: int
     vertices: Array
-    faces: npt.NDArray[np.int64]
+    faces: IntArray
     rgba: tuple[float, float, float, float]
 
 
@@ -94,7 +93,7 @@ def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
     return made
 
 
-def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDArray[np.int64]]:
+def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray]:
     """Surface of the tube around a polyline, without caps; closed if the last point equals the first.
 
     The rings are oriented by parallel transport, so that the surface does not twist more than the line does.

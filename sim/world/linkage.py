@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.errors import SimError
 from sim.world.phantom_port import ARM_JOINTS
 from sim.world.world import World

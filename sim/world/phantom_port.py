@@ -19,7 +19,7 @@ from models.phantom.kinematics import (
     stylus_orientation,
     vector_to_hand_frame,
 )
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.errors import SimError
 from sim.world.encoders import ANGLES, MEMORY_SIZE, RATES, SENSED, motor_torques, plausibility, take_reading
 

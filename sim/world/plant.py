@@ -9,11 +9,11 @@ from controllers.kernel_call import call_as_given
 from controllers.lent import lend
 from controllers.safety.faults import is_silent
 from controllers.state import Array
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 from sim.compilation.native import mj_step
-from sim.users.arm import Arm, CompiledArm, hand_force
-from sim.users.fingers import turning_moment
-from sim.users.person_state import PersonState, nobody
+from sim.users.hand.arm import Arm, CompiledArm, hand_force
+from sim.users.hand.fingers import turning_moment
+from sim.users.person.person_state import PersonState, nobody
 from sim.world.phantom_port import ARM_JOINTS, PhantomPort, let_go, true_motion, true_turn
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World

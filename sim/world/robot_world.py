@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS, arm_model
-from models.scene import ROBOT, SceneConfig, robot_world_model
+from models.world.scene import ROBOT, SceneConfig, robot_world_model
 from sim.world.world import place_stylus
 
 

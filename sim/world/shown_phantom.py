@@ -4,14 +4,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
 from models.phantom.kinematics import gimbal_angles, inverse_kinematics, vector_to_device_frame
-from models.scene import PHANTOM
+from models.world.scene import PHANTOM
 
-IntArray = npt.NDArray[np.int64]
 Angles = tuple[float, float, float]
 
 _JOINTS = ("theta1", "theta2", "theta3", "elbow", "twin", "gimbal1", "gimbal2", "gimbal3")

@@ -18,7 +18,7 @@ from models.phantom.kinematics import (
     vector_to_device_frame,
     within_limits,
 )
-from models.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world_model
+from models.world.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world_model
 from sim.errors import SimError
 
 FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]

@@ -9,9 +9,9 @@ import pytest
 from experiments.certify.certified_clips import PLAYED, certify_clips, played
 from experiments.flights.ballistics import clip_ballistics
 from experiments.flights.repair import over_the_floor, repair_clip
-from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
 
 UP = np.eye(75)[2]
 

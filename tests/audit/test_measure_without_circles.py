@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from experiments.config.words import run_config
 from experiments.results.measures import PathMeasure
-from experiments.run import run
+from experiments.runs.run import run
 from models.humanoid.skeleton import FOOT_CONTACTS, JOINTS, figure_model, joint_range, rest_pose, standing_com
 from models.mocap.library import embedded
 from sim.body.clip_motion import clip_motion

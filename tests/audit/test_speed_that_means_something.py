@@ -55,7 +55,7 @@ def test_every_mode_that_is_benched_steps_once_a_tick_and_has_its_figure_at_500_
 def test_what_draws_is_not_imported_before_the_first_tick() -> None:
     late = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
     code = (
-        "import sys, experiments.cli, experiments.run, experiments.setups.wiring; "
+        "import sys, experiments.cli, experiments.runs.run, experiments.setups.wiring; "
         f"print([name for name in {late} if name in sys.modules])"
     )
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout

@@ -102,6 +102,18 @@ def test_a_configuration_of_every_mode_goes_through_its_file(mode: str, tmp_path
     assert config_of_options(parsed(["run", "--config", str(file)]).options) == config == load_config(file)
 
 
+def test_a_recording_of_parts_in_python_says_that_its_script_makes_it_again(
+    sim: hvf.Simulation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sim.run(0.1, record=tmp_path / "run")
+    capsys.readouterr()
+    assert main(["reproduce", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err
+    assert "is of a simulation put together in Python" in said
+    assert "run the script again" in said
+    assert said.count("\n") == 1
+
+
 def test_a_recording_of_another_version_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import h5py
 

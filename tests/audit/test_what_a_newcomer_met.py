@@ -249,7 +249,7 @@ def test_two_runs_do_not_write_into_one_folder(run: Path, capsys: pytest.Capture
 
 
 def test_a_run_of_a_day_says_first_what_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments import foresight
+    from experiments.console import foresight
     from sim.recording.recorder import Group
 
     monkeypatch.setattr(foresight, "expected_seconds", lambda what: 0.25)

@@ -17,8 +17,8 @@ from sim.loop.loop import Loop, groups, record_into, tick_channels
 from sim.loop.servo import Servo, rearm_servo
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
-from sim.users.arm import Arm
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
+from sim.users.hand.arm import Arm
 from sim.world.world import World
 from tests.devices.drivers import KINDS, NODE_KINDS, made_rig
 from tests.sim.bare_servos import CUTOFF, Driver, bare_servo, device_world, follow_program, run, simulated

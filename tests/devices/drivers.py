@@ -12,7 +12,7 @@ from sim.devices.exchange import Exchange
 from sim.devices.hdapi import HdapiDevice
 from sim.devices.hid import HidHandle, HidPhantom
 from sim.devices.spacemouse import SpaceMouse
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compiled
 from tests.devices.mocks import BehindDhd, BehindHd, mock_dhd, mock_hd
 from tests.devices.rig import Behind, FirmwareBehind, Linkage, Rig

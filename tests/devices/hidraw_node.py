@@ -10,7 +10,7 @@ from pathlib import Path
 from sim.devices import hid_protocol as protocol
 from sim.devices.exchange import Exchange
 from sim.devices.hardware_list import open_device, open_hid
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from tests.devices.drivers import spacemouse_rig
 from tests.devices.firmware import ROOT, Firmware, compiled
 from tests.devices.rig import Linkage, Rig

@@ -6,11 +6,11 @@ from typing import Protocol
 import numpy as np
 
 from controllers.safety.faults import FAULT_CODE, latch
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity, Driver, DriverFault
 from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, READING_SIZE, READING_THETA, Exchange
 from sim.hardware.emulated import EmulatedPhantom
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.plant import make_plant
 from tests.devices.firmware import Firmware, FirmwareHandle
 from tests.sim.bare_servos import START, device_world, pass_period, simulated

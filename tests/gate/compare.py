@@ -1,9 +1,9 @@
 """The gate of a change that moves code and no number: short runs of a commit and of this tree, compared bit for bit.
 
 ``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case
-there
-and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings could not
-be kept instead: libraries round by processor, and a figure with contacts magnifies that.
+there and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings
+could not be kept instead: libraries round by processor, and a figure with contacts magnifies that. Cases that need
+another one's recording or map bring it along.
 """
 
 import os
@@ -17,7 +17,9 @@ import h5py
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-_MAP = "MAP"  # stands for the file of the lifted map that a tree has made
+_MAP, _RUN = "MAP", "RUN"  # stand for the file of the lifted map, and the folder of the case "follow", of a tree
+_SCRIPT = "SCRIPT"  # a script of this folder, which is given the folder to write and further arguments
+_NEEDS = {"lifted": "lift", "lifted-rivers": "lift", "reproduce": "follow", "replay": "follow"}
 
 CASES = {
     "follow": "run --seconds 2",
@@ -39,17 +41,33 @@ CASES = {
     "lifted": f"run --map {_MAP} --curve run --seconds 2",
     "lifted-rivers": f"run --map {_MAP} --curve walk --mode rivers --user push --seconds 4",
     "arm": "arm --seconds 3",
-    "own-law": "",
+    "kinematic": "run --figure kinematic --user push --seconds 2",
+    "no-figure": "run --figure none --user push --seconds 2",
+    "person": "run --person median --user push --seconds 3",
+    "person-traces": "run --person median --user trace --figure kinematic --seconds 2",
+    "own-law": f"{_SCRIPT} own_law.py",
+    "compiled-law": f"{_SCRIPT} compiled_law.py",
+    "reproduce": f"reproduce {_RUN}",
+    "replay": f"{_SCRIPT} replay.py {_RUN}",
 }
 
 
 def command(case: str, folder: Path) -> list[str]:
     """What runs a case in a tree, and writes into the case's own folder."""
-    if case == "own-law":
-        return [sys.executable, str(Path("tests/gate/own_law.py")), str(folder / case)]
-    words = [str(folder / "map.npz") if word == _MAP else word for word in CASES[case].split()]
-    out = [] if case == "lift" else ["--out", str(folder / case)]
-    return [sys.executable, "-m", "experiments.cli", *words, *out]
+    places = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
+    first, *others = (places.get(word, word) for word in CASES[case].split())
+    out = str(folder / case)
+    if first == _SCRIPT:
+        script, *arguments = others
+        return [sys.executable, str(Path(__file__).with_name(script)), out, *arguments]
+    return [
+        sys.executable,
+        "-m",
+        "experiments.cli",
+        first,
+        *others,
+        *(["--out", out] if first in ("run", "arm") else []),
+    ]
 
 
 def start(case: str, tree: Path, folder: Path) -> "subprocess.Popen[bytes]":
@@ -79,6 +97,7 @@ def differences(before: Path, after: Path) -> Iterator[str]:
 def gate(commit: str, cases: list[str]) -> int:
     """Run the cases in both trees and compare; 1 if anything differs."""
     failed: list[str] = []
+    cases = [case for case in CASES if case in cases or case in {_NEEDS.get(other) for other in cases}]
     with tempfile.TemporaryDirectory() as scratch:
         tree, folders = Path(scratch) / "tree", (Path(scratch) / "before", Path(scratch) / "after")
         subprocess.run(["git", "worktree", "add", "--detach", "--quiet", str(tree), commit], cwd=ROOT, check=True)
@@ -93,6 +112,10 @@ def gate(commit: str, cases: list[str]) -> int:
                 ]
                 if said:
                     said += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
+                elif case == "reproduce":
+                    said = (
+                        [] if len({(folder / f"{case}.log").read_text() for folder in folders}) == 1 else ["the text"]
+                    )
                 elif case == "lift":
                     with np.load(folders[0] / "map.npz") as was, np.load(folders[1] / "map.npz") as now:
                         said = [name for name in was.files if was[name].tobytes() != now[name].tobytes()]

@@ -13,7 +13,7 @@ from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Lead
 from experiments.setups.lead import leading, leading_hand
-from sim.users.arm import hand_force
+from sim.users.hand.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")
 GAIT = Gait(1.375, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.47)

@@ -15,8 +15,8 @@ from controllers.state import HandState
 from experiments.setups.expression import expressive_figure, lap_turns
 from models.humanoid.skeleton import BODIES
 from models.mocap.library import embedded
-from sim.users.fingers import wanted_turn
-from sim.users.intent import turn_table
+from sim.users.hand.actions import turn_table
+from sim.users.hand.fingers import wanted_turn
 
 GOLDEN = Path(__file__).with_name("orientation.csv")
 CURVE = Trajectory.circle(0.0477, 4.0)

@@ -14,7 +14,7 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCI
 from experiments.config.words import run_config
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
-from sim.users.arm import hand_force
+from sim.users.hand.arm import hand_force
 
 # Written out, so that other defaults change no golden path.
 BENDING = {"seek": 150.0, "rubber": 150.0, "tube_damping": 14.0, "rubber_tube": 0.008, "bump": 0.5}

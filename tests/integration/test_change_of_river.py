@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.run import run
-from models.mocap.clip import pose_difference
+from experiments.runs.run import run
+from models.mocap.motion.clip import pose_difference
 from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow

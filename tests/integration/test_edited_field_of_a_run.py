@@ -7,7 +7,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
 from experiments.config.words import run_config
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
 from tests.loop_with_law import loop_with
 
 CURVE = Trajectory.circle(0.0477, 4.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.run import run
+from experiments.runs.run import run
 from experiments.setups import lead
 from sim.recording.recording import Recording
 

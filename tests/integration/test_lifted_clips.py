@@ -12,10 +12,10 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, rest_pose
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, embedded_names, load_clip
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.own_bvh import write_bvh
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.reference.reference import poses_along
 from sim.world.world import World
 

@@ -11,8 +11,8 @@ from experiments.lifting.in_betweens import measure_motion
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.map_quality import in_between, neighbours
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
+from models.mocap.motion.clip import Clip
 
 TURN = 2.0 * np.pi
 NAMES = ("walk", "run", "jump", "angry")

@@ -9,7 +9,7 @@ import pytest
 from experiments.cli import main
 from experiments.config.words import run_config
 from experiments.files.map_files import load_figure_map
-from experiments.run import run
+from experiments.runs.run import run
 from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow

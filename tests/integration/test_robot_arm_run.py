@@ -1,15 +1,17 @@
 """FOLLOW leads a robot arm through the same loop, map and device as it does the figure."""
 
 import json
+import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from experiments.cli import main
 from experiments.config.run_config import ArmConfig
 from experiments.setups.robot_arm import HOME, SCALE, wire_arm
-from models.scene import PEDESTAL
+from models.world.scene import PEDESTAL
 from sim.loop.loop import Loop
 from sim.recording.recording import Recording
 
@@ -42,6 +44,20 @@ def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> N
     assert summary["nearest_limit_deg"] > 20.0
     assert (folder / "report.html").exists()
     assert (folder / "arm.png").exists()
+
+
+@pytest.mark.slow
+def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", str(folder)]) == 0
+    assert "bit for bit, over 8000 ticks" in capsys.readouterr().out
+    altered = tmp_path / "altered"
+    shutil.copytree(folder, altered)
+    with h5py.File(altered / "run.h5", "r+") as file:
+        config = json.loads(file["config"][()])
+        del file["config"]
+        file["config"] = json.dumps(config | {"stiffness": 301.0})
+    assert main(["reproduce", str(altered)]) == 1
+    assert "differs first at" in capsys.readouterr().out
 
 
 @pytest.mark.slow

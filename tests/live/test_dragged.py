@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sim.users.arm import Arm, hand_force
-from sim.users.dragged import dragged, relaxed, tremor
+from sim.users.hand.arm import Arm, hand_force
+from sim.users.hand.dragged import dragged, relaxed, tremor
 
 RNG = np.random.default_rng(3)
 START, END, P, V = (0.05 * RNG.normal(size=3) for _ in range(4))

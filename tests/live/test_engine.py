@@ -9,8 +9,8 @@ from experiments.live.engine import STRONGEST, Drag, Engine
 from experiments.live.engine_process import slice_points
 from experiments.live.gains import gains_of, with_gain
 from experiments.live.takes import Take
-from experiments.reproduce import reproduce
 from experiments.results.folder import EDITED, RECORDING
+from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from models.mocap.library import load
 from sim.errors import SimError

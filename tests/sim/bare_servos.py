@@ -10,7 +10,7 @@ from controllers.safety.limiter import ForceLimiter
 from controllers.state import HandState
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, gimbal_reading
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.body.unsimulated import no_figure
 from sim.compilation.compiled import entry_point
 from sim.devices.device import DeviceState, read_device, write_device
@@ -27,7 +27,7 @@ from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.loop import make_logs
 from sim.loop.servo import FrameLog, Servo, TickLog, run_block, unlinked_field
 from sim.reference.reference import no_reference
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_plant
 from sim.world.world import World

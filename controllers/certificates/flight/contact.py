@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.certificates.flight.flight_fit import NOISE, Mask
+from controllers.certificates.flight.flight_fit import NOISE
 from controllers.certificates.flight.tolerance import ContactTolerance
-from controllers.state import Array
+from controllers.state import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,10 @@ Played at the rate σ, all accelerations are multiplied by σ², so a flight rec
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from controllers.certificates.flight.tolerance import GRAVITY
-from controllers.state import Array
-
-Mask = npt.NDArray[np.bool_]
+from controllers.state import Array, Mask
 
 NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 FEWEST = 5  # frames of a flight: two more than a parabola has coefficients

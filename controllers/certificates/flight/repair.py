@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.flight.flight_fit import Mask
 from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.errors import ControllerError, ParameterError
-from controllers.state import Array
+from controllers.state import Array, Mask
 
 _PACE = 0.5  # s_h, scale of changes of the rate (natural logarithm)
 _PLACE = 0.05  # s_δ [m], scale of shifts of the body

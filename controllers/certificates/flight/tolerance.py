@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # [m/s²]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Stability of a river in the sampled-data loop: critical gains, delay margin, Floquet multipliers, and the verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
+from controllers.state import Array, Mask
 
 MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] upper ends of the searches, beyond any device
 GRID = 40  # gains on the grid before bisection
@@ -58,7 +58,7 @@ class River(NamedTuple):
         return linearise(self.device, self.law, standing, places, hand, self.width)
 
 
-def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
+def _onset(stable: Mask, grid: Array) -> tuple[Array, Array]:
     """Neighbours of the grid between which each column of `stable`, (grid, n), first becomes false; inf if never."""
     first = np.where(np.all(stable, axis=0), len(grid), np.argmin(stable, axis=0))
     ends = np.append(grid, np.inf)
@@ -76,22 +76,21 @@ def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Arr
 
     Infinite where the loop is stable up to `MOST_STIFFNESS`; `least` where it is unstable there already.
     """
-    grid = np.geomspace(least, MOST_STIFFNESS, GRID)
-    low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for k_r in grid]), grid)
-    for _ in range(24):
-        middle = np.sqrt(low * np.minimum(high, MOST_STIFFNESS))
-        stable = loop.radius(middle, b_d) < 1.0
-        low, high = np.where(stable, middle, low), np.where(stable, high, middle)
-    return high
+    return _smallest_unstable(lambda k_r: loop.radius(k_r, b_d), least, MOST_STIFFNESS)
 
 
 def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
     """Smallest unstable b_d ≥ `least` [N s/m] at every phase, with the phase frozen, shape (n,)."""
-    grid = np.geomspace(least, MOST_DAMPING, GRID)
-    low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for b_d in grid]), grid)
+    return _smallest_unstable(lambda b_d: loop.radius(k_r, b_d), least, MOST_DAMPING)
+
+
+def _smallest_unstable(radius: Callable[[float | Array], Array], least: float, most: float) -> Array:
+    """First gain between `least` and `most` with a spectral radius of 1 at each phase: a grid, then 24 bisections."""
+    grid = np.geomspace(least, most, GRID)
+    low, high = _onset(np.array([radius(gain) < 1.0 for gain in grid]), grid)
     for _ in range(24):
-        middle = np.sqrt(low * np.minimum(high, MOST_DAMPING))
-        stable = loop.radius(k_r, middle) < 1.0
+        middle = np.sqrt(low * np.minimum(high, most))
+        stable = radius(middle) < 1.0
         low, high = np.where(stable, middle, low), np.where(stable, high, middle)
     return high
 
@@ -144,9 +143,9 @@ class _WithHands(NamedTuple):
 
     def worst(self, hands: Sequence[HandImpedance]) -> tuple[float, HandImpedance, int]:
         """Least critical k_r [N/m], its hand, and the index of its phase."""
-        who, at = divmod(int(self.critical.argmin()), self.critical.shape[1])
-        least = float(self.critical[who, at])
-        return least, hands[who] if np.isfinite(least) else NO_HAND, at
+        hand, at = divmod(int(self.critical.argmin()), self.critical.shape[1])
+        least = float(self.critical[hand, at])
+        return least, hands[hand] if np.isfinite(least) else NO_HAND, at
 
     def change(self, periodic: bool) -> float:
         """Largest change of the critical k_r from a phase to the next [N/m]."""

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.sparse import csr_array
 
+from controllers.easing import cubic_steps
 from controllers.haptic_map.lifting.layouts import on_lattice, scaled
 from controllers.haptic_map.lifting.room import Rectangle
 from controllers.haptic_map.lifting.transitions import Transition
@@ -93,8 +94,8 @@ class Task:
         angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
         found: list[tuple[int, int, Array]] = []
         for at in self.transitions:
-            x = np.minimum(np.abs(np.remainder(angle - at.angle + np.pi, 2.0 * np.pi) - np.pi) / WINDOW, 1.0)
-            found.append((at.first, at.second, x * x * (3.0 - 2.0 * x)))
+            away = np.abs(np.remainder(angle - at.angle + np.pi, 2.0 * np.pi) - np.pi)
+            found.append((at.first, at.second, cubic_steps(away / WINDOW)))
         return found
 
 

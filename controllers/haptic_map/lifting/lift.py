@@ -18,10 +18,10 @@ from controllers.haptic_map.lifting.common_lap import Phase, common_lap
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure, measure
 from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
 from controllers.haptic_map.lifting.layouts import lattice
-from controllers.haptic_map.lifting.motion_features import Features, Mask, Motion, features
+from controllers.haptic_map.lifting.motion_features import Features, Motion, features
 from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import Comparison, Transition, compare, find_transitions, same_motions
-from controllers.state import Array
+from controllers.state import Array, Mask
 
 _FEWEST = 4  # frames, for a cubic spline
 

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
 from controllers.motion.loops import checked_clip
-from controllers.state import Array
-
-Mask = npt.NDArray[np.bool_]
+from controllers.state import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)

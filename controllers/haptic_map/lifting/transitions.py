@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.haptic_map.lifting.motion_features import Features, Mask
-from controllers.state import Array, IntArray
+from controllers.haptic_map.lifting.motion_features import Features
+from controllers.state import Array, IntArray, Mask
 
 SAME = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
 _APART = 1.2  # [rad] least distance between two transitions of one clip

@@ -8,8 +8,8 @@ import numpy as np
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import AFTER, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
-from sim.users.person import Person
-from sim.users.wishes import targets
+from sim.users.person.person import Person
+from sim.users.person.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
 TIMES = (0.2, 0.3, 0.4)  # [s] imposed movement times, too short for visual feedback on the end

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.state import Array
 from models.humanoid.skeleton import rest_pose
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.devices.simulated import (
     SimulatedPhantom,
@@ -16,8 +16,8 @@ from sim.devices.simulated import (
     simulated_phantom,
 )
 from sim.users.participant import Participant
-from sim.users.person import Person
-from sim.users.wishes import Wishes
+from sim.users.person.person import Person
+from sim.users.person.wishes import Wishes
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import Plant, make_plant
 from sim.world.world import World

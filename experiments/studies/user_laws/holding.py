@@ -9,8 +9,8 @@ from scipy.signal import welch
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, trial
 from experiments.studies.user_laws.law import Law, Study
-from sim.users.person import Person
-from sim.users.wishes import Wishes, following
+from sim.users.person.person import Person
+from sim.users.person.wishes import Wishes, following
 
 PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # force [N], period [s], number, window of a response [s]
 GRIPS = (1.0, 2.0, 4.0, 8.0)  # [N]

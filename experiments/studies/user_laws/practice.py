@@ -9,8 +9,8 @@ from scipy.optimize import curve_fit
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, trial
 from experiments.studies.user_laws.law import Law, Study
-from sim.users.person import Person
-from sim.users.wishes import Wishes, following
+from sim.users.person.person import Person
+from sim.users.person.wishes import Wishes, following
 
 LAPS, LAP, RADIUS, PUSH = 24, 2.0, 0.04, 1.5  # laps of tracing; their duration [s], radius [m], recurring force [N]
 LEARNING = 0.15  # share of an error that people who learn correct per repetition

@@ -14,8 +14,8 @@ from experiments.studies.user_laws.holding import grip, step_response, tremor
 from experiments.studies.user_laws.law import Law, Study
 from experiments.studies.user_laws.practice import endurance, practice
 from experiments.studies.user_laws.tracing import power_law, steering
-from sim.users.person import Person
-from sim.users.population import population
+from sim.users.person.person import Person
+from sim.users.person.population import population
 
 STUDIES = {
     "fitts": fitts, "scatter": scatter, "steering": steering, "power-law": power_law, "tremor": tremor,

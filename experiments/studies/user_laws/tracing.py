@@ -10,9 +10,9 @@ from scipy.stats import norm
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
-from sim.users.pace import natural_times
-from sim.users.person import Person
-from sim.users.wishes import Wishes, following
+from sim.users.person.pace import natural_times
+from sim.users.person.person import Person
+from sim.users.person.wishes import Wishes, following
 
 LAPS = 7  # laps of an ellipse, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]

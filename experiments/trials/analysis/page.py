@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
 from experiments.trials.analysis.replays import Replay
 from experiments.trials.analysis.statistics import Contrast, Statistics
-from experiments.trials.measures import MEASURES
-from experiments.trials.study_config import StudyConfig
+from experiments.trials.design.study_config import StudyConfig
+from experiments.trials.trial.measures import MEASURES
 
 _BODY = """<p>{question}</p>
 {sentences}

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.trials.analysis.statistics import Contrast, Statistics
-from experiments.trials.measures import MEASURES
+from experiments.trials.trial.measures import MEASURES
 
 _USER, _MEAN = "#9aa6b8", "#1f5fbf"
 

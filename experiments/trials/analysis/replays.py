@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from experiments.results.folder import RECORDING, world_of
-from experiments.trials.measures import MEASURES
-from experiments.trials.plan import Trial
-from experiments.trials.run_trial import Shelf, recorded
-from experiments.trials.trial_log import TrialLog
+from experiments.trials.design.plan import Trial
+from experiments.trials.trial.measures import MEASURES
+from experiments.trials.trial.run_trial import Shelf, recorded
+from experiments.trials.trial.trial_log import TrialLog
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
 

@@ -11,9 +11,9 @@ from experiments.trials.analysis.replays import replays
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.analysis.tidy import measured_columns
-from experiments.trials.measures import MEASURES, OF_CONDITIONS
-from experiments.trials.plan import Trial
-from experiments.trials.study_config import StudyConfig
+from experiments.trials.design.plan import Trial
+from experiments.trials.design.study_config import StudyConfig
+from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
 
 _CONTRASTS = "contrasts.csv"
 

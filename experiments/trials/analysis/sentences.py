@@ -6,8 +6,8 @@ from typing import Any
 
 from experiments.trials.analysis.effect_sizes import ALIKE
 from experiments.trials.analysis.statistics import Contrast, Statistics
-from experiments.trials.measures import MEASURES
-from experiments.trials.study_config import StudyConfig
+from experiments.trials.design.study_config import StudyConfig
+from experiments.trials.trial.measures import MEASURES
 
 
 def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: int) -> tuple[str, str, str]:

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.trials.errors import StudyError
-from experiments.trials.measures import MEASURES, OF_CONDITIONS
-from experiments.trials.plan import Trial
-from experiments.trials.run_trial import Row
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.plan import Trial
+from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
+from experiments.trials.trial.run_trial import Row
 
 TABLE_CSV, TABLE_PARQUET = "trials.csv", "trials.parquet"
 _MISSING = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"

@@ -17,10 +17,10 @@ from scipy.spatial import ConvexHull, QhullError
 from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
-GRAVITY = 9.81
-_TOUCH = 0.006  # height below which a contact sphere counts as support [m]
+GRAVITY = 9.81  # [m/s²]
+_SUPPORT_HEIGHT = 0.006  # height below which a contact sphere counts as support [m]
 
 
 class Dynamics(NamedTuple):
@@ -98,7 +98,7 @@ def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
     array, shape (2,)
         The point itself when it lies inside or when nothing touches the floor.
     """
-    touching = contacts[contacts[:, 2] < CONTACT_RADIUS + _TOUCH, :2]
+    touching = contacts[contacts[:, 2] < CONTACT_RADIUS + _SUPPORT_HEIGHT, :2]
     if len(touching) == 0:
         return point
     middle = touching.mean(axis=0)

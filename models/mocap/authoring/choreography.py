@@ -10,7 +10,7 @@ import numpy as np
 
 from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step
 from models.mocap.authoring.balance import balanced_clip
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 FPS = 60.0
 

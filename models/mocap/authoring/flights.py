@@ -14,10 +14,10 @@ from scipy.interpolate import PchipInterpolator
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
 from models.mocap.authoring.authoring import Arm
-from models.mocap.clip import Clip
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
+from models.mocap.motion.clip import Clip
 
 FPS = 120.0
 _HIP = 0.0875  # half the distance of the hips [m]: the feet stand below them

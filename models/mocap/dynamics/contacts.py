@@ -9,13 +9,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
-from models.mocap.clip import Clip
-
-Mask = npt.NDArray[np.bool_]
+from models.mocap.motion.clip import Clip
 
 _CERTAIN = 0.005  # height below which a part touches at any speed [m]
 _REACH, _HAND_REACH = 0.06, 0.12  # height above which it does not touch at any speed [m]

@@ -10,7 +10,7 @@ import numpy as np
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 
 _DELTA = 1e-3  # [s] step of the finite differences for angular velocity and acceleration
 

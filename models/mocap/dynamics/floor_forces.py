@@ -11,14 +11,11 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import nnls
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.floor import FRICTION
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
-
-Mask = npt.NDArray[np.bool_]
 
 _SHARE = 0.01  # ε, regularisation: makes the forces unique, shared between spheres, and continuous in the state
 _SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.arrays import Array
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 
 
 class Momentum(NamedTuple):

@@ -4,8 +4,8 @@ import numpy as np
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, figure_model
-from models.mocap import quaternions
-from models.mocap.clip import global_rotations
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import global_rotations
 
 _REACH = 0.9995  # largest distance from hip to ankle as a share of the leg's length
 _CHAINS = tuple(

@@ -16,8 +16,8 @@ from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssu
 
 from models.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
-from models.mocap import quaternions
-from models.mocap.clip import Clip
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import around, plus
 
 DEGREE = 5

@@ -5,8 +5,8 @@ squares of
 
 - the residual wrench at the centre of mass, r = w − A f*, with f* the contact forces that best produce the required
   wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
-- the displacement of standing contact spheres from their places (foot skate), and the depth of the others below the
-  floor;
+- the displacement of standing contact spheres from their places (foot skate), ever less beside the stance, and the
+  depth of the others below the floor;
 - the excess over joint limits, and torques of the legs beyond three quarters of their limits;
 - the change itself, and its third derivative.
 
@@ -19,16 +19,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
-from models.mocap import quaternions
-from models.mocap.clip import Clip
 from models.mocap.dynamics.floor_forces import EDGES, Floor
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.change import DEGREE, Change, Normal
 from models.mocap.preparation.inverse_dynamics import InverseDynamics, cross_matrix
 from models.mocap.preparation.stances import Stances, clearance
-
-Mask = npt.NDArray[np.bool_]
 
 _MARGIN = 0.02  # kept from the joints' limits [rad]
 _STRONG = 0.75  # share of the torque limits of the legs beyond which torque is penalised
@@ -106,14 +104,6 @@ class Feasible(NamedTuple):
         RMS of the change of the root's position [m].
     turned : float
         RMS over joints and time of the change of rotations [rad].
-    furthest : float
-        Largest change of the root's position [m].
-    most_turned : float
-        Largest change of a joint's rotation [rad].
-    joint : str
-        The joint of this largest change.
-    when : float
-        The time of this largest change [s].
     costs : tuple of float
         Cost at first and after every iteration.
     """
@@ -122,19 +112,31 @@ class Feasible(NamedTuple):
     residual: float
     moved: float
     turned: float
-    furthest: float
-    most_turned: float
-    joint: str
-    when: float
     costs: tuple[float, ...]
 
 
 class _Errors(NamedTuple):
-    """Weighted errors (m, 140) of the nonlinear terms, their Jacobian blocks, and the residual wrench (m, 6)."""
+    """Errors of m instants.
+
+    Attributes
+    ----------
+    weighted : array, shape (m, 140)
+        Weighted errors of the nonlinear terms.
+    jacobian : array or None
+        Blocks of their Jacobian.
+    residual : array, shape (m, 6)
+        Residual wrench [N], [N m].
+    grip : array, shape (m, 32)
+        Contact forces along the edges of the friction pyramids [N].
+    share : array, shape (m, 51)
+        Joint torques as shares of their limits.
+    """
 
     weighted: Array
     jacobian: Array | None
     residual: Array
+    grip: Array
+    share: Array
 
 
 def feasible(
@@ -165,12 +167,14 @@ def feasible(
     sizes = change.size(points)
     places = np.linalg.norm(sizes[:, :3], axis=1)
     turns = np.linalg.norm(sizes[:, 6:].reshape(len(sizes), -1, 3), axis=2)
-    instant, joint = np.unravel_index(int(np.argmax(turns)), turns.shape)
     force = np.linalg.norm(problem.errors(x, False).residual[:, :3], axis=1) / problem.floor.body_weight
     return Feasible(
-        change.changed(points, fps), _rms(force), _rms(places), _rms(turns), float(places.max()), float(turns.max()),
-        JOINTS[joint], float(change.times[instant]), tuple(costs),
-    )  # fmt: skip
+        change.changed(points, fps),
+        _rms(force),
+        _rms(places),
+        _rms(turns),
+        tuple(costs),
+    )
 
 
 def _rms(values: Array) -> float:
@@ -184,10 +188,9 @@ class _Problem:
         self.change, self.w = change, weights
         self.floor = Floor(weights.moment / weights.force)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
-        self.standing, self.pushing = schedule.standing[frames], schedule.pushing[frames]
-        self.places = schedule.places[frames]
-        self.grounded = self.standing | schedule.sliding[frames]
-        self.pinned = np.repeat(self.standing[:, :, None], 3, axis=2).astype(np.float64)
+        self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
+        self.grounded = (schedule.standing | schedule.sliding)[frames]
+        self.pinned = np.repeat(schedule.kept[frames][:, :, None], 3, axis=2)
         self.pinned[:, :, 2] = self.grounded
         self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
         self.low, self.high = joint_range().reshape(-1, 2).T + np.array([[_MARGIN], [-_MARGIN]])
@@ -278,7 +281,7 @@ class _Problem:
         parts = [w.strain * strain, scale * residual, slip.reshape(m, 24), low, w.limit * excess]
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
-            return _Errors(weighted, None, residual)
+            return _Errors(weighted, None, residual, grip, share)
         answer = self.floor.answer(demand, grip)
         projection = np.eye(6) - columns @ answer
         pushes = grip.reshape(m, 8, 4) @ EDGES
@@ -300,12 +303,44 @@ class _Problem:
             torque = dynamics.torque[hot] - np.einsum("mti,moin->motn", follows, moving[hot])
             torque[:, 0] -= dynamics.leaning(pushes, hot)
             jacobian[hot, :, :_N] = gain[:, None, :, None] * torque
-        return _Errors(weighted, jacobian, residual)
+        return _Errors(weighted, jacobian, residual, grip, share)
+
+
+class Borne(NamedTuple):
+    """What contact forces give to a clip.
+
+    Attributes
+    ----------
+    residual : float
+        RMS residual force [body weights].
+    loads : array, shape (n, 8)
+        Vertical force on each contact sphere, frame by frame [body weights].
+    strain : float
+        Largest torque of a joint, as a share of its limit.
+    joint : str
+        The joint of this torque.
+    """
+
+    residual: float
+    loads: Array
+    strain: float
+    joint: str
+
+
+def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
+    """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
+    change = Change(clip, _KNOT, _STEP, passage)
+    problem = _Problem(change, schedule, _WEIGHTS)
+    errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
+    weight = problem.floor.body_weight
+    pushes = (errors.grip.reshape(-1, 8, 4) @ EDGES)[:, :, 2] / weight
+    frames = np.arange(clip.n_frames) / clip.fps
+    loads = np.column_stack([np.interp(frames, change.times, push) for push in pushes.T])
+    shares = np.abs(errors.share).max(axis=0)
+    residual = _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
+    return Borne(residual, loads, float(shares.max()), JOINTS[int(shares.argmax()) // 3])
 
 
 def contact_residual(clip: Clip, schedule: Stances, passage: bool = False) -> float:
     """RMS residual force of a clip as it is, for a contact schedule [body weights]; `passage` as in `feasible`."""
-    change = Change(clip, _KNOT, _STEP, passage)
-    problem = _Problem(change, schedule, _WEIGHTS)
-    errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
-    return _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / problem.floor.body_weight
+    return borne(clip, schedule, passage).residual

@@ -11,13 +11,12 @@ every lap.
 from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from models.arrays import Array
+from models.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.clip import Clip, PlanarDisplacement, pose_difference
-from models.mocap.laps import lap_of, likeness
+from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.preparation.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
 from models.mocap.preparation.stances import stances
 
@@ -51,7 +50,7 @@ class Looped(NamedTuple):
     kind : {"cycle", "half stride", "way back", "open"}
         How it was looped.
     start, end : float
-        The part of the capture that was used [s].
+        The part of the capture that was used [s]; an open clip, which comes from rest, begins before it.
     gap : float
         d between its ends before closing [rad].
     """
@@ -121,7 +120,7 @@ def _wished(clip: Clip, wish: str) -> tuple[int, int]:
     return round(start * clip.fps), min(round(end * clip.fps), clip.n_frames - 1)
 
 
-def _distances(clip: Clip, frames: npt.NDArray[np.int64]) -> Array:
+def _distances(clip: Clip, frames: IntArray) -> Array:
     return likeness(clip, frames)[0]
 
 
@@ -269,7 +268,8 @@ def _rested(clip: Clip) -> Looped:
     before = _dying(clip.poses[0], -velocities[0], clip.fps)[::-1]
     after = _dying(clip.poses[-1], velocities[-1], clip.fps)
     poses = np.vstack((before, clip.poses, after))
-    return Looped(Clip(poses, clip.fps, clip.name), "open", 0.0, clip.duration, 0.0)
+    start = -len(before) / clip.fps
+    return Looped(Clip(poses, clip.fps, clip.name), "open", start, clip.duration, 0.0)
 
 
 def _dying(pose: Array, velocity: Array, fps: float) -> Array:

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
-from models.mocap.clip import Clip
 from models.mocap.dynamics.momentum import momentum
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import contact_points
 
 GRAVITY = 9.81  # [m/s²]

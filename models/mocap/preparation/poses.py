@@ -6,8 +6,8 @@ from scipy.interpolate import CubicSpline
 
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
-from models.mocap import quaternions
-from models.mocap.clip import Clip, PlanarDisplacement
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip, PlanarDisplacement
 
 _PASSES = (
     0.802  # a second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off (Winter)

@@ -5,9 +5,10 @@ from time import process_time
 from typing import NamedTuple
 
 from models.errors import ModelError
-from models.mocap.clip import Clip
 from models.mocap.library import load
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.feasible import Feasible, feasible
+from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import resampled, smoothed
@@ -38,6 +39,8 @@ class Prepared(NamedTuple):
         Result of looping, before optimisation.
     feasible : Feasible
         Result of the optimisation.
+    fidelity : Fidelity
+        Distance of the clip from the capture.
     seconds : float
         Processor time [s].
     near : bool
@@ -51,6 +54,7 @@ class Prepared(NamedTuple):
     paced: Paced
     looped: Looped
     feasible: Feasible
+    fidelity: Fidelity
     seconds: float
     near: bool
 
@@ -74,21 +78,24 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     MotionFileError
         If the file cannot be read, or contradicts itself.
     ModelError
-        If the motion is shorter than two frames or longer than two minutes, or the loop is not within it.
+        If the motion has a single frame, what is taken of it is longer than two minutes, or the loop is not within it.
     """
     began = process_time()
     loaded = load(path, hints)
     captured = loaded.clip
-    if not 1.0 / captured.fps <= captured.duration <= _LONGEST:
-        raise ModelError(
-            f"{path}: lasts {captured.duration:.2f} s; expected a motion of two frames to {_LONGEST:.0f} s"
-        )
+    if captured.n_frames < 2:
+        raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_LONGEST:.0f} s")
     timed = paced(resampled(captured, FPS))
     cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
+    if (lasts := cycle.clip.duration) > _LONGEST:
+        raise ModelError(
+            f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, or --loop START:END of a part"
+        )
     smooth = smoothed(cycle.clip, _CORNER)
     schedule = rested(stances(cycle.clip, smooth), cycle.clip)
     made = feasible(smooth, schedule, fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED and made.residual < _LACKS
     taken = made.clip if near else smooth
     clip = Clip(taken.poses, taken.fps, captured.name)
-    return Prepared(clip, captured, loaded.report, timed, cycle, made, process_time() - began, near)
+    kept = fidelity(clip, captured, cycle, timed.pace)
+    return Prepared(clip, captured, loaded.report, timed, cycle, made, kept, process_time() - began, near)

@@ -11,17 +11,14 @@ captures may be cut.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.clip import Clip, global_rotations
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
+from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.poses import around, sole_points
-
-Mask = npt.NDArray[np.bool_]
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
 _REACH = 0.045  # largest height of a standing part of a sole [m]
@@ -36,6 +33,7 @@ _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
 _SWING = 0.015  # least height of a swinging foot [m]: the tracking controller takes one below 8 mm for standing
 _RISE = 0.08  # time before and after stance in which this height is reached [s]; captured feet swing at 2 to 5 cm
 _RESTS = 0.1  # time at both ends of an open clip in which both feet stand [s]
+_KEPT = 0.05  # time before and after a stance over which a sphere keeps its place ever less [s]: one knot of `Change`
 _UPRIGHT = 0.55  # least height of the root there [m]: a crawling or lying body is supported otherwise
 _GRAVITY = 9.81
 
@@ -53,12 +51,16 @@ class Stances(NamedTuple):
         Target centres of standing spheres [m], level on the floor.
     sliding : array of bool, shape (n, 8)
         Whether it is on the floor and under load, but not at rest.
+    kept : array, shape (n, 8)
+        Share with which a sphere keeps its place over the floor: 1 in stance, falling to 0 before and after it while
+        another stands.
     """
 
     standing: Mask
     pushing: Mask
     places: Array
     sliding: Mask
+    kept: Array
 
 
 def stances(clip: Clip, smooth: Clip) -> Stances:
@@ -73,9 +75,9 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     """
     closed = clip.closes()
     if closed:
-        margin = min(clip.n_frames, round(clip.fps))
-        poses, first = around(clip, margin)
-        calm, _ = around(smooth, margin)
+        # A lap to either side: a stance over the seam has one place, however long it is.
+        poses, first = around(clip, clip.n_frames)
+        calm, _ = around(smooth, clip.n_frames)
     else:
         poses, calm, first = clip.poses, smooth.poses, 0
     points, fps = sole_points(poses), clip.fps
@@ -101,8 +103,9 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     # In frames under load in which nothing else may bear, standing spheres bear without the lag.
     none = ~pushing.any(axis=1) & (load > _LOADED)
     pushing[none] |= standing[none]
+    kept = _kept(standing, places, round(_KEPT * fps))
     here = slice(first, first + clip.n_frames)
-    return Stances(standing[here], pushing[here], places[here], sliding[here] & ~standing[here])
+    return Stances(standing[here], pushing[here], places[here], sliding[here] & ~standing[here], kept[here])
 
 
 def rested(schedule: Stances, clip: Clip) -> Stances:
@@ -117,8 +120,8 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
     """
     if clip.closes():
         return schedule
-    standing, pushing, places, sliding = schedule
-    made = Stances(standing.copy(), pushing.copy(), places.copy(), sliding.copy())
+    standing, pushing, places, sliding, kept = schedule
+    made = Stances(standing.copy(), pushing.copy(), places.copy(), sliding.copy(), kept)
     points, turned = sole_points(clip.poses), global_rotations(clip.poses)
     k = round(_RESTS * clip.fps)
     for at, span in ((0, slice(0, k)), (-1, slice(clip.n_frames - k, clip.n_frames))):
@@ -134,7 +137,7 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
             made.places[span, mine] = place
             made.standing[span, mine] = made.pushing[span, mine] = True
             made.sliding[span, mine] = False
-    return made
+    return made._replace(kept=_kept(made.standing, made.places, round(_KEPT * clip.fps)))
 
 
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
@@ -207,6 +210,21 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
         else:
             frames, spheres = span[heel[span]], [0, 1]
         places[start:end] = _lying(points[frames], sole, float(np.median(yaw[frames])), spheres)
+
+
+def _kept(standing: Mask, places: Array, width: int) -> Array:
+    """Share with which spheres keep their places; `places` are extended over the frames beside stances."""
+    share = standing.astype(np.float64)
+    for sphere in range(standing.shape[1]):
+        for start, end in _runs(standing[:, sphere]):
+            for away in range(1, width + 1):
+                left = 1.0 - away / (width + 1)
+                for at, stance in ((start - away, start), (end - 1 + away, end - 1)):
+                    if 0 <= at < len(share) and share[at, sphere] < left:
+                        share[at, sphere], places[at, sphere] = left, places[stance, sphere]
+    # Nothing holds a foot that leaves into a flight or lands from one: held there, a backflip and a kick fell.
+    share[~standing.any(axis=1)] = 0.0
+    return share
 
 
 def _heading(turned: Array) -> Array:

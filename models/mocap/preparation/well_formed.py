@@ -6,18 +6,17 @@ The bounds are the constants below; `WellFormed.faults` names the measures that 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.arrays import Array
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap import quaternions
-from models.mocap.clip import Clip, global_rotations, pose_difference
+from models.arrays import Array, Mask
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.preparation.feasible import contact_residual
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip, global_rotations, pose_difference
+from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.preparation.feasible import Borne, borne
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
-from models.mocap.ranges import beyond_ranges
 
 LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]
 FLATTEST = np.deg2rad(2.0)  # largest tilt of soles in stance
@@ -30,6 +29,7 @@ FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity 
 _STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
 _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
+_UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
 _ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
 _SHORT_FLIGHT = 0.08  # least duration of a flight [s]
 _GRAVITY = 9.81
@@ -49,6 +49,8 @@ class WellFormed:
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
         Largest distance of a contact point from its median place in a stance, 95th percentile over stances [m].
+    slid : float
+        The same, of all stances [m].
     outliers : int
         Number of frames with outlying acceleration.
     closed : bool
@@ -63,6 +65,10 @@ class WellFormed:
         Largest excess of a joint over its range [rad].
     residual : float
         RMS of the force that contact cannot give, by inverse dynamics of the clip [body weights].
+    strain : float
+        Largest torque of a joint by inverse dynamics, as a share of its limit.
+    joint : str
+        The joint of this torque.
     """
 
     seconds: float
@@ -70,6 +76,7 @@ class WellFormed:
     highest: float
     tilt: float
     skate: float
+    slid: float
     outliers: int
     closed: bool
     seam: float
@@ -77,6 +84,8 @@ class WellFormed:
     falling: float
     excess: float
     residual: float
+    strain: float
+    joint: str
 
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
@@ -99,18 +108,21 @@ class WellFormed:
             found.append(f"a joint is {np.rad2deg(self.excess):.0f}° beyond its range; 1° at most")
         if self.residual > (bound := FLYING if self.flights else RESIDUAL):
             found.append(f"contact lacks {100 * self.residual:.0f} % of weight RMS; {100 * bound:.0f} % at most")
+        if self.strain > 1.0:
+            found.append(f"{self.joint} needs {100 * self.strain:.0f} % of its torque limit; 100 % at most")
         return tuple(found)
 
     def lines(self) -> tuple[str, ...]:
         """The measures, a line each."""
         return (
             f"soles in stance {1000 * self.lowest:.0f} to {1000 * self.highest:.0f} mm, tilted by "
-            f"{np.rad2deg(self.tilt):.1f}°, skate {1000 * self.skate:.0f} mm",
+            f"{np.rad2deg(self.tilt):.1f}°, skate {1000 * self.skate:.0f} mm "
+            f"({1000 * self.slid:.0f} in the worst stance)",
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "
             f"{'seam differ by' if self.closed else 'ends'} {self.seam:.2f} rad/s",
             f"{self.outliers} frames stand out; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
             f"{self.flights} flights, {self.falling:.1f} m/s² beside gravity; contact lacks "
-            f"{100 * self.residual:.1f} % of weight",
+            f"{100 * self.residual:.1f} % of weight; {self.joint} needs {100 * self.strain:.0f} % of its torque limit",
         )
 
 
@@ -124,13 +136,17 @@ def well_formed(clip: Clip) -> WellFormed:
     speeds = np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps if clip.n_frames > 1 else 0.0 * heights
     standing = schedule.standing & (speeds < _AT_REST)
     low, high = np.quantile(heights[standing], (0.01, 0.99)) if standing.any() else (0.0, 0.0)
-    skate = _skate(points, schedule.standing & (heights < _ON_FLOOR))
+    given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
+    # A sphere that bears nothing and moves is in swing, however low.
+    swings = (given.loads < _UNLOADED) & (speeds > _AT_REST)
+    slides = stance_slides(points, schedule.standing & (heights < _ON_FLOOR) & ~swings)
     flights, falling = _flights(clip)
     return WellFormed(
-        clip.duration, float(low), float(high), _tilt(clip, standing), skate, outliers(clip), closed,
+        clip.duration, float(low), float(high), _tilt(clip, standing), float(np.quantile(slides, 0.95)),
+        float(slides.max()), outliers(clip), closed,
         _seam(clip, closed), flights, falling,
         float(beyond_ranges(clip.poses).max()),
-        contact_residual(clip, schedule) if clip.n_frames > 8 else 0.0,
+        given.residual, given.strain, given.joint,
     )  # fmt: skip
 
 
@@ -146,7 +162,7 @@ def outliers(clip: Clip) -> int:
     return int(np.sum((accelerations > _STANDS_OUT * usual) & (accelerations > _JERKY)))
 
 
-def _tilt(clip: Clip, resting: npt.NDArray[np.bool_]) -> float:
+def _tilt(clip: Clip, resting: Mask) -> float:
     angles: list[Array] = []
     turned = global_rotations(clip.poses)
     for foot, side in enumerate(("left", "right")):
@@ -157,16 +173,15 @@ def _tilt(clip: Clip, resting: npt.NDArray[np.bool_]) -> float:
     return float(np.quantile(every, 0.95)) if len(every) else 0.0
 
 
-def _skate(points: Array, standing: npt.NDArray[np.bool_]) -> float:
-    """Largest distance of contact points from their median place in a stance, 95th percentile over stances [m]."""
-    travels: list[float] = []
-    for sphere in range(points.shape[1]):
-        mask = standing[:, sphere].astype(int)
+def stance_slides(points: Array, standing: Mask) -> Array:
+    """Largest distance of contact points (n, k, 3) from their median place in each stance [m]; 0 without one."""
+    slides = [0.0]
+    for sphere, mask in enumerate(standing.T.astype(int)):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], mask, [0]))))
         for start, end in zip(edges[::2], edges[1::2], strict=True):
             stand = points[start:end, sphere, :2]
-            travels.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
-    return float(np.quantile(travels, 0.95)) if travels else 0.0
+            slides.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
+    return np.array(slides if len(slides) == 1 else slides[1:])
 
 
 def _seam(clip: Clip, closed: bool) -> float:

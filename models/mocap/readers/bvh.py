@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.arrays import Array
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 from models.mocap.readers.motion_file import (
     FRAME_LIMIT,
     JOINT_LIMIT,

@@ -13,7 +13,7 @@ from typing import NamedTuple, NoReturn, cast
 import numpy as np
 
 from models.arrays import Array
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 from models.mocap.readers.motion_file import (
     JOINT_LIMIT,
     MAGNITUDE_LIMIT,

@@ -13,7 +13,7 @@ import numpy as np
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.source_motion import SourceMotion
 
 _CENTIMETRES = 100.0

@@ -1,12 +1,16 @@
 """A motion on its source skeleton: what the readers return, before any retargeting."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from models.arrays import Array
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
+
+_UNTURNED = 1e-4  # half an angle [rad] that files with four decimals write for zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +62,11 @@ class SourceMotion:
     def n_frames(self) -> int:
         """Number of frames."""
         return len(self.rotations)
+
+    def at_rest(self, joints: Sequence[int]) -> npt.NDArray[np.bool_]:
+        """Frames in which no one of these joints is rotated, though some are in others: the zero pose; shape (n,)."""
+        turned = np.abs(self.rotations[:, list(joints), 1:]).max(axis=2, initial=0.0) > _UNTURNED
+        return ~turned.any(axis=1) & turned.any()
 
     def global_rotations(self) -> Array:
         """Rotation of every joint from the zero pose in the file's axes, shape (frames, joints, 4)."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, joint_range
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES
 
 _Y = 1  # the arms' long axis

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.arrays import Array
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles
@@ -131,12 +131,3 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
 
 def _sine(a: Array, b: Array) -> Array:
     return np.linalg.norm(np.cross(unit(a), unit(b)), axis=1)
-
-
-def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
-    """A joint and all its descendants: the body without nodes that programs put above or beside it."""
-    below = {top}
-    for joint, parent in enumerate(parents):
-        if parent in below:
-            below.add(joint)
-    return sorted(below)

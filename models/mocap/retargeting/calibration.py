@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
-from models.mocap import quaternions
+from models.mocap.motion import quaternions
 
 _LEVEL = 0.06  # largest height difference of the four contact points of a level sole [m]
 _SHARE = 0.25  # quantile of the heights of level soles that is the floor

@@ -6,7 +6,9 @@ hips, scaled by the length of the legs. A constant vertical shift puts the feet 
 parabolas.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,17 +17,18 @@ from scipy.spatial.transform import Rotation
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, SEGMENTS, figure_model
-from models.mocap import quaternions
-from models.mocap.clip import Clip
-from models.mocap.ranges import beyond_ranges
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.arm_twist import with_twist_shared
-from models.mocap.retargeting.body_lines import body_lines, joints_below
+from models.mocap.retargeting.body_lines import body_lines
+from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.calibration import calibrate
 from models.mocap.retargeting.footing import levelled, on_the_floor
-from models.mocap.retargeting.leading_pose import without_leading_pose
-from models.mocap.retargeting.skeleton_roles import Roles, missing, unused
+from models.mocap.retargeting.leading_pose import leading_frames
+from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
@@ -50,6 +53,8 @@ class Hints:
         The file's axis that points up, such as ``+Y``.
     rest_frame : int or None
         A frame of the file in which the body stands upright with level feet, counted from 0.
+    roles : Path or None
+        A file that says which joint plays which role, in place of the joints' names; see `role_file`.
 
     Raises
     ------
@@ -59,6 +64,7 @@ class Hints:
 
     up: str | None = None
     rest_frame: int | None = None
+    roles: Path | None = None
 
     def __post_init__(self) -> None:
         if self.up is not None and self.up not in AXES:
@@ -116,8 +122,16 @@ class RetargetReport(NamedTuple):
             f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs",
             "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
             "unused: " + (", ".join(self.unused) or "none"),
-            "missing: " + (", ".join(self.missing) or "none"),
-            *([f"left out: the first {self.dropped} frames, a pose that is not of the motion"] if self.dropped else []),
+            *([] if self.missing else ["missing: none"]),
+        )
+        return (*(printable(line, 4000) for line in lines), *self.notes())
+
+    def notes(self) -> tuple[str, ...]:
+        """What the file lacks, and what was left out, assumed or repaired, a line each."""
+        frames = "frame" if self.dropped == 1 else f"{self.dropped} frames"
+        lines = (
+            *(["missing: " + ", ".join(self.missing)] if self.missing else []),
+            *([f"left out: the first {frames}, a pose that is not of the motion"] if self.dropped else []),
             *self.remarks,
         )
         return tuple(printable(line, 4000) for line in lines)
@@ -140,18 +154,21 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rest = hints.rest_frame
     if rest is not None and rest >= motion.n_frames:
         raise MotionFileError(motion.path, 0, f"there is no frame {rest}", f"--rest-frame below {motion.n_frames}")
-    whole = motion
-    motion, dropped = without_leading_pose(motion)
-    # The pose in front is no part of the motion, but the user may name it as the rest frame.
-    calibrating = whole if rest is not None and rest < dropped else motion
-    skipped = calibrating.n_frames - motion.n_frames
-    rotations = calibrating.global_rotations()
-    positions = calibrating.global_positions(rotations)
+    motion, broken, jumps = repaired(motion, roles)
+    rotations = motion.global_rotations()
+    positions = motion.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
+    dropped = leading_frames(motion, roles, lines)
+    # The pose in front is no part of the motion, but the user may name it as the rest frame.
+    first = 0 if rest is not None and rest < dropped else dropped
+    skipped = dropped - first
+    if first:
+        rotations, positions = rotations[first:], positions[first:]
+        lines = body_lines(motion, roles, positions, rotations)
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
-    frame = None if rest is None else rest - (dropped - skipped)
+    frame = None if rest is None else rest - first
     unclear = MotionFileError(
         motion.path, 0, "its joints do not tell how the body stands", "a trunk, thighs and shanks that have a length"
     )
@@ -172,7 +189,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
-    remarks: list[str] = []
+    remarks = list(_named_gaps(broken, [k for k in jumps if k >= dropped], motion.fps))
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):
@@ -230,6 +247,17 @@ def _named_beyond_ranges(poses: Array) -> str:
         if most[k] > _RANGE
     ]
     return f"beyond the figure's range: {', '.join(told)}; see whether the file has it so" if told else ""
+
+
+def _named_gaps(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:
+    """Remarks on frames that were lost, and on jumps that are left."""
+    if broken:
+        n = len(broken)
+        which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
+        yield f"{which} ({broken[0] / fps:.2f} s) did not belong to the motion around: interpolated"
+    if jumps:
+        times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
+        yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
 
 
 def _axis_name(direction: Array) -> str:

@@ -1,36 +1,39 @@
 """Assignment of a foreign skeleton's joints to the figure's segments, by name and by position in the joint tree.
 
-Known naming schemes: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max
-Biped, Unreal, Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with
-sides before or after, namespaces and numbers. Pelvis, chest and abdomen have many names, so they are found in the tree:
-the pelvis is where the legs meet, the chest where the arms meet, the abdomen halfway between.
+Names alone do not decide: each part of a limb lies below the one before, and a limb that goes on by a name that is not
+known is refused. Pelvis, chest and abdomen have many names, so they are found in the tree: the pelvis is where the legs
+meet, the chest where the arms meet, the abdomen halfway between. The tests have the names of some forty programs.
 """
 
-import re
 from typing import NamedTuple
 
 from models.humanoid.skeleton import BODIES, SEGMENTS
+from models.mocap.retargeting.joint_names import JointName, joint_names
 
-_SIDED = {
-    "clavicle": ("clavicle", "collar", "collarbone", "shoulder"),
-    "upper_arm": ("upperarm", "uparm", "uarm", "humerus", "shldr", "arm", "shoulder"),
-    "forearm": ("forearm", "lowerarm", "lowarm", "farm", "elbow", "radius"),
-    "hand": ("fingerbase", "hand"),
-    "wrist": ("wrist", "hand"),
-    "thigh": ("upleg", "upperleg", "uleg", "thigh", "femur", "hip"),
-    "shank": ("lowleg", "lowerleg", "shin", "calf", "tibia", "knee", "leg"),
-    "foot": ("foot", "ankle"),
-    "toe": ("toebase", "toe", "toes", "toe0", "forefoot", "ball"),
+# Words for each part, with their rank: a word that also means a neighbour (a leg is a shank below an upper leg, and a
+# thigh above a knee) gives way to one that does not.
+_LEG = {
+    "thigh": {"femur": 0, "thigh": 0, "upleg": 0, "upperleg": 0, "uleg": 0, "hip": 1, "leg": 2},
+    "shank": {"tibia": 0, "shank": 0, "shin": 0, "calf": 0, "lowerleg": 0, "lowleg": 0, "loleg": 0, "knee": 0,
+              "leg": 1},
+    "foot": {"foot": 0, "ankle": 0, "talus": 0, "calcn": 1},
+    "toe": {"toebase": 0, "toe": 0, "toes": 0, "forefoot": 0, "ball": 0, "foot": 1},
+}  # fmt: skip
+_ARM = {
+    "clavicle": {"clavicle": 0, "collar": 0, "collarbone": 0, "scapula": 0, "shoulder": 1},
+    "upper_arm": {"upperarm": 0, "uparm": 0, "uarm": 0, "humerus": 0, "shldr": 0, "arm": 0, "shoulder": 1},
+    "forearm": {"forearm": 0, "lowerarm": 0, "lowarm": 0, "loarm": 0, "farm": 0, "elbow": 0, "ulna": 0, "radius": 0},
+    "wrist": {"wrist": 0, "carpus": 0, "hand": 1},
 }
-_CENTRAL = {
-    "chest": ("chest", "thorax", "torso", "spine4", "spine3", "spine2", "spine1", "spine", "t8"),
-    "neck": ("neck", "neck1", "lowerneck"),
-    "head": ("head",),
-}
-_PREFIX = re.compile(r"(mixamorig|character|skeleton|actor|armature|rig|bip|biped|valve|cc|base|j|def|org)\d*")
-_WORDS = re.compile(r"[A-Z]?[a-z]+\d*|[A-Z]+(?![a-z])\d*|\d+")
-_HELPER = re.compile(r"twist|roll|helper|corrective|muscle|mesh|nub|end|ik|pole|ctrl|target|site|marker|tip")
-_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
+LIMBS = (tuple(_LEG), (*_ARM, "hand"))  # parts from the trunk out
+_HAND = ("fingerbase", "hand")  # beyond the wrist
+_CHEST = frozenset(("chest", "upperchest", "thorax", "torso", "spine", "upperbody", "t8"))
+_NECK = frozenset(("neck", "lowerneck", "upperneck"))
+_SIDED = frozenset(word for limb in (_LEG, _ARM) for words in limb.values() for word in words) | {*_HAND}
+_CENTRAL = _CHEST | _NECK | {"head"}
+_OPTIONAL = ("clavicle", "toe")  # a limb without one is whole
+# Costs of a limb's chain, each beyond all sums of the next, which is that of a joint further from the root.
+_LACKING, _LEAF, _RANK = 10_000_000, 1_000_000, 10_000
 
 
 class Roles(NamedTuple):
@@ -49,94 +52,150 @@ class Roles(NamedTuple):
 
 
 def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
-    """The roles of a skeleton's joints; or, if it cannot be a human's, the name of the missing pelvis or leg part."""
-    named = _by_name(joints, parents)
+    """The roles of a skeleton's joints; or, where they do not tell a human's, the part that no joint is taken for."""
+    names = names_of(joints)
+    named: dict[str, int] = {}
+    for side in ("left", "right"):
+        for limb in (_LEG, _ARM):
+            named |= _limb(side, limb, names, parents)
+        if (wrist := named.get(f"{side}_wrist")) is not None:
+            # Beyond a wrist there may be a hand (CMU): it carries all the rotation.
+            below = [joint for joint in joints_below(wrist, parents) if names[joint].side == side]
+            hands = [joint for word in _HAND for joint in below if names[joint].bare == word]
+            named[f"{side}_hand"] = next(iter(hands), wrist)
+    roles = assembled(named, names, parents)
+    if isinstance(roles, str):
+        return roles
+    for side in ("left", "right"):
+        for upper, lower in (("shank", "foot"), ("upper_arm", "forearm"), ("forearm", "hand")):
+            joint = named.get(f"{side}_{upper}")
+            if joint is None or f"{side}_{lower}" in named:
+                continue
+            own = names[joint].bare
+            if further := [k for k in joints_below(joint, parents) if not names[k].helper and names[k].bare != own]:
+                return f"{side}_{lower}, though {joints[further[0]]} is below {joints[joint]}"
+    return roles
+
+
+def names_of(joints: tuple[str, ...]) -> tuple[JointName, ...]:
+    """Sides and words of joints' names."""
+    return joint_names(joints, _SIDED, _CENTRAL)
+
+
+def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]) -> Roles | str:
+    """Roles from the limbs' joints, and the trunk's and head's from the tree; or the name of a missing part.
+
+    Parameters
+    ----------
+    named : dict from part to joint index
+        Figure bodies, and ``left_wrist``, ``left_toe`` and so on where forearms and feet end.
+    names : tuple of JointName
+        What the joints' names say.
+    parents : tuple of int
+        Parent of each joint.
+    """
     for part in ("left_thigh", "right_thigh", "left_shank", "right_shank"):
         if part not in named:
             return part
-    pelvis = _meeting_point(named["left_thigh"], named["right_thigh"], parents)
-    if pelvis is None or any(part == pelvis for part in named.values()):
+    for side in ("left", "right"):
+        if named[f"{side}_thigh"] not in ancestry(named[f"{side}_shank"], parents)[1:]:
+            return f"{side}_shank below its thigh"
+    pelvis = named.get("pelvis", _meeting_point(named["left_thigh"], named["right_thigh"], parents))
+    if pelvis is None or any(part != "pelvis" and joint == pelvis for part, joint in named.items()):
         return "pelvis"
-    segments = {"pelvis": pelvis}
-    arms = [named[part] for part in ("left_upper_arm", "right_upper_arm") if part in named]
-    chest = _meeting_point(arms[0], arms[1], parents) if len(arms) == 2 else named.get("chest")
-    spine = _path(pelvis, chest, parents) if chest is not None else []
+    segments = {"pelvis": pelvis} | {part: named[part] for part in BODIES if part in named}
+    spine = _spine(pelvis, named, names, parents)
     if spine:
-        segments["chest"] = spine[-1]
+        segments.setdefault("chest", spine[-1])
         if len(spine) > 1:
             # The middle joint below the chest, rounded down: the figure's abdomen ends where the ribs begin.
-            segments["abdomen"] = spine[(len(spine) - 1) // 2]
-    if (head := named.get("head", named.get("neck"))) is not None:
+            segments.setdefault("abdomen", spine[(len(spine) - 1) // 2])
+    if "head" not in segments and (head := _head(spine, named, names, parents)) is not None:
         segments["head"] = head
     ends: dict[str, int] = {}
     for side in ("left", "right"):
-        for part in ("clavicle", "upper_arm", "forearm", "thigh", "shank", "foot"):
-            if f"{side}_{part}" in named:
-                segments[f"{side}_{part}"] = named[f"{side}_{part}"]
-        # If both exist, the wrist is the end of the forearm, and the hand beyond it (CMU) carries all the rotation.
-        wrist, hand = named.get(f"{side}_wrist"), named.get(f"{side}_hand")
-        if (last := hand if hand is not None else wrist) is not None:
-            segments[f"{side}_hand"] = last
+        wrist = named.get(f"{side}_wrist", named.get(f"{side}_hand"))
         chain = (("upper_arm", named.get(f"{side}_forearm")), ("forearm", wrist),
                  ("thigh", named.get(f"{side}_shank")), ("shank", named.get(f"{side}_foot")),
                  ("foot", named.get(f"{side}_toe")))  # fmt: skip
         for part, end in chain:
             if end is not None and segments.get(f"{side}_{part}") in ancestry(end, parents)[1:]:
                 ends[f"{side}_{part}"] = end
-    for part in ("left_thigh", "right_thigh"):
-        if part not in ends:
-            return f"{part.removesuffix('thigh')}shank below its thigh"
     return Roles({body: segments[body] for body in BODIES if body in segments}, ends)
 
 
-def _base(name: str) -> tuple[str, str]:
-    """Side ('' if none) and bare name of a joint: ``Bip01 L UpperArm`` → left, upperarm."""
-    words = [word.lower() for word in _WORDS.findall(name.rsplit(":", 1)[-1].rsplit("|", 1)[-1])]
-    while len(words) > 1 and _PREFIX.fullmatch(words[0]):
-        words = words[1:]
-    side = next((_SIDES[word] for word in words if word in _SIDES), "")
-    bare = "".join(word for word in words if word not in _SIDES)
-    known = {alias for aliases in _SIDED.values() for alias in aliases}
-    if side and bare not in known:
-        # thigh.L.001, lThighBend, and the mirrored chains of some rigs
-        short = bare.rstrip("0123456789").removesuffix("bend")
-        bare = short if short in known else bare
-    if not side and bare[:1] in ("l", "r"):
-        for short in (bare[1:], bare[1:].removesuffix("bend")):
-            if short in known:
-                return _SIDES[bare[0]], short  # lfemur
-    return side, bare
+def _limb(
+    side: str, limb: dict[str, dict[str, int]], names: tuple[JointName, ...], parents: tuple[int, ...]
+) -> dict[str, int]:
+    """The likeliest joints of a limb's parts, each below the one before.
+
+    Of all such chains the one that lacks least; then with fewest leaves, of words that mean their part alone, and
+    nearest to the root. Two joints of one word, such as ``thigh.L`` and ``thigh.L.001``, are one part.
+    """
+    inner, parts = set(parents), tuple(limb)
+    above = {k: set(ancestry(k, parents)[1:]) for k, name in enumerate(names) if name.side == side}
+    lacking = [_LACKING * (1 if part in _OPTIONAL else 10) for part in parts]
+    # Chains that begin at a part: its index, the cost, and the parts' joints.
+    chains: list[tuple[int, int, tuple[tuple[str, int], ...]]] = [(len(parts), 0, ())]
+    for k in reversed(range(len(parts))):
+        longer: list[tuple[int, int, tuple[tuple[str, int], ...]]] = []
+        for joint in above:
+            if (rank := limb[parts[k]].get(names[joint].bare)) is None:
+                continue
+            cost, rest = min(
+                (cost + sum(lacking[k + 1 : first]), chain)
+                for first, cost, chain in chains
+                if not chain or (joint in above[chain[0][1]] and names[joint].bare != names[chain[0][1]].bare)
+            )
+            leaf = _LEAF if k < len(parts) - 1 else 1  # where a limb ends, a leaf is as likely
+            cost += leaf * (joint not in inner) + _RANK * (2 * rank + names[joint].noisy) + len(above[joint])
+            longer.append((k, cost, ((f"{side}_{parts[k]}", joint), *rest)))
+        chains += longer
+    return dict(min((cost + sum(lacking[:first]), chain) for first, cost, chain in chains)[1])
 
 
-def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int]:
-    """Joint index of each part found by name alone; joints with children take precedence over leaves."""
-    bases: dict[tuple[str, str], int] = {}
-    leaves = set(range(len(joints))) - set(parents)
-    for index in sorted(range(len(joints)), key=lambda joint: joint in leaves):
-        side, bare = _base(joints[index])
-        if not _HELPER.search(bare):
-            bases.setdefault((side, bare), index)
-    found: dict[str, int] = {}
+def _spine(
+    pelvis: int, named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]
+) -> list[int]:  # fmt: skip
+    """Joints from the pelvis (or from what it and the chest hang on) to the chest, where the arms meet."""
+    arms = [named[part] for part in ("left_upper_arm", "right_upper_arm") if part in named]
+    chest = named.get("chest", _meeting_point(arms[0], arms[1], parents) if len(arms) == 2 else None)
+    if chest is None and len(arms) < 2:
+        trunk = [k for k in _free(named, parents) if names[k].bare in _CHEST and not names[k].side and k != pelvis]
+        chest = max(trunk, key=lambda k: (k in parents, len(ancestry(k, parents))), default=None)
+    if chest is None or chest == pelvis:
+        return []
+    down = ancestry(chest, parents)
+    common = next((joint for joint in ancestry(pelvis, parents) if joint in down), None)
+    # A root that is the chest has the pelvis below it.
+    path = [chest] if common == chest else down[: down.index(common)][::-1] if common is not None else []
+    while len(path) > 1 and names[path[-1]].bare in _NECK and "chest" not in named:
+        path.pop()  # 3ds Max hangs the collar bones on the neck
+    return path
 
-    def find(part: str, side: str, aliases: tuple[str, ...]) -> None:
-        candidates = [bases[side, alias] for alias in aliases if (side, alias) in bases]
-        if candidates:
-            found[part] = min(candidates, key=lambda joint: joint in leaves)
 
-    for part, aliases in _CENTRAL.items():
-        find(part, "", aliases)
-    for side in ("left", "right"):
-        for part, aliases in _SIDED.items():
-            find(f"{side}_{part}", side, aliases)
-        ankle, foot = bases.get((side, "ankle")), bases.get((side, "foot"))
-        if ankle is not None and foot is not None and ankle in ancestry(foot, parents):
-            # SMPL's foot is the ball of the foot.
-            found[f"{side}_foot"] = ankle
-            found.setdefault(f"{side}_toe", foot)
-        # A "shoulder" is the clavicle if there is an arm joint as well, and otherwise the upper arm.
-        if found.get(f"{side}_clavicle") == found.get(f"{side}_upper_arm"):
-            found.pop(f"{side}_clavicle", None)
-    return found
+def _head(
+    spine: list[int], named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]
+) -> int | None:  # fmt: skip
+    """The head, or the last joint of the neck, by name; or the end of a chain that goes on beyond the chest."""
+    free = [k for k in _free(named, parents) if not names[k].side]
+    heads = [k for k in free if names[k].bare == "head"]
+    if heads:
+        return min(heads, key=lambda k: (k not in parents, names[k].noisy, len(ancestry(k, parents))))
+    if necks := [k for k in free if names[k].bare in _NECK]:
+        return max(necks, key=lambda k: len(ancestry(k, parents)))
+    words = {names[k].bare for k in spine} - {""}
+    last = end = spine[-1] if spine else -1
+    while spine and (further := [k for k in free if parents[k] == end and names[k].bare in words]):
+        end = further[0]
+    return end if end != last else None
+
+
+def _free(named: dict[str, int], parents: tuple[int, ...]) -> list[int]:
+    """Joints that neither carry a limb nor belong to one."""
+    limbs = set(named.values())
+    carrying = {joint for limb in limbs for joint in ancestry(limb, parents)}
+    return [k for k in range(len(parents)) if k not in carrying and limbs.isdisjoint(ancestry(k, parents))]
 
 
 def ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
@@ -153,10 +212,13 @@ def _meeting_point(one: int, other: int, parents: tuple[int, ...]) -> int | None
     return next((joint for joint in ancestry(one, parents)[1:] if joint in above), None)
 
 
-def _path(top: int, bottom: int, parents: tuple[int, ...]) -> list[int]:
-    """Joints from below `top` down to `bottom`; empty if `bottom` is no descendant of `top`."""
-    chain = ancestry(bottom, parents)
-    return chain[: chain.index(top)][::-1] if top in chain else []
+def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
+    """A joint and all its descendants: the body without nodes that programs put above or beside it."""
+    below = {top}
+    for joint, parent in enumerate(parents):
+        if parent in below:
+            below.add(joint)
+    return sorted(below)
 
 
 def unused(roles: Roles, joints: tuple[str, ...]) -> tuple[str, ...]:

@@ -13,9 +13,8 @@ legs; and β = 0.1 for +Y and +Z, the only axes that programs write.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from models.arrays import Array
+from models.arrays import Array, IntArray
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
@@ -56,7 +55,7 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     """
     if (name := said or motion.up) is not None:
         return Up(np.array(AXES[name], dtype=np.float64), np.inf)
-    frames = np.unique(np.linspace(0, motion.n_frames - 1, _SAMPLES).round().astype(int))
+    frames = np.unique(np.linspace(0, len(positions) - 1, _SAMPLES).round().astype(int))
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
@@ -67,7 +66,7 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     return Up(np.array(AXES[best], dtype=np.float64), lead)
 
 
-def _score(name: str, lines: BodyLines, positions: Array, frames: npt.NDArray[np.int64]) -> float:
+def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> float:
     up = np.array(AXES[name], dtype=np.float64)
     body = unit(lines.top - lines.lowest_joints.mean(axis=1))[frames]
     heights = positions[frames] @ up
@@ -86,12 +85,13 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: npt.NDArray[np
 
 
 def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
-    """Refuse a mirrored body: hips and trunk define left, which toes and the bend of the knees must confirm.
+    """Refuse a mirrored body: hips and trunk define left, which toes, the bend of the knees and the arms must confirm.
 
     Raises
     ------
     MotionFileError
-        If toes and knees show a mirrored body, or one of them does while the other is unclear or contradicts it.
+        If toes and knees show a mirrored body, one of them does while the other is unclear or contradicts it, or the
+        shoulders lie on average the other way than the hips: no trunk is twisted by more than 90° throughout.
     """
     left = unit(lines.left)
     ahead = unit(np.cross(left, unit(lines.trunk)))
@@ -99,10 +99,14 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
     clear = [np.sign(s) for s in signs if abs(s) > _SURE]
+    stated = "left and right as the names say, or --roles FILE that says them"
+    shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
+    if lines.has_arms and np.sum(lines.left * shoulders) < 0.0:
+        which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"
+        what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
+        raise MotionFileError(motion.path, 0, what, stated)
     if clear and sum(clear) < 0:
-        raise MotionFileError(
-            motion.path, 0, "the body is mirrored: toes and knees point back", "left and right as the names say"
-        )
+        raise MotionFileError(motion.path, 0, "the body is mirrored: toes and knees point back", stated)
     if clear and sum(clear) == 0:
         raise MotionFileError(
             motion.path, 0, "toes and knees point opposite ways", "a body that bends its knees forwards"

@@ -1,4 +1,4 @@
-"""Intents of simulated persons at the stylus; each is turned into a table of wishes (see `sim.users.wishes`)."""
+"""Intents of simulated persons at the stylus; each is turned into a table of wishes (see `sim.users.person.wishes`)."""
 
 from sim.users.intents.bend import Bend
 from sim.users.intents.change_over import ChangeOver

@@ -7,9 +7,9 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
-from sim.users.intent import Grab, grab_table
+from sim.users.hand.actions import Grab, grab_table
 from sim.users.intents.intent import PERIOD, between, moments
-from sim.users.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
+from sim.users.person.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from sim.users.intents.intent import PERIOD, between, centre, check, moments
-from sim.users.wishes import Wishes, following
+from sim.users.person.wishes import Wishes, following
 
 
 @dataclass(frozen=True)

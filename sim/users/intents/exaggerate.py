@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from controllers.curves.trajectory import Trajectory
 from sim.users.intents.intent import PERIOD, bump, centre, check, moments
-from sim.users.wishes import Wishes, following
+from sim.users.person.wishes import Wishes, following
 
 
 @dataclass(frozen=True)

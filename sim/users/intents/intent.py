@@ -5,10 +5,10 @@ from typing import Protocol
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import smooth_step
+from controllers.easing import smooth_steps
 from controllers.state import Array
 from sim.errors import SimError
-from sim.users.wishes import Wishes
+from sim.users.person.wishes import Wishes
 
 PERIOD = 0.02  # [s] sampling period of wishes: shorter than any submovement
 
@@ -28,8 +28,7 @@ def moments(seconds: float) -> Array:
 
 def between(t: Array, start: float, end: float) -> Array:
     """0 before `start`, 1 after `end` [s], a minimum-jerk profile between."""
-    eased: list[float] = [smooth_step.py_func(s) for s in np.clip((t - start) / (end - start), 0.0, 1.0)]
-    return np.array(eased)
+    return smooth_steps((t - start) / (end - start))
 
 
 def bump(phase: Array, start: float, end: float) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 from sim.users.intents.intent import PERIOD, moments
-from sim.users.wishes import Wishes, following
+from sim.users.person.wishes import Wishes, following
 
 
 @dataclass(frozen=True)

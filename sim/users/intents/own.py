@@ -12,9 +12,9 @@ from numba.core.errors import NumbaError
 from controllers.curves.trajectory import Trajectory
 from controllers.kernel_call import address_of
 from sim.errors import SimError
-from sim.users.own_intent import INTENT_ARGUMENTS
-from sim.users.person_state import BELIEF, FELT_FORCE, PersonState
-from sim.users.wishes import ENGAGED, FORCE, GRIP, OWN, PLACE, SWITCH, Wishes, resting
+from sim.users.person.own_intent import INTENT_ARGUMENTS
+from sim.users.person.person_state import BELIEF, FELT_FORCE, PersonState
+from sim.users.person.wishes import ENGAGED, FORCE, GRIP, OWN, PLACE, SWITCH, Wishes, resting
 
 
 class Wish(NamedTuple):
@@ -49,8 +49,8 @@ class Own:
     ----------
     function : callable
         In Python ``function(t, place, force)`` returns a `Wish`, or a position [m]. Compiled, ``function(t, place,
-        force, rows)`` writes the wishes' two rows (see `sim.users.own_intent`). Its arguments are the time [s], her
-        estimate of her hand's position [m] and the force of her hand as she feels it [N], in H, shape (3,).
+        force, rows)`` writes the wishes' two rows (see `sim.users.person.own_intent`). Its arguments are the time [s],
+        her estimate of her hand's position [m] and the force of her hand as she feels it [N], in H, shape (3,).
     every : float
         Time between two calls in Python [s].
     compiled : bool

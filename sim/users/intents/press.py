@@ -7,9 +7,9 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
 from sim.users.intents.intent import PERIOD, centre, moments
-from sim.users.wishes import FORCE, Wishes, resting
+from sim.users.person.wishes import FORCE, Wishes, resting
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from controllers.curves.trajectory import Trajectory
 from sim.users.intents.intent import PERIOD, moments
-from sim.users.wishes import Wishes, resting
+from sim.users.person.wishes import Wishes, resting
 
 
 @dataclass(frozen=True)

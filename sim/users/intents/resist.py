@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from sim.users.intents.intent import PERIOD, check, moments
-from sim.users.wishes import GRIP, PLACE, Wishes, following
+from sim.users.person.wishes import GRIP, PLACE, Wishes, following
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ import pytest
 from controllers.state import Array
 from experiments.cli import main
 from models.humanoid.skeleton import SEGMENTS, figure_model
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.own_bvh import write_bvh
 
 pytest.importorskip("pygltflib")

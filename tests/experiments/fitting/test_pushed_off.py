@@ -16,7 +16,7 @@ from experiments.fitting.verdict import Verdict
 from experiments.lifting.lift import lift_clips
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
-from models.mocap.clip import pose_difference
+from models.mocap.motion.clip import pose_difference
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,9 @@ from experiments.render.lowest_point import lowest_point, seen_geoms
 from experiments.render.shown_world import GHOST
 from experiments.render.timeline import Ghost
 from models.humanoid.skeleton import N_POSE, rest_pose
-from models.mocap.clip import Clip
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
-from models.scene import P_WH
+from models.world.scene import P_WH
 from sim.errors import SimError
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording

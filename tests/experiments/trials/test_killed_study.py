@@ -60,8 +60,8 @@ def test_a_lost_scheduler_is_one_line_and_the_study_goes_on_without_it(tmp_path:
 
 
 def test_nobody_at_the_address_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.trials import cluster
-    from experiments.trials.errors import StudyError
+    from experiments.trials.design.errors import StudyError
+    from experiments.trials.execution import cluster
 
     monkeypatch.setattr(cluster, "_WAIT", "1s")
     with pytest.raises(StudyError, match="no Dask scheduler answers"), cluster.cluster_at("tcp://127.0.0.1:9"):
@@ -71,9 +71,9 @@ def test_nobody_at_the_address_is_a_line(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_worker_with_other_code_or_files_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from experiments.config.part import to_json
     from experiments.config.words import run_config
-    from experiments.trials.cluster import perform_on_worker
-    from experiments.trials.errors import StudyError
-    from experiments.trials.run_trial import Task
+    from experiments.trials.design.errors import StudyError
+    from experiments.trials.execution.cluster import perform_on_worker
+    from experiments.trials.trial.run_trial import Task
 
     config = run_config(figure="none", seconds=0.5)
     with pytest.raises(StudyError, match=r"worker on .*differ from the driver's"):

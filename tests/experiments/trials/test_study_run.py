@@ -7,11 +7,11 @@ import pytest
 from controllers.errors import ParameterError
 from experiments.config.part import to_json
 from experiments.results import smoothness
-from experiments.trials import run_trial
-from experiments.trials.database import Database
-from experiments.trials.errors import StudyError
-from experiments.trials.run_trial import Row, Shelf, Task, perform
+from experiments.trials.design.errors import StudyError
+from experiments.trials.execution.database import Database
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
+from experiments.trials.trial import run_trial
+from experiments.trials.trial.run_trial import Row, Shelf, Task, perform
 from sim.compilation.sources import reached_code
 from sim.recording.recording import Recording
 
@@ -120,7 +120,7 @@ def test_a_condition_is_no_measure_of_ease(tmp_path: Path) -> None:
 
 
 def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
-    assert smoothness.__name__ in reached_code("experiments.trials.run_trial")
+    assert smoothness.__name__ in reached_code("experiments.trials.trial.run_trial")
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,11 @@ from controllers.errors import ParameterError
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import load_config
 from experiments.config.words import run_config
-from experiments.trials.database import Database
-from experiments.trials.errors import StudyError
-from experiments.trials.run_trial import Row, Task
-from experiments.trials.threads import Threads
-from experiments.trials.where import Where
+from experiments.trials.design.errors import StudyError
+from experiments.trials.execution.database import Database
+from experiments.trials.execution.threads import Threads
+from experiments.trials.execution.where import Where
+from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of

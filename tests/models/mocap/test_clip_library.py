@@ -3,8 +3,8 @@ import pytest
 
 from models.errors import ModelError
 from models.humanoid.skeleton import rest_pose
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import convert, embedded, embedded_names, load, load_clip
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.own_bvh import write_bvh
 

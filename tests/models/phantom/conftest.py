@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from models.phantom.kinematics import within_limits
-from models.phantom.parameters import PREMIUM_1_5
-from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, phantom_model
+from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, phantom_spec
 
 
 @dataclass
@@ -36,7 +36,10 @@ class Linkage:
 
 @pytest.fixture
 def linkage() -> Linkage:
-    model = phantom_model()
+    spec = phantom_spec()
+    spec.option.gravity = np.array([0.0, -GRAVITY, 0.0])  # along −y of frame P, which is the world's here
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model = spec.compile()
     closure = np.zeros((model.nv, 3))
     for column, name in enumerate(MOTOR_JOINTS):
         closure[model.joint(name).dofadr[0], column] = 1.0

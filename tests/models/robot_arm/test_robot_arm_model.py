@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
-from models.scene import PHANTOM, ROBOT, SceneConfig, robot_world_model
+from models.world.scene import PHANTOM, ROBOT, SceneConfig, robot_world_model
 
 
 def test_it_has_seven_joints_and_a_straight_zero():

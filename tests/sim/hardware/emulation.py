@@ -5,12 +5,12 @@ import numpy as np
 from controllers.safety.arming import ARM, NO_REQUEST
 from controllers.safety.faults import Fault
 from controllers.safety.gate import Gate
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_THETA, exchange
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker, columns
-from sim.users.arm import Arm
+from sim.users.hand.arm import Arm
 from sim.world.linkage import Linkage
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, follow_program
 

@@ -2,7 +2,7 @@
 
 import socket
 
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import GatedServo

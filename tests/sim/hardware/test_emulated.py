@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.phantom.kinematics import forward_kinematics
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.exchange import READING_SIZE, READING_THETA
 from sim.hardware.emulated import EmulatedPhantom
 from tests.sim.bare_servos import START

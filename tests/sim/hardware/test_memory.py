@@ -16,7 +16,7 @@ from experiments.config import maps, modes
 from experiments.config.run_config import RunConfig
 from experiments.hardware.parts import served, session_of, start_of
 from experiments.setups.defaults import resolved
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker
 from tests.devices.firmware import ROOT, compiled

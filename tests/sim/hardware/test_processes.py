@@ -21,7 +21,7 @@ import pytest
 
 from controllers.safety.arming import ARM, CLEAR, State
 from controllers.safety.faults import Fault
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun, Look
 from sim.hardware.emulated_process import SHOWN_SIZE, SHOWN_TORQUE, SHOWN_TRIPS, EmulatedEnd, host_device

@@ -7,11 +7,11 @@ import pytest
 
 from controllers.safety.arming import ARM
 from models.phantom.kinematics import jacobian
-from models.scene import SceneConfig
+from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import Ticker
 from sim.hardware.twin import Twin, tip_force
-from sim.users.arm import Arm
-from sim.users.intent import Push
+from sim.users.hand.actions import Push
+from sim.users.hand.arm import Arm
 from tests.sim.hardware.emulation import AT_ONCE, gated_servo, run
 
 PUSH = Push(2.0, 1.0, 1.5, (0.3, -0.5, 0.81))

@@ -5,7 +5,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
-from sim.users.intent import Grab, Push
+from sim.users.hand.actions import Grab, Push
 from sim.users.intents import (
     Bend,
     ChangeOver,
@@ -18,10 +18,20 @@ from sim.users.intents import (
     Resist,
     Trace,
 )
-from sim.users.pace import natural_times
 from sim.users.participant import Participant
-from sim.users.submovement import aimed_seconds, set_submovement, submovement
-from sim.users.wishes import ENGAGED, FORCE, GRIP, PLACE, SWITCH, Wishes, following, targets, wanted_motion
+from sim.users.person.pace import natural_times
+from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
+from sim.users.person.wishes import (
+    ENGAGED,
+    FORCE,
+    GRIP,
+    PLACE,
+    SWITCH,
+    Wishes,
+    following,
+    targets,
+    wanted_motion,
+)
 
 CIRCLE = Trajectory.circle(0.04, 4.0)
 INTENTS = [

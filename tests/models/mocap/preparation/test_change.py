@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from models.humanoid.skeleton import N_TANGENT
-from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation import feasible
 from models.mocap.preparation.change import DEGREE, Change, Normal
 from models.mocap.preparation.feasible import FeasibleWeights, _Problem

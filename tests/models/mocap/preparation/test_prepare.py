@@ -1,17 +1,20 @@
 import numpy as np
 import pytest
+from rigs import Rig, write_rig
 
+from experiments.cli import main
 from experiments.preparation import prepared_clip
 from experiments.preparation.command import changes, prepare_file, summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.preparation.feasible import borne
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import resampled, sole_points
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.stances import rested, stances
-from models.mocap.preparation.well_formed import outliers, well_formed
+from models.mocap.preparation.well_formed import outliers, stance_slides, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 
 
@@ -165,6 +168,68 @@ def test_the_walks_feet_stand_by_turns(walks):
     assert not (left & right).all()
 
 
+@pytest.fixture(scope="module")
+def hop():
+    """Four seconds that close, in which the standing body hops once at 1 s and drifts by 2 cm and back."""
+    still = resampled(embedded("cheer"), 120.0).poses[0]
+    poses = np.repeat(still[None], 480, axis=0)
+    t = np.arange(480) / 479.0
+    poses[:, 0] += 0.02 * np.sin(2.0 * np.pi * t)
+    poses[:, 2] += 0.3 * np.maximum(0.0, 1.0 - ((t - 0.25) / 0.05) ** 2)
+    return Clip(poses, 120.0, "hop")
+
+
+def test_a_stance_over_the_seam_has_one_place_however_long(hop):
+    schedule = stances(hop, hop)
+    assert hop.closes()
+    assert schedule.standing[[0, -1]].all()
+    assert not schedule.standing.all(axis=1).all()
+    np.testing.assert_allclose(schedule.places[0], schedule.places[-1], atol=1e-9)
+
+
+def test_a_sphere_keeps_its_place_ever_less_beside_a_stance(walks):
+    schedule = stances(walks[0], walks[0])
+    share, standing = schedule.kept[:, 0], schedule.standing[:, 0]
+    lands = int(np.flatnonzero(np.diff(standing.astype(int)) > 0)[0]) + 1
+    rising = share[lands - 7 : lands + 1]
+    np.testing.assert_allclose(rising, np.arange(8) / 7.0, atol=1e-12)
+    np.testing.assert_array_equal(schedule.places[lands - 6 : lands, 0], np.tile(schedule.places[lands, 0], (6, 1)))
+    assert (share[standing] == 1.0).all()
+
+
+def test_nothing_keeps_a_place_in_flight(hop):
+    schedule = stances(hop, hop)
+    flies = ~schedule.standing.any(axis=1)
+    assert flies.any()
+    assert (schedule.kept[flies] == 0.0).all()
+
+
+def test_skate_is_the_way_from_the_median_place_of_each_stance():
+    points = np.zeros((10, 2, 3))
+    points[:4, 0, 0] = 0.0, 0.0, 0.0, 0.03
+    points[6:, 0, 1] = 0.1, 0.1, 0.1, 0.14
+    points[:, 1, 2] = 0.01 * np.arange(10)
+    standing = np.ones((10, 2), dtype=bool)
+    standing[4:6, 0] = False
+    np.testing.assert_allclose(stance_slides(points, standing), [0.03, 0.04, 0.0])
+    np.testing.assert_allclose(stance_slides(points, ~np.ones((10, 2), dtype=bool)), [0.0])
+
+
+def test_the_standing_body_bears_its_weight(walks):
+    walk = walks[0]
+    loads = borne(walk, stances(walk, walk)).loads.sum(axis=1)
+    assert loads.mean() == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_low_part_of_a_sole_that_bears_nothing_and_moves_does_not_skate(walks):
+    """A toe that rolls off is as low as one that stands."""
+    walk = walks[0]
+    schedule = stances(walk, walk)
+    points = sole_points(walk.poses)
+    every = stance_slides(points, schedule.standing)
+    assert well_formed(walk).slid < every.max()
+
+
 def test_the_embedded_walk_is_well_formed(walks):
     assert well_formed(walks[0]).faults() == ()
 
@@ -183,7 +248,8 @@ def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
     before = well_formed(made.captured)
     assert after.closed
     assert after.residual < 0.05 < before.residual
-    assert after.skate < before.skate
+    assert after.skate < 0.005 < before.skate
+    assert after.slid < 0.01
     assert follows.stands
     assert "the physical figure follows it for 20 s" in summary(outcome)
     assert (tmp_path / "prepare-walk.html").stat().st_size > 10_000
@@ -197,6 +263,39 @@ def test_a_file_of_few_frames_a_second_is_doubted(fps, doubted, tmp_path):
     doubts = [line for line in changes(prepared(tmp_path / "cheer.bvh", "open")) if "a frame lasts" in line]
     assert bool(doubts) == doubted
     assert all("0.5 s" in line for line in doubts)
+
+
+@pytest.fixture
+def long_walk(tmp_path):
+    """More than two minutes of walking, open at its ends."""
+    walk = resampled(embedded("walk"), 30.0)
+    rows = [walk.poses[:-1]]
+    while sum(map(len, rows)) < 130 * walk.fps:
+        rows.append(walk.displacement.moved(rows[-1]))
+    path = tmp_path / "long.bvh"
+    write_bvh(Clip(np.concatenate(rows), walk.fps, "long"), path)
+    return path
+
+
+def test_a_part_of_a_long_file_can_be_prepared(long_walk):
+    made = prepared(long_walk, "10:12.2")
+    assert made.captured.duration > 120.0
+    assert made.clip.duration == pytest.approx(2.2, abs=0.01)
+
+
+def test_the_whole_of_a_long_file_is_refused(long_walk):
+    with pytest.raises(ModelError, match=r"long.bvh: lasts 13\d.* at most 120 s, or --loop START:END of a part"):
+        prepared(long_walk, "open")
+
+
+def test_what_a_file_lacks_is_said_in_the_terminal(tmp_path, capsys):
+    walk = embedded("walk")
+    write_rig(Rig(without=("clavicle",), leading=1), Clip(walk.poses[::4], walk.fps / 4, "walk"), tmp_path / "r.bvh")
+    assert main(["prepare", str(tmp_path / "r.bvh"), str(tmp_path / "out.bvh")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "missing: left_clavicle (follows chest), right_clavicle (follows chest)"
+    assert lines[1] == "left out: the first frame, a pose that is not of the motion"
+    assert lines[-1].startswith("r: ")
 
 
 def test_prepared_clips_are_kept_by_the_code_that_prepares_them():

@@ -1,0 +1,98 @@
+"""Progress on the terminal: of simulated time, and of work by how long it took last time on this machine."""
+
+import json
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import cast
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from sim.compilation.unit_cache import cache_folder
+
+_WORTH_KEEPING = 2.0  # [s]; shorter durations are not stored
+
+
+class _Left(ProgressColumn):
+    """Column of the elapsed time and the expected remaining time."""
+
+    def __init__(self, expected: float | None):
+        super().__init__()
+        self._expected = expected
+
+    def render(self, task: Task) -> Text:
+        """As ``12 s, about 18 s left``."""
+        return Text(left(task.elapsed or 0.0, self._expected))
+
+
+def left(elapsed: float, expected: float | None) -> str:
+    """Elapsed time and, if the duration was measured before, remaining time, in words; both [s]."""
+    if expected is None:
+        return f"{elapsed:.0f} s"
+    if elapsed > expected:
+        return f"{elapsed:.0f} s, longer than the {expected:.0f} s of the last time"
+    return f"{elapsed:.0f} s, about {expected - elapsed:.0f} s left"
+
+
+@contextmanager
+def working(what: str, share: float = 1.0) -> Generator[None]:
+    """Show on stderr, if it is a terminal, what is being done and how long it still takes.
+
+    Parameters
+    ----------
+    what : str
+        Name of the work, such as ``lifting``, under which its duration is stored.
+    share : float
+        Amount of work in its own units, such as clips; the duration is taken to be proportional to it.
+    """
+    console, began = Console(stderr=True), time.perf_counter()
+    seconds = expected_seconds(what)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), _Left(seconds and share * seconds))
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        bar.add_task(what, total=None)
+        yield
+    taken = time.perf_counter() - began
+    if taken > _WORTH_KEEPING:
+        keep_seconds(what, taken / share)
+
+
+@contextmanager
+def simulating(console: Console, seconds: float) -> Generator[Callable[[float], None]]:
+    """Show a bar of the simulated time of a run of `seconds` [s]; yields a function to call with the time reached."""
+    columns = TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s")
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("", total=seconds)
+        yield lambda t: bar.update(task, completed=t)
+
+
+def expected_seconds(what: str) -> float | None:
+    """Duration per unit of some work the last time on this machine [s]; None if it is not known."""
+    return _kept().get(what)
+
+
+def _file() -> Path:
+    return cache_folder() / "durations.json"
+
+
+def _kept() -> dict[str, float]:
+    """Stored durations [s] by name; empty if the file is missing or unreadable, as they are only a help."""
+    try:
+        kept = json.loads(_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(kept, dict):
+        return {}
+    items = cast(dict[str, object], kept).items()
+    return {name: float(value) for name, value in items if isinstance(value, int | float) and value > 0.0}
+
+
+def keep_seconds(what: str, seconds: float) -> None:
+    """Store the duration of one unit of some work [s]; a file that cannot be written is ignored."""
+    try:
+        _file().parent.mkdir(parents=True, exist_ok=True)
+        _file().write_text(json.dumps(_kept() | {what: float(f"{seconds:.3g}")}), encoding="utf-8")
+    except OSError:
+        return

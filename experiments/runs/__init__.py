@@ -1,0 +1,1 @@
+"""Runs into folders and in memory: from a configuration or from Python, reproduced, completed, swept, tracked."""

@@ -1,0 +1,51 @@
+"""Completes an interrupted run from its recording: summary, animations, figures, page."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from experiments.console.compiling import compile_once
+from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
+from experiments.results.report_of import lines_of, write_report_of
+from experiments.results.summary_parts import SpeedSummary
+from experiments.runs.reproduce import check_map
+from experiments.runs.run import measured, write_animations, write_summary
+from experiments.setups.wiring import wire
+from sim.loop.loop import Loop
+from sim.loop.memory import peak_memory_mb
+from sim.recording.recording import Recording
+
+
+def finish(folder: Path) -> list[str]:
+    """Draw figures and page of a run again; an interrupted run first gets its summary and animations.
+
+    Returns what happened in the run, in words.
+
+    Raises
+    ------
+    SimError
+        If there is no recording, or the run is still in progress.
+    """
+    with Recording(folder / RECORDING) as recording:
+        of_a_configuration = "mode" in recording.config and "live" not in recording.texts
+        stopped = not recording.complete and not (folder / SUMMARY).exists()
+    with claimed(folder):
+        if stopped and of_a_configuration:
+            _complete(folder)
+        write_report_of(folder)
+    with Recording(folder / RECORDING) as recording:
+        return lines_of(recording, folder)
+
+
+def _complete(folder: Path) -> None:
+    """Write summary and animations; state that is not in the recording is found by simulating the run again."""
+    with Recording(folder / RECORDING) as recording:
+        config = config_of(recording)
+        check_map(config, recording)
+        session = wire(config, clips_of(recording), lambda units: compile_once(Console(stderr=True), units))
+        seconds = len(recording.channel("ticks", "t")) * session.servo.plant.period
+        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
+        times = loop.run(seconds)
+    speed = SpeedSummary(times.real_time_factor, float("nan"), peak_memory_mb())
+    write_summary(folder, measured(folder, session, speed))
+    write_animations(folder, session)

@@ -1,0 +1,150 @@
+"""Runs the configuration of a recording again and compares the two bit for bit."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from llvmlite.binding import get_host_cpu_name
+
+from controllers.state import Array
+from experiments.config.maps import MapFile
+from experiments.config.run_config import RunConfig
+from experiments.files.map_files import map_digest
+from experiments.results.arm import arm_channels
+from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm
+from experiments.setups.robot_arm import wire_arm
+from experiments.setups.wiring import wire
+from sim.errors import SimError
+from sim.loop.loop import Loop, groups, shown_channels, tick_channels
+from sim.loop.servo import FrameLog, Servo, TickLog
+from sim.recording.recording import Recording
+from sim.world.robot_world import RobotWorld
+from sim.world.world import World
+
+Channels = Callable[[TickLog, FrameLog, int], Mapping[str, Mapping[str, Array]]]
+"""Gives the channels of a block of n ticks, by group and name."""
+
+
+class _Comparison:
+    """Compares the blocks of a run with a recording while it runs; keeps the first difference of each group."""
+
+    def __init__(self, recording: Recording, channels: Channels):
+        self._recording, self._channels = recording, channels
+        self._rows = {"ticks": 0, "frames": 0}
+        self.differences: dict[str, str] = {}
+
+    def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
+        for group, blocks in self._channels(ticks, frames, n).items():
+            self._compare(group, blocks)
+
+    def _compare(self, group: str, blocks: Mapping[str, Array]) -> None:
+        first, n = self._rows[group], len(blocks["t"])
+        for name, block in blocks.items():
+            recorded = self._recording.channel(group, name)[first : first + n]
+            mine = block[: len(recorded)]
+            same = np.equal(recorded, mine) | (np.isnan(recorded) & np.isnan(mine))
+            if group not in self.differences and not np.all(same):
+                row = int(np.argmin(np.all(same.reshape(len(same), -1), axis=1)))
+                self.differences[group] = f"{name} differs first at {group[:-1]} {first + row}"
+        self._rows[group] += n
+
+
+def check_map(config: RunConfig, recording: Recording) -> None:
+    """Refuse a map whose file has changed since the recording was made."""
+    recorded = recording.texts.get("map_sha256")
+    if recorded is None:
+        return
+    path = config.map.file if isinstance(config.map, MapFile) else ""
+    found = map_digest(Path(path))
+    if found != recorded:
+        raise SimError(
+            f"{path}: the map has changed since the run was recorded: its SHA-256 is {found[:12]}…, expected "
+            f"{recorded[:12]}…; put the file back that the run was made with, or make it again by the same hvf lift"
+        )
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """Result of running a recording again.
+
+    Attributes
+    ----------
+    same : bool
+        Whether every tick and frame is the same, bit for bit.
+    ticks : int
+        Number of ticks compared.
+    differences : dict of str to str
+        First difference of each group of channels, in words.
+    remarks : tuple of str
+        Packages and processor that differ from those of the recording.
+    """
+
+    same: bool
+    ticks: int
+    differences: dict[str, str]
+    remarks: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Result in words."""
+        found = f"the same, bit for bit, over {self.ticks} ticks and what the figure did"
+        return [*self.remarks, found if self.same else f"not the same: {'; '.join(self.differences.values())}"]
+
+
+def reproduce(folder: Path) -> Reproduced:
+    """Run a recording's configuration again, and compare every tick and frame.
+
+    Raises
+    ------
+    SimError
+        If the folder holds no recording, the file of its map has changed, a person drove the run live, or it is of a
+        `Simulation` put together in Python.
+    OSError
+        If a file cannot be read.
+    """
+    with Recording(folder / RECORDING) as recording:
+        if "live" in recording.texts:
+            raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
+        remarks = _others(recording.versions)
+        servo, world, channels = _again_arm(recording) if of_arm(recording) else _again(recording)
+        comparison = _Comparison(recording, channels)
+        recorded_ticks = len(recording.channel("ticks", "t"))
+        Loop(servo, world, comparison).run(recorded_ticks * servo.plant.period)
+    return Reproduced(not comparison.differences, recorded_ticks, comparison.differences, remarks)
+
+
+def _again(recording: Recording) -> tuple[Servo, World, Channels]:
+    """A recorded run of a figure in its start state, and the channels that it recorded."""
+    config = config_of(recording)
+    check_map(config, recording)
+    session = wire(config, clips_of(recording))
+    servo, shown = session.servo, groups(session.servo)["frames"].channels
+
+    def channels(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
+        m = -(-n // servo.figure_ticks)
+        of_frames = shown_channels(frames, m, shown, session.world.pose_at)
+        return {"ticks": tick_channels(ticks, n), "frames": of_frames}
+
+    return servo, session.world, channels
+
+
+def _again_arm(recording: Recording) -> tuple[Servo, RobotWorld, Channels]:
+    """A recorded run of the robot arm in its start state, and the channels that it recorded."""
+    servo, world, _ = wire_arm(arm_config_of(recording))
+    return servo, world, arm_channels(servo, world)
+
+
+def _others(versions: Mapping[str, str]) -> tuple[str, ...]:
+    """Packages and processor that differ from those of a recording, in words."""
+    said: list[str] = []
+    for package, recorded in versions.items():
+        if package == "processor":
+            here = get_host_cpu_name()
+            if here != recorded:
+                said.append(
+                    f"recorded on a processor {recorded}, this is {here}: libraries round otherwise, expect differences"
+                )
+        elif package != "python" and version(package) != recorded:
+            said.append(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+    return tuple(said)

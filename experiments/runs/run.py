@@ -1,0 +1,214 @@
+"""Runs a configuration and writes its folder: recording, summary, animations, figures, page."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from rich.console import Console
+
+from controllers.curves.trajectory import Trajectory
+from controllers.state import HAND_TIME, POSITION
+from experiments.config.part import to_dict, to_json
+from experiments.config.run_config import RunConfig
+from experiments.console.compiling import compile_once
+from experiments.console.foresight import SIMULATING, check_length, foreseen
+from experiments.console.working import keep_seconds, simulating
+from experiments.files.curve_files import CURVE_FILE, save_curve
+from experiments.files.json_text import json_text
+from experiments.results.folder import (
+    CONFIG,
+    DEFAULT,
+    EDITED,
+    RECORDING,
+    REPORT,
+    SUMMARY,
+    check_folder,
+    check_holds,
+    claimed,
+    clear_folder,
+)
+from experiments.results.measures import BLOCK_FRAMES, summarise
+from experiments.results.summary import RunSummary
+from experiments.results.summary_parts import SpeedSummary
+from experiments.setups.default_animation import default_poses
+from experiments.setups.parts import Measuring
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from models.mocap.readers.own_bvh import write_bvh_blocks
+from models.world.scene import P_WH
+from sim.loop.clock import RealTime
+from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into, shown_configuration
+from sim.loop.memory import peak_memory_mb
+from sim.loop.servo import FrameLog, TickLog
+from sim.recording.recorder import Recorder
+from sim.recording.recording import Recording
+from sim.viewer.courses import courses
+from sim.viewer.page import NullPage, Page
+from sim.viewer.shown import Shown
+
+BVH_FPS = 50.0
+VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
+
+
+def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: bool = False) -> RunSummary:
+    """Run and write everything into a folder.
+
+    Parameters
+    ----------
+    config : RunConfig
+        What to run.
+    out : Path
+        Folder; created if it is missing.
+    overwrite : bool
+        Whether a run that the folder holds may be replaced.
+    started : float
+        `time.perf_counter` when the program began.
+    view : bool
+        Show the run in a browser while it goes on, at the pace of the wall clock.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If something about the configuration or a file is wrong; the folder is then left unchanged.
+    """
+    console = Console(stderr=True)
+    check_folder(out, overwrite)
+    check_length(out, config.seconds, config.clock.servo_period)
+    session = wire(config, ready=lambda units: compile_once(console, units))
+    for remark in session.remarks:
+        console.print(remark, highlight=False)
+    whole = cast(RunConfig, session.config)
+    takes = foreseen(out, whole.seconds, groups(session.servo))
+    if takes is not None:
+        console.print(takes, highlight=False)
+    with claimed(out):
+        check_holds(out, overwrite)
+        clear_folder(out)
+        (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
+        summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
+        write_animations(out, session)
+        write_summary(out, summary)
+        from experiments.results.report_of import write_report_of  # matplotlib and viser: after the first tick
+
+        write_report_of(out)
+    others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())
+    console.print(f"Written to {out}: {REPORT} (open it in a browser), {others}.")
+    return summary
+
+
+def write_summary(out: Path, summary: RunSummary) -> None:
+    """Write the summary of a run beside its recording."""
+    (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
+
+
+def record(
+    session: Session, out: Path, config: Mapping[str, object], seconds: float, started: float, console: Console,
+    view: bool = False,
+) -> RunSummary:  # fmt: skip
+    """Run a session, record it into an existing folder and return its summary.
+
+    Parameters
+    ----------
+    session : Session
+        Session that has not been run yet.
+    out : Path
+        Existing folder.
+    config : Mapping
+        Configuration of the session, as the recording stores it.
+    seconds : float
+        Simulated time [s].
+    started : float
+        `time.perf_counter` when the program began.
+    console : Console
+        Where progress is shown.
+    view : bool
+        As in `run`.
+    """
+    servo = session.servo
+    with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
+        speed = _simulate(session, recorder, seconds, console, started, view)
+        recorder.flush()
+        summary = measured(out, session, speed)
+        recorder.close(asdict(summary) | {"lines": summary.lines()})
+    return summary
+
+
+def _simulate(
+    session: Session, recorder: Recorder, seconds: float, console: Console, started: float, view: bool
+) -> SpeedSummary:
+    servo = session.servo
+    record = record_into(recorder, servo, session.world)
+    page = _live_page(session) if view else NullPage()
+    clock, simulated = RealTime(), session.world.kind == "physical"
+
+    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        record(ticks, frames, n)
+        hand = ticks.hand[n - 1]
+        page.show(
+            Shown(
+                hand[HAND_TIME], shown_configuration(servo), servo.reference.pose if simulated else hand[:0],
+                hand[POSITION], ticks.force[n - 1], ticks.user[n - 1], np.full(3, np.nan),
+            )
+        )  # fmt: skip
+
+    laws = session.parts.program.python_laws
+    block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
+    loop = Loop(servo, session.world, observe, block, laws, **session.asking)
+    first = servo.plant.period * servo.figure_ticks
+    loop.run(first)
+    first_tick = time.perf_counter() - started
+    with simulating(console, seconds) as reached:
+
+        def progress(t: float) -> None:
+            reached(t)
+            if view:
+                clock.wait_until(t)
+
+        times = loop.run(seconds - first, progress)
+    page.close()
+    keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
+    return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
+
+
+def _live_page(session: Session) -> Page:
+    from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
+
+    static = session.static()
+    radius = float(np.asarray(static["tube_radius"]))
+    return LivePage(session.world.full_model(), courses(static), radius, P_WH, session.world.kind)
+
+
+def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
+    """Summary of a session that has been run, computed from its recording."""
+    parts = session.parts
+
+    def keep_curve(curve: Trajectory) -> None:
+        save_curve(curve, out / CURVE_FILE)
+
+    with Recording(out / RECORDING) as recording:
+        summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
+        of = Measuring(recording, lambda: default_poses(session), parts.handled, session.servo.field.memory, keep_curve)
+        return parts.summarise(summary, of)
+
+
+def write_animations(out: Path, session: Session) -> None:
+    """Write two BVH files: the animation as the hand made it, and that of the curve's nearest points at each frame."""
+    with Recording(out / RECORDING) as recording:
+        if "reference" not in recording.groups["frames"]:
+            return  # a run without a figure has no animation
+        reference = recording.channel("frames", "reference")
+        on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
+        stride = max(1, round(recording.rates["frames"] / BVH_FPS))
+        fps = recording.rates["frames"] / stride
+        n = -(-len(reference) // stride)
+        per_frame = stride * session.servo.figure_ticks
+        poses_at = default_poses(session, stride)
+        starts = range(0, n, BLOCK_FRAMES)
+        blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
+        write_bvh_blocks(
+            out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
+        )
+        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(*(c[rows] for c in on_curve)) for rows in blocks))

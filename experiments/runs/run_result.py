@@ -1,0 +1,141 @@
+"""The result of a simulation: summary, recorded channels, animation and page, in a temporary or a given folder."""
+
+import shutil
+import tempfile
+import time
+import weakref
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from controllers.state import Array
+from experiments.files.json_text import json_text
+from experiments.results.folder import EDITED, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
+from experiments.results.summary import RunSummary
+from experiments.runs.run import record as record_session
+from experiments.runs.run import write_animations
+from experiments.setups.session import Session
+from models.errors import ModelError
+from sim.recording.recording import Recording
+
+
+class Channels(Mapping[str, Array]):
+    """Channels of a recording at one rate, by name: ``run.ticks["force"]``, shape (n, ...)."""
+
+    def __init__(self, path: Path, group: str):
+        self._path, self._group = path, group
+
+    def __getitem__(self, name: str) -> Array:
+        with Recording(self._path) as recording:
+            return recording.channel(self._group, name)[:]
+
+    def __iter__(self) -> Iterator[str]:
+        with Recording(self._path) as recording:
+            return iter(sorted(recording.groups[self._group]))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+    def __repr__(self) -> str:
+        return f"<{self._group}: {', '.join(self)}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Result of a simulation.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the recording; unless ``record`` was given, a temporary one that is deleted with the `Run` object.
+    summary : RunSummary
+        Measures as numbers; `str` of a run gives them in words.
+    """
+
+    folder: Path
+    summary: RunSummary
+    _session: Session = field(repr=False)
+
+    @staticmethod
+    def of(
+        session: Session, config: Mapping[str, object], seconds: float, record: str | Path | None, overwrite: bool
+    ) -> "Run":
+        """Run a session and keep its recording; see `Simulation.run`."""
+        started, console = time.perf_counter(), Console(stderr=True, quiet=True)
+        if record is None:
+            folder = Path(tempfile.mkdtemp(prefix="hvf-"))
+        else:
+            folder = Path(record)
+            check_folder(folder, overwrite)
+            clear_folder(folder)
+        summary = record_session(session, folder, config, seconds, started, console)
+        session.haptic_map.check()
+        run = Run(folder, summary, session)
+        if record is None:
+            weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
+            return run
+        write_animations(folder, session)
+        (folder / SUMMARY).write_text(json_text(asdict(summary) | {"lines": summary.lines()}) + "\n", encoding="utf-8")
+        run.report()
+        return run
+
+    @property
+    def ticks(self) -> Channels:
+        """Channels at the rate of the servo."""
+        return Channels(self.folder / RECORDING, "ticks")
+
+    @property
+    def frames(self) -> Channels:
+        """Channels at the rate of the figure's control."""
+        return Channels(self.folder / RECORDING, "frames")
+
+    def to_bvh(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write the animation as the hand made it.
+
+        Raises
+        ------
+        ModelError
+            If the file exists and is not to be overwritten.
+        """
+        target = Path(path)
+        if target.exists() and not overwrite:
+            raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")
+        if not (self.folder / EDITED).exists():
+            write_animations(self.folder, self._session)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(self.folder / EDITED, target)
+        return target
+
+    def report(self) -> Path:
+        """Draw page and figures of the run; returns the page."""
+        from experiments.results.report_of import write_report_of  # matplotlib takes long to import
+
+        write_report_of(self.folder)
+        return self.folder / REPORT
+
+    def frame(self) -> Any:
+        """The ticks as a pandas DataFrame (pandas must be installed), with one column per scalar."""
+        pandas = import_module("pandas")
+        columns: dict[str, Any] = {}
+        for name, values in self.ticks.items():
+            rows = values.reshape(len(values), -1)
+            suffixes = [""] if values.ndim == 1 else [f"_{i}" for i in range(rows.shape[1])]
+            columns |= {name + suffix: rows[:, i] for i, suffix in enumerate(suffixes)}
+        return pandas.DataFrame(columns).set_index("t")
+
+    def __str__(self) -> str:
+        return "\n".join(self.summary.lines())
+
+    def __repr__(self) -> str:
+        alone = self.summary.path.deviation_rms_mm
+        told = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
+        return f"<run of {self.ticks['t'][-1]:.1f} s{told}>"
+
+    def _repr_html_(self) -> str:
+        """The replay, in a notebook."""
+        page = self.report().read_text(encoding="utf-8").replace("&", "&amp;").replace('"', "&quot;")
+        return f'<iframe srcdoc="{page}" width="100%" height="640"></iframe>'

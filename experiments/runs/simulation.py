@@ -1,0 +1,296 @@
+"""Simulations from Python: put parts together, run them in memory or into a folder, step them tick by tick."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from rich.console import Console
+
+from controllers.curves.stylus import stylus_path
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.law import Law
+from controllers.haptic_map.base import HapticMap
+from controllers.safety.energy_tank import EnergyTank
+from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array, HandState, Wrench
+from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.config.run_config import User as RunUser
+from experiments.console.compiling import compile_once
+from experiments.runs.run_result import Run
+from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
+from experiments.setups.hands import intent_of, participant
+from experiments.setups.parts import ClipMapParts, Notes, Parts
+from experiments.setups.session import Session
+from experiments.setups.wiring import assemble, check_rates
+from models.mocap.motion.clip import Clip
+from models.world.scene import SceneConfig
+from sim.loop.loop import Loop
+from sim.users.hand.actions import Grab, Push, Turn
+from sim.users.hand.arm import Arm
+from sim.users.intents.intent import PersonIntent
+from sim.users.participant import Participant
+from sim.users.person.person import Person
+from sim.world.world import World
+
+
+class FigureMap(Protocol):
+    """Factory of a haptic map for the figure of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        ...
+
+
+@dataclass(frozen=True)
+class Cylindrical:
+    """Cylindrical map: the angle sets the frame, radius and height blend four clips (the paper's Fig. 3).
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Inner low, outer low, inner high, outer high; if there are fewer, they are repeated.
+    around : Trajectory
+        Curve about the z axis of H, in the middle of the map's domain.
+    reach : float
+        Half width of the domain about the curve, in radius and in height [m].
+    expressive : bool
+        Whether the figure's gaze and lean follow the orientation of the stylus.
+    """
+
+    clips: Sequence[Clip]
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    expressive: bool = False
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return cylindrical_parts(tuple(self.clips), _place(self), world.figure)
+
+
+@dataclass(frozen=True)
+class Composite:
+    """Composite map: the lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Lower body, upper body inside, upper body outside; if there are fewer, they are repeated.
+    around, reach, expressive
+        As in `Cylindrical`.
+    """
+
+    clips: Sequence[Clip]
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    expressive: bool = False
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return composite_parts(tuple(self.clips), _place(self), world.figure)
+
+
+def _place(part: Cylindrical | Composite) -> Place:
+    curve = reached(part.around)
+    points = curve.point(np.linspace(curve.start, curve.end, 65))
+    return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), part.reach, part.expressive)
+
+
+@dataclass(frozen=True)
+class User:
+    """The simulated hand: relaxed or tracing a curve, with pushes, turns and grabs at given times.
+
+    Parameters
+    ----------
+    pushes, turns, grabs : sequences of Push, Turn, Grab
+        Actions of the hand.
+    traces : Trajectory, optional
+        Curve that the hand traces, again and again.
+    person : Person, optional
+        Model of the human operator; without it the hand is an arm's impedance, without delay and noise.
+    intent : PersonIntent, optional
+        What the person intends, one of `hvf.intents`; by default it follows from the other parameters.
+    """
+
+    pushes: Sequence[Push] = ()
+    turns: Sequence[Turn] = ()
+    grabs: Sequence[Grab] = ()
+    traces: Trajectory | None = field(default=None, repr=False)
+    person: Person | None = None
+    intent: PersonIntent | None = None
+
+    def hand(self, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
+        """The hand for a run of `seconds` [s] about a curve, with a seed.
+
+        Raises
+        ------
+        ParameterError
+            If an intent is given without a person, or turns with one.
+        """
+        if self.intent is not None and self.person is None:
+            raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
+        if self.person is not None:
+            if self.turns:
+                raise ParameterError("a person lets the stylus swing and does not turn it; leave out the turns")
+            does = "relaxed" if self.traces is None else "trace"
+            user = RunUser(does=does, pushes=tuple(self.pushes), grabs=tuple(self.grabs))
+            return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
+        if self.traces is None:
+            return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+        path = self.traces.point(np.arange(0.0, seconds, 0.01))
+        return Arm(path=path, period=0.01, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+
+
+class Tick(NamedTuple):
+    """One tick of a simulation that is stepped.
+
+    Attributes
+    ----------
+    hand : HandState
+        Measured state of the hand.
+    field : Wrench
+        Force and torque of the field.
+    force : Array
+        Force commanded to the device, after limiter and energy tank, in H [N], shape (3,).
+    pose : Array
+        The animation h(p), qpos, shape (75,).
+    figure : Array
+        Simulated pose of the figure, qpos, shape (75,); empty without a figure.
+    """
+
+    hand: HandState
+    field: Wrench
+    force: Array
+    pose: Array
+    figure: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """A hand, a field, a haptic map and a figure, with the device and the clock: all that determines a run.
+
+    Parameters
+    ----------
+    field : Law
+        Law of force: built-in, composed or user-defined.
+    haptic_map : FigureMap or HapticMap
+        Map from the stylus to the figure; a user-defined `HapticMap` is taken to lie along the curve of the field.
+    user : User
+        The simulated hand.
+    device : Phantom
+        The device.
+    figure : Figure
+        The figure that plays the animation.
+    clock : Clock
+        The rates.
+    seed : int
+        Seed of the start position of the stylus and of a person's noise.
+    tank : EnergyTank, optional
+        Bound on the energy that the field may inject; by default from the device's force and the curve's speed.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If the rates are not multiples of each other.
+    """
+
+    field: Law
+    haptic_map: FigureMap | HapticMap
+    user: User = User()
+    device: Phantom = Phantom()  # noqa: RUF009 - frozen
+    figure: Figure = Figure()  # noqa: RUF009
+    clock: Clock = Clock()  # noqa: RUF009
+    seed: int = 1
+    tank: EnergyTank | None = None
+
+    def __post_init__(self) -> None:
+        check_rates(self)
+
+    @property
+    def scene(self) -> SceneConfig:
+        """Configuration of the world: the figure's size and the rates."""
+        figure, clock = self.figure, self.clock
+        return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
+
+    def session(self, seconds: float = 60.0) -> Session:
+        """The simulation put together for at most `seconds` [s]; compiles what it needs.
+
+        Raises
+        ------
+        ModelError, ControllerError, SimError
+            If its parts do not fit together.
+        """
+        world, console = World(self.scene, self.figure.kind), Console(stderr=True)
+        given = self.haptic_map
+        maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
+        return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
+
+    def _curve(self) -> Trajectory:
+        """Curve of the first law of the field that has one: a user-defined map lies along it."""
+        curves = (getattr(law, "curve", None) for law in self.field.program().laws)
+        found = [curve for curve in curves if isinstance(curve, Trajectory)]
+        if not found:
+            raise ParameterError("a map of one's own lies along the curve of the field; expected a field with a curve")
+        return found[0]
+
+    def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
+        limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
+        power, spring = limiter.peak * fastest(maps.curve), (np.inf, SPAN)
+        tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
+        handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
+        return Parts(
+            config=self, maps=maps, field=self.field, program=program, course=maps.curve,
+            user=self.user.hand(maps.curve, seconds, self.seed), tank=tank, gains=maps.gains,
+            notes=Notes(type(self.field).__name__.upper(), maps.reach),
+            argument_at=lambda nearest, phases: stylus_path(nearest),
+            handled=((0.0, np.inf),) if self.user.traces is not None else handled,
+        )  # fmt: skip
+
+    def run(self, seconds: float, record: str | Path | None = None, overwrite: bool = False) -> Run:
+        """Run from the start and return the result.
+
+        Parameters
+        ----------
+        seconds : float
+            Simulated time [s].
+        record : path, optional
+            Folder to write recording, summary, animations, figures and page into; by default a temporary one.
+        overwrite : bool
+            Replace a run that the folder holds.
+
+        Raises
+        ------
+        ModelError, ControllerError, SimError
+            If the parts do not fit together, or the folder cannot be written or holds a run.
+        """
+        least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
+        if not least <= seconds < np.inf:
+            raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
+        return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
+
+    def __iter__(self) -> Iterator[Tick]:
+        """Step tick by tick, without end: ``for tick in sim``."""
+        session = self.session()
+        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
+        while True:
+            ticks, frames = loop.step()
+            session.haptic_map.check()
+            force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
+            yield Tick(
+                HandState.of(ticks.hand[0]), Wrench(force, torque), ticks.force[0].copy(),
+                session.servo.reference.pose.copy(), session.figure_pose(frames.qpos[0]),
+            )  # fmt: skip
+
+    def description(self) -> dict[str, object]:
+        """What the simulation is made of, in plain data, as its recordings store it."""
+        clips = getattr(self.haptic_map, "clips", ())
+        return {
+            "simulation": "of Python objects; the script that made it makes it again",
+            "field": self.field.description(),
+            "map": {"kind": type(self.haptic_map).__name__, "clips": [clip.name for clip in clips]},
+            "clock": {"servo_period": self.clock.servo_period, "physics_step": self.clock.physics_step},
+            "seed": self.seed,
+        }

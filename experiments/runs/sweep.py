@@ -1,0 +1,109 @@
+"""Parameter sweeps: a simulation run at many values of its parameters, in parallel threads."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass
+from dataclasses import replace as replaced
+from typing import Any, NamedTuple, cast
+
+from controllers.errors import ParameterError
+from controllers.fields.function_law import FunctionLaw
+from controllers.fields.law import Law, Program
+from experiments.runs.run_result import Run
+from experiments.runs.simulation import Simulation
+
+
+class Swept(NamedTuple):
+    """One simulation of a sweep.
+
+    Attributes
+    ----------
+    values : dict
+        Values of the swept parameters, by path.
+    run : Run
+        Result of the run.
+    """
+
+    values: dict[str, Any]
+    run: Run
+
+
+def sweep(
+    sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float = 10.0, threads: int = 1
+) -> Iterator[Swept]:
+    """Run a simulation at every combination of values, and yield the runs in the order of the combinations.
+
+    Parameters
+    ----------
+    sim : Simulation
+        Simulation with the values of all other parameters.
+    values : mapping of str to sequence
+        Values by path of the parameter: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a
+        composed field a name must belong to one law only; ``field.Follow.k_r`` names the law too. The parameters of a
+        user-defined law are reached in the same way, under the name of its function: ``field.floor.k``.
+    seconds : float
+        Simulated time of each run [s].
+    threads : int
+        Number of simultaneous runs; the compiled loop releases the GIL.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such parameter, or several laws have it.
+    """
+    combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
+    simulations = [with_values(sim, chosen) for chosen in combinations]
+
+    def run(simulation: Simulation) -> Run:
+        return simulation.run(seconds)
+
+    if simulations and threads > 1:
+        simulations[0].session(seconds)  # compiles the units once, before the threads begin
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        for chosen, made in zip(combinations, pool.map(run, simulations), strict=True):
+            yield Swept(chosen, made)
+
+
+def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
+    """The same simulation with parameters set, by path as in `sweep`."""
+    for path, value in chosen.items():
+        sim = cast(Simulation, _set(sim, path.split("."), value, path))
+    return sim
+
+
+def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
+    """The same part with one parameter set, which may be nested."""
+    if isinstance(part, Program):
+        law = _owner(part, names, path)
+        rest = names if len(names) == 1 or _name(law) != names[0] else names[1:]
+        return part.with_law(law, cast(Law, _set(law, rest, value, path)))
+    if isinstance(part, FunctionLaw) and len(names) == 1:
+        return part(**{names[0]: value})
+    if not is_dataclass(part) or isinstance(part, type) or names[0] not in {f.name for f in fields(part)}:
+        known = [f.name for f in fields(part)] if is_dataclass(part) else []
+        raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {', '.join(known)}")
+    new = value if len(names) == 1 else _set(getattr(part, names[0]), names[1:], value, path)
+    return replaced(part, **{names[0]: new})
+
+
+def _owner(program: Program, names: Sequence[str], path: str) -> Law:
+    """The one law of a composed field to which a path refers."""
+    wanted = names[0]
+    found = [
+        law for law in program.laws
+        if (_name(law) == wanted if len(names) > 1 else _has(law, wanted))
+    ]  # fmt: skip
+    if len(found) != 1:
+        laws = ", ".join(_name(law) for law in program.laws)
+        raise ParameterError(f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}")
+    return found[0]
+
+
+def _name(law: Law) -> str:
+    """Name of a law: of a user-defined one that of its function, otherwise that of its class."""
+    return law.name if isinstance(law, FunctionLaw) else type(law).__name__
+
+
+def _has(law: Law, number: str) -> bool:
+    return number in law.parameters if isinstance(law, FunctionLaw) else hasattr(law, number)

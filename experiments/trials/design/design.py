@@ -1,0 +1,150 @@
+"""Experimental design of a study: its conditions, their assignment to users, and their counterbalanced order."""
+
+import itertools
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyConfig, Words
+from experiments.trials.trial.measures import MEASURES
+
+_TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
+
+
+class Condition(NamedTuple):
+    """A combination of one level of every factor.
+
+    Attributes
+    ----------
+    levels : dict
+        Name of the level by name of the factor.
+    words : Words
+        Parameters of a run that the levels set.
+    """
+
+    levels: dict[str, str]
+    words: Words
+
+
+class Meeting(NamedTuple):
+    """A trial of the design: a user in a condition.
+
+    Attributes
+    ----------
+    user, repetition, position : int
+        Number of the user, of the repetition of the condition, and of the trial in the user's sequence.
+    number : int
+        Index of the condition among all `conditions`.
+    condition : Condition
+        The condition.
+    """
+
+    user: int
+    repetition: int
+    position: int
+    number: int
+    condition: Condition
+
+
+def conditions(study: StudyConfig) -> tuple[Condition, ...]:
+    """All combinations of levels; the level of the last factor changes fastest.
+
+    Raises
+    ------
+    StudyError
+        If the design contradicts itself.
+    """
+    _check(study)
+    names = list(study.factors)
+    made: list[Condition] = []
+    for chosen in itertools.product(*study.factors.values()):
+        levels = dict(zip(names, chosen, strict=True))
+        words: Words = {}
+        for name, level in levels.items():
+            words |= study.factors[name][level]
+        made.append(Condition(levels, words))
+    return tuple(made)
+
+
+def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
+    """Every trial of a study, by user and then in the order of time.
+
+    Users are assigned in turn to the groups of the between-subject factors. Within a group, the users take the rows of
+    a balanced Latin square in turn, or all the fixed order.
+
+    Raises
+    ------
+    StudyError
+        If the design contradicts itself.
+    """
+    groups: dict[tuple[str, ...], list[tuple[int, Condition]]] = {}
+    for number, condition in enumerate(conditions(study)):
+        group = tuple(condition.levels[name] for name in study.between)
+        groups.setdefault(group, []).append((number, condition))
+    dealt = list(groups.values())
+    if len(dealt) > study.users.number:
+        raise StudyError(
+            f"study {study.name!r}: {len(dealt)} groups between users and {study.users.number} users; expected a user "
+            f"or more for each, or fewer factors in between"
+        )
+    met: list[Meeting] = []
+    for user in range(study.users.number):
+        own = dealt[user % len(dealt)]
+        rows = balanced_rows(len(own)) if study.order == "latin-square" else (tuple(range(len(own))),)
+        row = rows[user // len(dealt) % len(rows)]
+        for repetition, (place, k) in itertools.product(range(study.repetitions), enumerate(row)):
+            number, condition = own[k]
+            met.append(Meeting(user, repetition, repetition * len(row) + place, number, condition))
+    return tuple(met)
+
+
+def balanced_rows(n: int) -> tuple[tuple[int, ...], ...]:
+    """Orders of n conditions in which each is in every position, and follows every other one, equally often.
+
+    A Latin square for even n, two of them for odd n (E. J. Williams, "Experimental designs balanced for the estimation
+    of residual effects of treatments", *Australian Journal of Scientific Research* A 2, 1949): the first row is 0, 1,
+    n−1, 2, n−2, …, each further row adds one modulo n, and for odd n the same rows are added in reverse.
+    """
+    first = [(k + 1) // 2 if k % 2 else (n - k // 2) % n for k in range(n)]
+    rows = [tuple((k + shift) % n for k in first) for shift in range(n)]
+    return tuple(rows if n % 2 == 0 else rows + [row[::-1] for row in rows])
+
+
+def _check(study: StudyConfig) -> None:
+    where = f"study {study.name!r}"
+    if not study.factors:
+        raise StudyError(f"{where} has no factors; expected one or more, such as stiffness = [100, 300]")
+    for name, levels in study.factors.items():
+        if name in _TAKEN:
+            raise StudyError(
+                f"{where}: factor {name!r} has the name of another column of the table; expected another one, with "
+                "levels that say what they set"
+            )
+        if len(levels) < 2:
+            had = f"one level, {next(iter(levels))!r}" if levels else "no levels"
+            raise StudyError(f"{where}: factor {name!r} has {had}; expected two or more, or its words under [run]")
+    _check_between(study, where)
+    for (one, its), (other, others) in itertools.combinations(study.factors.items(), 2):
+        shared = _words(its.values()) & _words(others.values())
+        if shared:
+            raise StudyError(
+                f"{where}: factors {one!r} and {other!r} both set {sorted(shared)[0]!r}; expected one factor for it"
+            )
+    for word, owner in (("person", "users"), ("seconds", "seconds"), ("seed", "seed")):
+        if word in study.run or any(word in _words(levels.values()) for levels in study.factors.values()):
+            raise StudyError(f"{where} sets {word!r} as a word of its runs; expected {owner!r} of the study itself")
+
+
+def _check_between(study: StudyConfig, where: str) -> None:
+    for name in study.between:
+        if name not in study.factors:
+            raise StudyError(f"{where}: no factor {name!r} to vary between users; there are {', '.join(study.factors)}")
+    if len(set(study.between)) < len(study.between):
+        raise StudyError(f"{where}: a factor stands twice in between; expected {sorted(set(study.between))}")
+
+
+def _words(levels: Iterable[Words]) -> set[str]:
+    found: set[str] = set()
+    for level in levels:
+        found |= set(level)
+    return found

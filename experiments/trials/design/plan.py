@@ -1,0 +1,135 @@
+"""The plan of a study: a configuration and a key for every trial."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from experiments.config.maps import MapFile
+from experiments.config.part import to_json
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.setups.defaults import resolved
+from experiments.trials.design.code_hash import code_hash
+from experiments.trials.design.design import Condition, Meeting, conditions, meetings
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.participants import participants
+from experiments.trials.design.study_config import StudyConfig, Words
+from models.mocap.library import embedded_names
+from sim.users.person.person import Person
+
+
+class Trial(NamedTuple):
+    """A planned trial.
+
+    Attributes
+    ----------
+    key : str
+        Hash of configuration, seed, files and code.
+    meeting : Meeting
+        User, condition and position in the design.
+    config : RunConfig
+        Configuration of the run.
+    """
+
+    key: str
+    meeting: Meeting
+    config: RunConfig
+
+
+def planned(study: StudyConfig) -> tuple[Trial, ...]:
+    """All trials of a study.
+
+    Raises
+    ------
+    ControllerError, SimError, ModelError
+        If the design contradicts itself, a level sets a parameter that a run does not have, or a clip does not exist.
+    """
+    people = participants(study.users)
+    bases = {number: _base(study, people[0], condition) for number, condition in enumerate(conditions(study))}
+    _check_apart(study, bases)
+    trials: list[Trial] = []
+    for meeting in meetings(study):
+        base = bases[meeting.number]
+        user = replace(base.user, person=people[meeting.user])
+        config = replace(base, user=user, seed=trial_seed(study.seed, meeting))
+        trials.append(Trial(key_of(config), meeting, config))
+    return tuple(trials)
+
+
+def trial_seed(seed: int, meeting: Meeting) -> int:
+    """Seed of a trial, independent of other trials' seeds and of the numbers of users and repetitions."""
+    entropy = (seed, meeting.user, meeting.number, meeting.repetition)
+    return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
+
+
+def key_of(config: RunConfig) -> str:
+    """Hash of a configuration with its seed, of the files that it names, and of the code, 32 hex digits.
+
+    Raises
+    ------
+    StudyError
+        If a file that it names does not exist.
+    """
+    told = to_json(resolved(config))
+    files = [f"{name} {file_digest(name)}" for name in files_of(config)]
+    return hashlib.sha256("\n".join([code_hash(), told, *files]).encode()).hexdigest()[:32]
+
+
+def files_of(config: RunConfig) -> tuple[str, ...]:
+    """Files that a configuration names: clips that are not embedded, the map's, and the device's."""
+    clips = tuple(name for name in config.map.clips if name not in embedded_names())
+    others = (config.map.file if isinstance(config.map, MapFile) else "", config.device.device_file)
+    return clips + tuple(name for name in others if name)
+
+
+@cache
+def file_digest(name: str) -> str:
+    """Hash of a file.
+
+    Raises
+    ------
+    StudyError
+        If it does not exist.
+    """
+    try:
+        return hashlib.sha256(Path(name).read_bytes()).hexdigest()
+    except OSError as error:
+        raise StudyError(
+            f"{name}: {error.strerror}; expected the file of a clip, a map or a device, or one of the embedded clips, "
+            f"{', '.join(embedded_names())}"
+        ) from None
+
+
+def _base(study: StudyConfig, person: Person, condition: Condition) -> RunConfig:
+    words: Words = {"person": person, "seconds": study.seconds} | study.run | condition.words
+    if words.get("mode") != "lead":  # in LEADING the hand does nothing but lead
+        words.setdefault("user", study.users.does)
+    try:
+        return run_config(**words)
+    except ParameterError as error:
+        said = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
+        raise StudyError(f"study {study.name!r}, condition {said}: {error}") from None
+    except TypeError as error:
+        raise StudyError(
+            f"study {study.name!r}: {error}; expected words of a run, as `hvf run --help` has them"
+        ) from None
+
+
+def _check_apart(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:
+    """Refuse two conditions that are the same."""
+    seen: dict[str, int] = {}
+    every = conditions(study)
+    for number, config in bases.items():
+        told = to_json(config)
+        if told in seen:
+            one, other = (" and ".join(every[k].levels.values()) for k in (seen[told], number))
+            raise StudyError(
+                f"study {study.name!r}: conditions {one!r} and {other!r} are the same; expected them to differ"
+            )
+        seen[told] = number

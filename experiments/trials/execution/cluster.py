@@ -1,0 +1,199 @@
+"""Executor of trials on a Dask cluster: local processes or the workers of any scheduler."""
+
+import logging
+import socket
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from experiments.config.part import from_json
+from experiments.config.run_config import RunConfig
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.plan import key_of
+from experiments.trials.trial.run_trial import Row, Task, perform
+
+AHEAD = 3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
+DEATHS = 50  # workers that die while they run the same trial before the trial is taken to be the cause
+STARTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
+_BUSY = "120s"  # timeout of local connections: on a busy machine processes may have to wait
+_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker
+
+
+class Cluster:
+    """Runs trials on the workers of a scheduler, including workers that join later.
+
+    If a worker is killed, Dask gives its trials to another one.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Client of the scheduler.
+    where : str
+        Name of the scheduler in messages.
+    """
+
+    def __init__(self, client: Any, where: str):
+        self._client, self._where = client, where
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        """Yield rows of tasks as they are completed; tasks are drawn from the iterable as they are needed.
+
+        Raises
+        ------
+        StudyError
+            If the scheduler is lost, or the code or files of a worker differ from the driver's.
+        """
+        from distributed import as_completed
+
+        left, running = iter(tasks), as_completed()
+        for task in _first(left, AHEAD * max(1, self._threads())):
+            running.add(self._submit(task))
+        for future in running:
+            yield self._row(future)
+            for task in _first(left, 1 + max(0, AHEAD * self._threads() - running.count() - 1)):
+                running.add(self._submit(task))
+
+    def _submit(self, task: Task) -> Any:
+        # pure=False: a task may be submitted again after its future was released.
+        return self._client.submit(perform_on_worker, task, key=f"trial-{task.key}", pure=False)
+
+    def _row(self, future: Any) -> Row:
+        from distributed import KilledWorker
+
+        try:
+            row = future.result()
+        except StudyError:
+            raise
+        except KilledWorker:
+            key = str(future.key).removeprefix("trial-")
+            return Row(key, "failed", f"every one of {DEATHS} workers that ran it died", {}, 0.0, "", "")
+        except (OSError, TimeoutError, RuntimeError) as error:
+            raise self._lost(error) from None
+        except Exception as error:  # Dask raises here whatever a worker could not import or unpickle
+            if future.status in ("cancelled", "lost"):
+                raise self._lost(error) from None
+            raise StudyError(
+                f"a worker of {self._where}: {type(error).__name__}: {error}; expected this version of hvf there"
+            ) from None
+        finally:
+            future.release()
+        return Row(*row)
+
+    def _lost(self, error: BaseException) -> StudyError:
+        said = (str(error).splitlines() or [type(error).__name__])[0].rpartition("reason: ")[2].rstrip(".")
+        return StudyError(
+            f"{self._where}: the scheduler is lost ({said}); every trial so far is kept; start it again to go on"
+        )
+
+    def _threads(self) -> int:
+        try:
+            return sum(self._client.nthreads().values())
+        except (OSError, TimeoutError, RuntimeError, ValueError) as error:
+            raise self._lost(error) from None
+
+
+@contextmanager
+def local_cluster(workers: int) -> Generator[Cluster]:
+    """A cluster of `workers` local processes, each of which runs one trial at a time; it ends with the block.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be started.
+    """
+    distributed = _distributed()
+    import dask
+
+    settings = {
+        "distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.memory.terminate": False,
+        "distributed.comm.timeouts.connect": _BUSY, "distributed.comm.timeouts.tcp": _BUSY,
+    }  # fmt: skip
+    with (
+        dask.config.set(settings),  # pyright: ignore[reportPrivateImportUsage]
+        _processes(distributed, workers) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield Cluster(client, f"{workers} local workers")
+
+
+def _processes(distributed: Any, workers: int) -> Any:
+    """Dask's local cluster; Dask gives up if a worker dies while it starts, so that several attempts are made."""
+    said = ""
+    for _ in range(STARTS):
+        try:
+            return distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_QUIET
+            )
+        except RuntimeError as error:
+            said = str(error.__cause__ or error).splitlines()[0]
+    raise StudyError(f"{workers} local workers do not start ({said}); expected fewer --workers, or --threads instead")
+
+
+@contextmanager
+def cluster_at(address: str) -> Generator[Cluster]:
+    """The cluster of a running scheduler, given by its address such as ``tcp://host:8786``.
+
+    Raises
+    ------
+    StudyError
+        If no scheduler answers, or it has no workers.
+    """
+    distributed = _distributed()
+    try:
+        client = distributed.Client(address, timeout=_WAIT)
+    except (OSError, TimeoutError, ValueError) as error:
+        said = str(error).splitlines()[0]
+        raise StudyError(
+            f"{address}: no Dask scheduler answers ({said}); expected one such as tcp://host:8786"
+        ) from None
+    try:
+        try:
+            client.wait_for_workers(1, timeout=_WAIT)
+        except TimeoutError:
+            raise StudyError(
+                f"{address}: the scheduler has no workers after {_WAIT}; start some with `dask worker {address}`"
+            ) from None
+        yield Cluster(client, address)
+    finally:
+        client.close(timeout="2s")
+
+
+_QUIET = logging.CRITICAL
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise StudyError(
+            "clusters need Dask; expected pip install 'haptic-vector-fields[study]', or --threads instead"
+        ) from None
+    for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "distributed.batched"):
+        logging.getLogger(name).setLevel(_QUIET)
+    return distributed
+
+
+def perform_on_worker(task: Task) -> Row:
+    """Run `perform` on a worker, after checking that its code and files are those of the driver.
+
+    Raises
+    ------
+    StudyError
+        If they differ.
+    """
+    config = from_json(RunConfig, task.config, "a trial's configuration")
+    try:
+        key = key_of(config)
+    except StudyError as error:
+        raise StudyError(f"worker on {socket.gethostname()}: {error}; copy it there, and start it again") from None
+    if key != task.key:
+        raise StudyError(
+            f"worker on {socket.gethostname()}: its code, libraries, clips or maps differ from the driver's; expected "
+            "the same version of all, and start it again"
+        )
+    return perform(task)
+
+
+def _first(tasks: Iterator[Task], number: int) -> Iterator[Task]:
+    for _, task in zip(range(number), tasks, strict=False):
+        yield task

@@ -1,0 +1,160 @@
+"""The database of a study: one SQLite file with a row per trial, which survives a kill at any moment."""
+
+import fcntl
+import json
+import math
+import os
+import sqlite3
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from experiments.trials.design.errors import StudyError
+from experiments.trials.trial.run_trial import Row
+
+SCHEMA = 1
+_MARK = 0x48564654  # "HVFT": application id, by which SQLite and `file` identify the file
+_TABLES = """
+CREATE TABLE study (identity TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL);
+CREATE TABLE trials (
+    key TEXT PRIMARY KEY, state TEXT NOT NULL, reason TEXT NOT NULL, measures TEXT NOT NULL, what TEXT NOT NULL,
+    seconds REAL NOT NULL, worker TEXT NOT NULL, processor TEXT NOT NULL, finished TEXT NOT NULL
+) WITHOUT ROWID;
+"""
+
+
+class Database:
+    """Rows of a study's trials by key; one driver at a time may write, any process may read.
+
+    Use as a context manager. Every row is a transaction in SQLite's write-ahead log: a kill loses no row already added.
+
+    Parameters
+    ----------
+    path : Path
+        File; created with its folder if it is missing.
+    identity : str
+        Hash of the study without its numbers of users and repetitions.
+    name, text : str
+        Name of the study and text of its file, for readers of the database.
+
+    Raises
+    ------
+    StudyError
+        If the file is no such database, belongs to another study or version, or is being written by another driver.
+    """
+
+    def __init__(self, path: Path, identity: str, name: str, text: str):
+        self._path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._lock = _locked(path.with_suffix(".lock"), path)
+        try:
+            with self._told():
+                self._db = sqlite3.connect(path, isolation_level=None)
+                self._begin(identity, name, text)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def _begin(self, identity: str, name: str, text: str) -> None:
+        if not self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+            self._db.execute("PRAGMA journal_mode = WAL")  # a persistent setting of the file
+            self._db.executescript(
+                f"BEGIN; {_TABLES} PRAGMA application_id = {_MARK}; PRAGMA user_version = {SCHEMA}; COMMIT;"
+            )
+        mark, version = (
+            self._db.execute(f"PRAGMA {what}").fetchone()[0] for what in ("application_id", "user_version")
+        )
+        if mark != _MARK:
+            raise StudyError(
+                f"{self._path}: a database of something else; expected one of `hvf trials`, or another --out"
+            )
+        if version != SCHEMA:
+            raise StudyError(
+                f"{self._path}: of version {version} of the database, this program writes {SCHEMA}; go on with the "
+                "program that began it, or give another --out"
+            )
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        held = self._db.execute("SELECT identity, name FROM study").fetchone()
+        if held is None:
+            self._db.execute("INSERT INTO study VALUES (?, ?, ?)", (identity, name, text))
+        elif held[0] != identity:
+            raise StudyError(
+                f"{self._path}: holds another study, {held[1]!r}, or this one before it was changed; give another "
+                "--out, or the study as it is in the database (table study, column text)"
+            )
+
+    def add(self, row: Row, what: Mapping[str, object]) -> None:
+        """Store a row; `what` describes the trial for readers of the database.
+
+        Raises
+        ------
+        StudyError
+            If the disk is full.
+        """
+        finite = {name: value if math.isfinite(value) else None for name, value in row.measures.items()}
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        values = (
+            row.key, row.state, row.reason, json.dumps(finite), json.dumps(what), row.seconds, row.worker,
+            row.processor, now,
+        )  # fmt: skip
+        with self._told():
+            self._db.execute("INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
+
+    def rows(self) -> Iterator[Row]:
+        """All rows, in the order of their keys."""
+        columns = "key, state, reason, measures, seconds, worker, processor"
+        with self._told():
+            for key, state, reason, measures, *rest in self._db.execute(f"SELECT {columns} FROM trials ORDER BY key"):
+                read = {name: math.nan if value is None else value for name, value in json.loads(measures).items()}
+                yield Row(key, state, reason, read, *rest)
+
+    def keys(self) -> set[str]:
+        """Keys of all rows."""
+        with self._told():
+            return {key for (key,) in self._db.execute("SELECT key FROM trials")}
+
+    def close(self) -> None:
+        """Close the file and release its lock for other drivers."""
+        self._db.close()
+        os.close(self._lock)
+
+    @contextmanager
+    def _told(self) -> Generator[None]:
+        """Turn SQLite's errors into a `StudyError` of one line."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            said = str(error)
+            todo = "expected a database of `hvf trials`; give another --out"
+            if "full" in said:
+                said, todo = "the disk is full", "every trial so far is kept; make room, and start it again to go on"
+            elif "locked" in said:
+                todo = "another program is writing it; close that, and start it again to go on"
+            raise StudyError(f"{self._path}: {said}; {todo}") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _locked(path: Path, database: Path) -> int:
+    """Acquire a lock file, which the system releases when the process ends in any way; returns its descriptor."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        holder = os.read(handle, 64).decode(errors="replace").strip()
+        os.close(handle)
+        raise StudyError(
+            f"{database}: another hvf is writing it (process {holder or 'unknown'}); wait for it, or give another --out"
+        ) from None
+    os.ftruncate(handle, 0)
+    os.pwrite(handle, str(os.getpid()).encode(), 0)
+    return handle

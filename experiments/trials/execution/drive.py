@@ -1,0 +1,92 @@
+"""The driver of trials: runs the trials that are not in the database yet, and stores every row as it arrives."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Task as BarTask
+from rich.text import Text
+
+from experiments.config.part import to_json
+from experiments.config.run_config import RunConfig
+from experiments.console.compiling import compile_once
+from experiments.trials.design.plan import Trial
+from experiments.trials.execution.database import Database
+from experiments.trials.trial.run_trial import Row, Shelf, Task
+
+
+class Executor(Protocol):
+    """Runs tasks: on threads of this process or on a cluster."""
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        """Yield rows of tasks as they are completed."""
+        ...
+
+
+class _Rate(ProgressColumn):
+    """Column of the progress bar with the trials per minute."""
+
+    def render(self, task: BarTask) -> Text:
+        return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
+
+
+def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
+    """Compile the units that trials need, once for each kind of run, and make their maps."""
+    for config in {_shape(config): config for config in configs}.values():
+        shelf.session(config, lambda units: compile_once(console, units))
+
+
+def _shape(config: RunConfig) -> object:
+    """Key of the settings that determine which compiled units and which map a run needs."""
+    added = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
+    return config.mode.kind, added, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+
+
+def run_missing(
+    trials: Sequence[Trial], database: Database, executor: Executor, recordings: str, console: Console,
+    what: Mapping[str, Mapping[str, object]],
+) -> int:  # fmt: skip
+    """Run all trials that the database lacks; returns how many were run.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        All trials of the study.
+    database : Database
+        Database in which rows are stored.
+    executor : Executor
+        Runs the trials.
+    recordings : str
+        Folder or URL of recordings; empty for none.
+    console : Console
+        Where progress is shown.
+    what : mapping
+        Descriptions of the trials for readers of the database, by key.
+
+    Raises
+    ------
+    StudyError, OSError
+        If the study cannot go on; completed trials are kept.
+    """
+    kept = database.keys()
+    missing = [trial for trial in trials if trial.key not in kept]
+    if not missing:
+        return 0
+    columns = (
+        TextColumn("trials"), BarColumn(), TextColumn("{task.completed} of {task.total}"), _Rate(),
+        TimeRemainingColumn(), TextColumn("{task.fields[failed]}"),
+    )  # fmt: skip
+    failed = 0
+    rows = executor.rows(Task(trial.key, to_json(trial.config), recordings) for trial in missing)
+    before = len(trials) - len(missing)
+    if recordings and before:
+        console.print(f"{before} trials ran before; only those that run now are recorded for certain")
+    with Progress(*columns, console=console, speed_estimate_period=60.0) as progress:
+        bar = progress.add_task("", total=len(trials), completed=before, failed="none failed")
+        progress.advance(bar, 0)  # first sample of time, from which the rate is estimated
+        for row in rows:
+            database.add(row, what[row.key])
+            failed += row.state == "failed"
+            progress.update(bar, advance=1, failed=f"{failed} failed" if failed else "none failed")
+    return len(missing)

@@ -1,0 +1,1 @@
+"""One trial: its run, the channels kept of it, and its measures."""

@@ -1,0 +1,183 @@
+"""Measures of a trial: accuracy, smoothness and effort of the hand, and their effect on the figure.
+
+Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from controllers.state import Array, Mask
+from experiments.config.run_config import PERSONAL, RunConfig
+from experiments.results.measures import SETTLING
+from experiments.results.pose_distance import geodesic_distance, seen_distance
+from experiments.results.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
+from experiments.setups.default_animation import default_poses
+from experiments.setups.session import Session
+from experiments.trials.trial.trial_log import TrialLog
+from sim.body.falls import UP
+from sim.body.residual import SUPPORTS
+
+SEEN_RATE = 25.0  # [Hz] at which animations are compared: about what the eye resolves
+_NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of a trial.
+
+    Attributes
+    ----------
+    name : str
+        Name in tables.
+    unit : str
+        Unit; empty for a dimensionless number.
+    better : {"less", "more"}
+        Which direction is better for the user.
+    says : str
+        Description.
+    figure : {"none", "kinematic", "physical"}
+        The simplest kind of figure for which the measure exists.
+    """
+
+    name: str
+    unit: str
+    better: Literal["less", "more"]
+    says: str
+    figure: Literal["none", "kinematic", "physical"] = "none"
+
+    @property
+    def label(self) -> str:
+        """Name and unit, for display."""
+        return self.name.replace("_", " ") + (f" [{self.unit}]" if self.unit else "")
+
+
+_TRACKING = "RMS distance of the stylus from the curve, while the hand does not mean to leave it"
+_EXCHANGED = "∫ F·v dt of the device's force: what the field put into the hand, less what it took"
+_EXPRESSIVE = (
+    "RMS distance in R³ × SO(3)^18 of the edited animation from the default one, while the hand means to leave the "
+    "curve: what is expressed, not what trembles"
+)
+_SEEN = "the same as it is seen: RMS distance of the 18 segments in space"
+
+MEASURES: dict[str, Measure] = {
+    measure.name: measure
+    for measure in (
+        Measure("tracking_error", "mm", "less", _TRACKING),
+        Measure("completion", "", "more", "share of the curve's own pace that was gone along it, at most 1"),
+        Measure("effort", "N² s", "less", "∫ F² dt of the hand's force on the stylus"),
+        Measure("hand_work", "mJ", "less", "∫ |F·v| dt of the hand: muscles pay for braking, too"),
+        Measure("energy_exchanged", "mJ", "less", _EXCHANGED),
+        Measure("sparc", "", "more", "spectral arc length of the speed, of a lap on average"),
+        Measure("log_jerk", "", "more", "log dimensionless jerk of the speed, of a lap on average"),
+        Measure("expressiveness", "rad", "more", _EXPRESSIVE, "kinematic"),
+        Measure("expressiveness_seen", "cm", "more", _SEEN, "kinematic"),
+        Measure("ballistic_error", "", "less", "RMS residual force in flight over body weight", "physical"),
+        Measure("contact_error", "", "less", "share of stance without the ground's support", "physical"),
+        Measure("fell", "", "less", "whether the figure fell", "physical"),
+        Measure("faults", "", "less", "faults of the device that were latched"),
+        Measure("margin_used", "", "less", "k_r over the critical k_r of the stability certificate, 1 at the boundary"),
+    )
+}  # fmt: skip
+"""All measures by name; `margin_used` belongs to a condition, not a trial, and is added in the analysis."""
+OF_CONDITIONS = ("margin_used",)
+_KINDS = ("none", "kinematic", "physical")
+
+
+def measures_of(figure: str) -> tuple[str, ...]:
+    """Names of the measures that exist for a kind of figure."""
+    return tuple(name for name, measure in MEASURES.items() if _KINDS.index(measure.figure) <= _KINDS.index(figure))
+
+
+def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
+    """All measures of a completed trial, by name; NaN where there is nothing to measure."""
+    ticks, frames = log.ticks, log.frames
+    since = min(SETTLING, 0.5 * float(ticks["t"][-1]))
+    meant = meant_to_leave(config, ticks["t"])
+    ticks, meant = {name: channel[ticks["t"] >= since] for name, channel in ticks.items()}, meant[ticks["t"] >= since]
+    found = dict.fromkeys(measures_of(config.figure.kind), _NAN)
+    found |= _of_hand(ticks, meant, session) | {"faults": float(np.sum(np.diff(ticks["fault"], prepend=0.0) > 0.0))}
+    del found["margin_used"]
+    if frames:
+        stride = max(1, round(1.0 / (SEEN_RATE * session.servo.plant.period * session.servo.figure_ticks)))
+        found |= _of_animation(session, log, stride, since, config)
+    if "joint_error" in frames:
+        found |= _of_figure(frames, session.weight)
+    return found
+
+
+def meant_to_leave(config: RunConfig, t: Array) -> Mask:
+    """Whether the hand intends to leave the curve at times t [s]: throughout for a person's intent, else about pushes.
+
+    A push counts from its start until `SETTLING` after its end.
+    """
+    if config.user.does in PERSONAL:
+        return np.ones(len(t), dtype=bool)
+    spans = [(push.at, push.at + push.seconds + SETTLING) for push in config.user.pushes]
+    return np.any([(at <= t) & (t <= end) for at, end in spans], axis=0) if spans else np.zeros(len(t), dtype=bool)
+
+
+def _of_hand(ticks: Mapping[str, Array], meant: Mask, session: Session) -> dict[str, float]:
+    period, curve = session.servo.plant.period, session.curve
+    user, force, v = ticks["user"], ticks["force"], ticks["v"]
+    steps = np.diff(ticks["phase"])
+    if curve.periodic:
+        steps -= curve.duration * np.round(steps / curve.duration)
+    elapsed = float(ticks["t"][-1] - ticks["t"][0])
+    sparc, jerk = _per_lap(v, 1.0 / period, curve.duration)
+    return {
+        "tracking_error": 1e3 * _rms(ticks["distance"][~meant]),
+        "completion": float(np.clip(np.sum(steps) / elapsed, 0.0, 1.0)) if elapsed > 0.0 else _NAN,
+        "effort": float(np.sum(user**2)) * period,
+        "hand_work": 1e3 * float(np.sum(np.abs(np.sum(user * v, axis=1)))) * period,
+        "energy_exchanged": 1e3 * float(np.sum(force * v)) * period,
+        "sparc": sparc,
+        "log_jerk": jerk,
+    }
+
+
+def _per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
+    """Mean SPARC and log dimensionless jerk over windows of a lap's duration, or of all if it is shorter than a lap."""
+    speed = speed_profile(velocity, rate)
+    size = round(lap * RATE)
+    laps = [speed[k : k + size] for k in range(0, len(speed) - size + 1, size)] or [speed]
+    if len(laps[0]) < 3:
+        return _NAN, _NAN
+    return (
+        float(np.mean([spectral_arc_length(one, RATE) for one in laps])),
+        float(np.mean([log_dimensionless_jerk(one, RATE) for one in laps])),
+    )
+
+
+def _of_animation(session: Session, log: TrialLog, stride: int, since: float, config: RunConfig) -> dict[str, float]:
+    ticks, frames = log.ticks, log.frames
+    rows = slice(None, None, stride * session.servo.figure_ticks)
+    default = default_poses(session, stride)(*(ticks[name][rows] for name in ("nearest", "phase", "river")))
+    t, edited = frames["t"][::stride], frames["reference"][::stride]
+    chosen = (t >= since) & meant_to_leave(config, t)
+    if not np.any(chosen):
+        return {}
+    return {
+        "expressiveness": _rms(geodesic_distance(default[chosen], edited[chosen])),
+        "expressiveness_seen": 1e2 * _rms(seen_distance(default[chosen], edited[chosen], session.world.figure)),
+    }
+
+
+def _of_figure(frames: Mapping[str, Array], weight: float) -> dict[str, float]:
+    """Measures of the physical figure, until its first fall."""
+    fallen = frames["down"] != UP
+    until = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
+    flight = frames["flight"][:until] > 0.0
+    standing = frames["ground"][:until, 2][~flight] > SUPPORTS
+    return {
+        "fell": float(np.any(fallen)),
+        "ballistic_error": _rms(np.linalg.norm(frames["residual"][:until, :3][flight], axis=1)) / weight,
+        "contact_error": 1.0 - float(np.mean(standing)) if len(standing) else _NAN,
+    }
+
+
+def _rms(values: Array) -> float:
+    return math.sqrt(float(np.mean(values**2))) if len(values) else _NAN

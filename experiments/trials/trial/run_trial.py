@@ -1,0 +1,178 @@
+"""Runs a trial, from its configuration to its row; the same on threads, in processes and on a cluster."""
+
+import os
+import platform
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import mujoco
+from llvmlite.binding import get_host_cpu_name
+
+from experiments.config.maps import Composite, Cylindrical
+from experiments.config.part import from_json, to_dict
+from experiments.config.run_config import RunConfig
+from experiments.results.folder import RECORDING
+from experiments.setups.parts import MapParts
+from experiments.setups.session import Session
+from experiments.setups.wiring import Ready, wire
+from experiments.trials.trial.measures import measured_trial
+from experiments.trials.trial.trial_log import TrialLog
+from models.mocap.motion.clip import Clip
+from sim.loop.loop import Loop, groups, record_into
+from sim.recording.recorder import Recorder
+
+State = Literal["done", "failed"]
+
+
+class Task(NamedTuple):
+    """A trial as it is given to a worker.
+
+    Attributes
+    ----------
+    key : str
+        Key of the trial.
+    config : str
+        Configuration of the trial, as JSON.
+    recordings : str
+        Folder or URL for its recording; empty for none.
+    """
+
+    key: str
+    config: str
+    recordings: str = ""
+
+
+class Row(NamedTuple):
+    """The result of a trial, as a worker returns it.
+
+    Attributes
+    ----------
+    key : str
+        Key of the trial.
+    state : {"done", "failed"}
+        Whether the trial was completed.
+    reason : str
+        Why it failed; empty if it did not.
+    measures : dict of str to float
+        See `experiments.trials.trial.measures`.
+    seconds : float
+        Processor time of the trial [s].
+    worker, processor : str
+        Host and process that ran it, and model of the processor.
+    """
+
+    key: str
+    state: State
+    reason: str
+    measures: dict[str, float]
+    seconds: float
+    worker: str
+    processor: str
+
+
+class Shelf:
+    """Cache of haptic maps that several runs share; a cached map is only read.
+
+    Clips, alignment and blends of a map take ten times as long as the rest of a trial's set-up.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[object, MapParts[Any]] = {}
+        self._locks: dict[object, threading.Lock] = {}
+        self._lock = threading.Lock()
+
+    def session(self, config: RunConfig, ready: Ready = lambda units: None) -> Session:
+        """Put a run together on a map from the cache, which is made first if it is missing."""
+        key = _shared(config)
+        with self._lock:
+            lock = self._locks.setdefault(key, threading.Lock())
+        if key not in self._made:
+            with lock:
+                if key not in self._made:
+                    session = wire(config, ready=ready)
+                    # The map was already refined when this session was assembled.
+                    self._made[key] = replace(session.parts.maps, refined=None)
+        return wire(config, ready=ready, maps_of=self._maps_of(key))
+
+    def _maps_of(self, key: object) -> Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]:
+        return lambda config, figure, clips: self._made[key]
+
+
+def _shared(config: RunConfig) -> object:
+    """Key of the settings on which a map depends: for a map about a circle not the mode, else all but seed and hand."""
+    figure = (config.figure.kind == "none", config.figure.stature, config.figure.mass)
+    if isinstance(config.map, Cylindrical | Composite):
+        return config.map, figure
+    return replace(config, seed=1, user=type(config.user)(does=config.user.does)), figure
+
+
+SHELF = Shelf()
+"""The cache of this process."""
+
+
+def perform(task: Task, shelf: Shelf = SHELF) -> Row:
+    """Run a trial and measure it; an error in the trial gives a row with its reason.
+
+    Errors of the machine rather than the trial are raised, so that the trial can be tried again.
+
+    Raises
+    ------
+    OSError, MemoryError
+        If the machine lacks something.
+    """
+    worker, began = f"{platform.node()}:{os.getpid()}", time.thread_time()
+    try:
+        config = from_json(RunConfig, task.config, "a trial's configuration")
+        measures = _run(config, task, shelf)
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        return Row(task.key, "failed", reason, {}, time.thread_time() - began, worker, get_host_cpu_name())
+    return Row(task.key, "done", "", measures, time.thread_time() - began, worker, get_host_cpu_name())
+
+
+def _run(config: RunConfig, task: Task, shelf: Shelf) -> dict[str, float]:
+    session = shelf.session(config)
+    log = TrialLog(session.servo, session.world)
+    if not task.recordings:
+        return _simulated(config, session, log)
+    with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
+        measures = recorded(config, session, log, Path(folder))
+        _keep(Path(folder) / RECORDING, f"{task.recordings.rstrip('/')}/{task.key}.h5")
+    return measures
+
+
+def _simulated(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
+    laws = session.parts.program.python_laws
+    Loop(session.servo, session.world, log, python_laws=laws).run(config.seconds)
+    return measured_trial(config, session, log)
+
+
+def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -> dict[str, float]:
+    """Run a trial, record it into an existing folder, and measure it."""
+    servo, laws = session.servo, session.parts.program.python_laws
+    static = session.static()
+    with Recorder(folder / RECORDING, to_dict(config), config.seed, groups(servo), static) as recorder:
+        record = record_into(recorder, servo, session.world)
+
+        def observe(ticks: Any, frames: Any, n: int) -> None:
+            log(ticks, frames, n)
+            record(ticks, frames, n)
+
+        Loop(servo, session.world, observe, python_laws=laws).run(config.seconds)
+        measures = measured_trial(config, session, log)
+        recorder.close({"lines": [], "measures": measures})
+    return measures
+
+
+def _keep(file: Path, url: str) -> None:
+    import fsspec  # an optional dependency, needed for recordings only
+
+    with fsspec.open(url, "wb") as target:
+        target.write(file.read_bytes())  # pyright: ignore[reportAttributeAccessIssue]

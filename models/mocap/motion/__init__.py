@@ -1,0 +1,1 @@
+"""Motions of the figure: clips, arithmetic of their quaternions, ranges of joints."""

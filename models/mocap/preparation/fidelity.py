@@ -1,0 +1,110 @@
+"""Distance of a prepared clip from the capture that it was made of, moment by moment of the part that was used."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from models.humanoid.skeleton import JOINTS
+from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.preparation.looping import Looped
+from models.mocap.preparation.poses import resampled
+
+GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05  # largest RMS distances [rad], [rad], [m]
+_LISTED = 5  # joints listed
+_TRAVELS = 0.4  # way of a lap beyond which a closed clip is a gait [m]
+
+
+class Extreme(NamedTuple):
+    """Where a joint differs most.
+
+    Attributes
+    ----------
+    joint : str
+        Name of the joint.
+    angle : float
+        Angle between its rotations in clip and capture [rad].
+    when : float
+        Time in the clip [s].
+    """
+
+    joint: str
+    angle: float
+    when: float
+
+
+class Fidelity(NamedTuple):
+    """Distance of a clip from its capture.
+
+    Attributes
+    ----------
+    joints : float
+        RMS over joints and time of the angle between their rotations [rad].
+    root : float
+        RMS distance of the roots [m], both over the floor as the best planar displacement lays them upon each other.
+    extremes : tuple of Extreme
+        The five joints that differ most, the largest first.
+
+    gait : bool
+        Whether the clip is a gait, of which less change is accepted.
+    """
+
+    joints: float
+    root: float
+    extremes: tuple[Extreme, ...]
+    gait: bool
+
+    def faults(self) -> tuple[str, ...]:
+        """Measures that exceed their bounds, a line each."""
+        found: list[str] = []
+        if self.joints > (bound := GAIT if self.gait else OTHERWISE):
+            found.append(
+                f"joints are {np.rad2deg(self.joints):.1f}° RMS from the capture; {np.rad2deg(bound):.0f} at most"
+            )
+        if self.root > ROOT:
+            found.append(f"the root is {100 * self.root:.1f} cm RMS from the capture; {100 * ROOT:.0f} at most")
+        return tuple(found)
+
+    def line(self) -> str:
+        """The measures in words."""
+        far = ", ".join(f"{e.joint} {np.rad2deg(e.angle):.0f}° at {e.when:.2f} s" for e in self.extremes)
+        return (
+            f"from the capture joints are {np.rad2deg(self.joints):.1f}°, the root {100 * self.root:.1f} cm RMS; "
+            f"at most {far}"
+        )
+
+
+def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
+    """Compare a prepared clip with the calibrated capture.
+
+    Frames that the capture does not have (the mirror image of half a stride, the way back of a gesture, the way to and
+    from rest of an open clip) are not compared.
+
+    Parameters
+    ----------
+    clip : Clip
+        The prepared clip.
+    captured : Clip
+        The calibrated capture, before loop, filter and dynamics.
+    part : Looped
+        The part of the paced capture from which the clip was made.
+    pace : float
+        How many times as fast as captured the clip is played.
+    """
+    original = resampled(Clip(captured.poses, captured.fps * pace, captured.name), clip.fps)
+    first, last = round(part.start * clip.fps), round(part.end * clip.fps)
+    begin = max(first, 0)
+    n = min(clip.n_frames - begin + first, original.n_frames - begin, last - begin + 1)
+    ours, theirs = clip.poses[begin - first :][:n], original.poses[begin:][:n]
+    # The rotation about the vertical and the translation that minimise the distance of the roots over the floor.
+    a, b = ours[:, :2] - ours[:, :2].mean(axis=0), theirs[:, :2] - theirs[:, :2].mean(axis=0)
+    turn = np.exp(-1j * np.angle(np.sum((a @ (1, 1j)).conj() * (b @ (1, 1j)))))
+    level = np.abs(b @ (1, 1j) * turn - a @ (1, 1j))
+    height = theirs[:, 2] - ours[:, 2]
+    angles = np.linalg.norm(pose_difference(ours, theirs)[:, 6:].reshape(n, -1, 3), axis=2)
+    instants = (begin - first + angles.argmax(axis=0)) / clip.fps
+    most = np.argsort(-angles.max(axis=0))[:_LISTED]
+    return Fidelity(
+        float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(level**2 + height**2))),
+        tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in most),
+        clip.closes() and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
+    )  # fmt: skip

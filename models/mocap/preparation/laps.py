@@ -1,0 +1,87 @@
+r"""Extraction of one lap (gait cycle) from a captured walk: the part of a clip that repeats itself best.
+
+A capture begins and ends at any phase of the gait, and closing it by a blend over its ends makes the feet skate there.
+The distance of two frames i < j is
+
+.. math:: d_{ij}^2 = \tfrac1{18}\,\bigl(\textstyle\sum_k \angle(q_{ik}, q_{jk})^2 + (z_i - z_j)^2/r^2
+          + \tau^2 \|\omega_i - \omega_j\|^2 + \tau^2 \|v_i - v_j\|^2/r^2\bigr)
+
+with the rotations of root (without its heading) and joints, the root's height, and their velocities relative to the
+heading (Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair of least distance among those between
+which the figure travels and both feet step.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from models.arrays import Array, IntArray
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip
+
+_TIME, _LENGTH = 0.1, 0.5  # τ [s], r [m]
+CLOSES = 1e-3  # largest gap of the ends of a clip that is already a lap [rad], [m]
+_SHORTEST = 0.4  # least duration of a lap [s]
+_TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest change of heading of a lap
+_MOST_FRAMES = 1200  # frames that are compared with each other, at most
+
+
+class Lap(NamedTuple):
+    """A lap, and its place in the clip.
+
+    Attributes
+    ----------
+    clip : Clip
+        The frames of the lap.
+    start, end : float
+        Times in the original clip [s].
+    gap : float
+        d between its ends [rad].
+    """
+
+    clip: Clip
+    start: float
+    end: float
+    gap: float
+
+
+def lap_of(clip: Clip) -> Lap:
+    """The part of a clip that repeats itself best; the clip itself if it closes, or if no part of it is a lap."""
+    whole = Lap(clip, 0.0, clip.duration, 0.0)
+    if clip.closes(CLOSES) or clip.n_frames < 3:
+        return whole
+    every = -(-clip.n_frames // _MOST_FRAMES)
+    frames = np.arange(0, clip.n_frames, every)
+    apart, headings = likeness(clip, frames)
+    travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
+    turn = np.abs(headings[:, None] - headings)
+    later = frames[None, :] - frames[:, None]
+    lap = (later >= _SHORTEST * clip.fps) & (travel >= _TRAVEL) & (turn <= _TURN)
+    planted = contacts(clip).planted
+    for foot in range(planted.shape[1]):
+        stood = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]
+        between = stood[None, :] - stood[:, None]
+        lap &= (between > 0) & (between < later)
+    if not lap.any():
+        return whole
+    i, j = np.unravel_index(int(np.argmin(np.where(lap, apart, np.inf))), lap.shape)
+    first, last = int(frames[i]), int(frames[j])
+    part = Clip(clip.poses[first : last + 1], clip.fps, clip.name)
+    return Lap(part, first / clip.fps, last / clip.fps, float(apart[i, j]))
+
+
+def likeness(clip: Clip, frames: IntArray) -> tuple[Array, Array]:
+    """Distances d between frames [rad], shape (n, n), and unwrapped headings [rad], shape (n,)."""
+    poses, velocities = clip.poses[frames], clip.velocities()[frames]
+    heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])
+    back = quaternions.about_axis(2, -heading)
+    turns = poses[:, 3:].reshape(len(poses), -1, 4).copy()
+    turns[:, 0] = quaternions.product(back, turns[:, 0])
+    turns = quaternions.sign_continuous(turns).reshape(len(poses), -1)
+    # The angle between nearby rotations is twice the distance of their quaternions.
+    parts = [2.0 * turns, poses[:, 2:3] / _LENGTH, _TIME * velocities[:, 3:]]
+    features = np.concatenate([*parts, _TIME / _LENGTH * quaternions.rotated(back, velocities[:, :3])], axis=1)
+    squares = (features**2).sum(axis=1)
+    distance = np.maximum(squares[:, None] + squares - 2.0 * features @ features.T, 0.0)
+    return np.sqrt(distance / turns.shape[1] * 4.0), np.unwrap(heading)

@@ -1,0 +1,164 @@
+"""Repair of frames that a capture has lost: where a joint jumps away and, within a tenth of a second, jumps back."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from models.arrays import Array
+from models.mocap.motion import quaternions
+from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.skeleton_roles import Roles, ancestry
+
+_LONGEST = 0.1  # longest gap that is interpolated [s]
+# Least ratio of a gap's jumps to the 95th percentile of the joint's steps, and of a single frame's distance from the
+# middle of its neighbours to the 95th percentile of such distances. Of the captures in ../shared/mocap and the embedded
+# clips, at their own rates and down to 15 Hz, joints that turn out and back by `_TURN` have at most 4.9; but for a hand
+# of CMU 16_09, whose markers flip for a frame.
+_TIMES = 5.5
+_TURN = np.deg2rad(15.0)  # least jump of a joint [rad]
+_WAY = 0.25  # least jump of the root [thigh lengths]
+_BACK = 0.3  # largest step across a gap, as a share of the lesser jump
+_JOINTS = 0.25  # least share of the joints that jump at once where the whole pose does
+_FEWEST = 10  # least number of frames that define usual steps
+_BESIDE = 3  # frames on either side of a gap through which it is interpolated
+
+
+class Repaired(NamedTuple):
+    """A motion without its short gaps.
+
+    Attributes
+    ----------
+    motion : SourceMotion
+        Broken frames are interpolated.
+    frames : tuple of int
+        Those frames.
+    jumps : tuple of int
+        Frames after which the whole pose jumps nevertheless: a calibration pose in front, or a longer gap.
+    """
+
+    motion: SourceMotion
+    frames: tuple[int, ...]
+    jumps: tuple[int, ...]
+
+
+def repaired(motion: SourceMotion, roles: Roles) -> Repaired:
+    """Interpolate short gaps whose neighbours agree with each other but not with the frames between.
+
+    Both jumps of a gap are large beside the usual steps of a joint, and the step across it is a small part of them: no
+    joint turns so far in a frame and back within `_LONGEST`. Joints that no segment of the figure follows do not count.
+    """
+    broken = np.zeros(motion.n_frames, dtype=bool)
+    if motion.n_frames < _FEWEST:
+        return Repaired(motion, (), ())
+    used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
+    pelvis = ancestry(roles.segments["pelvis"], motion.parents)
+    thigh = float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
+    longest = max(1, int(_LONGEST * motion.fps))
+    lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
+    edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _TURN))
+    for before, last in pairwise(edges):
+        # Programs write zeros for a frame without data.
+        broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
+    motion = _interpolated(motion, broken)
+    # Shorter gaps first: between two of them, the frames that are right would look like a gap.
+    tracks: tuple[_Track, ...] = ()
+    for length in range(1, longest + 1):
+        if not tracks:
+            root = motion.translations[:, pelvis].sum(axis=1, keepdims=True)
+            tracks = (_Track(motion.rotations[:, used], _TURN, _angles, _turned_off),
+                      _Track(root, _WAY * thigh, _ways, _moved_off))  # fmt: skip
+        found = np.concatenate([track.gaps(length) for track in tracks])
+        for k in found:
+            broken[k + 1 : k + 1 + length] = True
+        if len(found):
+            motion, tracks = _interpolated(motion, broken), ()
+    steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
+    left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
+    lost = motion.at_rest(used)
+    left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
+    return Repaired(motion, _indices(broken), _indices(left))
+
+
+class _Track:
+    """Values of shape (n, joints, …) with their distances from frame to frame.
+
+    Parameters
+    ----------
+    values : array
+        Rotations or positions.
+    least : float
+        Least jump.
+    apart, off : callable
+        Distance of two values, and of a value from the middle of those before and after it.
+    """
+
+    def __init__(
+        self, values: Array, least: float, apart: Callable[[Array, Array], Array], off: Callable[[Array], Array]
+    ) -> None:
+        self.values, self.least, self.apart, self.off = values, least, apart, off
+        self.steps = apart(values[:-1], values[1:])
+        self.limits = _limits(self.steps, 2)
+
+    def gaps(self, length: int) -> npt.NDArray[np.intp]:
+        """Frames before the gaps of a length."""
+        values = self.values
+        lesser = np.minimum(self.steps[:-length], self.steps[length:])
+        odd = lesser > self.limits
+        if length == 1:
+            off = self.off(values)
+            odd |= off > _limits(off, 3)
+        odd &= lesser > self.least
+        first = np.flatnonzero(odd.any(axis=1))
+        across = self.apart(values[first], values[first + length + 1])
+        return first[(odd[first] & (across < _BACK * lesser[first])).any(axis=1)]
+
+
+def _limits(measures: Array, own: int) -> Array:
+    """What a joint's measures exceed in a gap only; the `own` largest, which a gap itself causes, are not counted."""
+    return _TIMES * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
+
+
+def _indices(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(k) for k in np.flatnonzero(chosen))
+
+
+def _dots(ours: Array, theirs: Array) -> Array:
+    return np.einsum("...i,...i", ours, theirs)
+
+
+def _angles(ours: Array, theirs: Array) -> Array:
+    return 2.0 * np.arccos(np.minimum(np.abs(_dots(ours, theirs)), 1.0))
+
+
+def _turned_off(q: Array) -> Array:
+    before, after = q[:-2], q[2:]
+    middle = before + np.copysign(1.0, _dots(before, after))[..., None] * after
+    return _angles(q[1:-1], middle / np.linalg.norm(middle, axis=-1, keepdims=True))
+
+
+def _ways(ours: Array, theirs: Array) -> Array:
+    return np.linalg.norm(theirs - ours, axis=-1)
+
+
+def _moved_off(p: Array) -> Array:
+    return _ways(p[1:-1], (p[:-2] + p[2:]) / 2.0)
+
+
+def _interpolated(motion: SourceMotion, broken: npt.NDArray[np.bool_]) -> SourceMotion:
+    """The motion with its broken frames on cubic splines through the frames beside them."""
+    if not broken.any():
+        return motion
+    rotations, translations = motion.rotations.copy(), motion.translations.copy()
+    good = np.flatnonzero(~broken)
+    for frames in np.split(np.flatnonzero(broken), np.flatnonzero(np.diff(np.flatnonzero(broken)) > 1) + 1):
+        at = np.searchsorted(good, frames[0])
+        beside = good[max(0, at - _BESIDE) : at + _BESIDE]
+        between = CubicSpline(beside, quaternions.sign_continuous(motion.rotations[beside]))(frames)
+        rotations[frames] = between / np.linalg.norm(between, axis=-1, keepdims=True)
+        translations[frames] = CubicSpline(beside, motion.translations[beside])(frames)
+    return replace(motion, rotations=rotations, translations=translations)

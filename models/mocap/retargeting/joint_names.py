@@ -1,0 +1,108 @@
+"""Side and body words of a joint's name, whatever a program writes around them.
+
+``Skeleton_001_LeftUpLeg``, ``l_upleg_JNT``, ``leftupleg`` and ``RL_L_UpLeg`` all become (left, upleg). Leading words
+that half of a skeleton's joints share are its own name; numbers are those of a chain, or of an export.
+"""
+
+import re
+import unicodedata
+from collections import Counter
+from typing import NamedTuple
+
+_SIDES = {"left": "left", "l": "left", "lt": "left", "lf": "left",
+          "right": "right", "r": "right", "rt": "right", "rf": "right"}  # fmt: skip
+_CENTRE = frozenset(("c", "m", "x", "mid", "middle", "center", "centre"))
+_NOISE = frozenset((
+    "jnt", "joint", "jt", "j", "bind", "def", "deform", "org", "bn", "bone", "b", "skin", "bend", "stretch", "bip",
+    "biped", "mixamorig", "character", "cc", "armature", "rig",
+))  # fmt: skip
+_HELPERS = frozenset((
+    "twist", "roll", "helper", "corrective", "muscle", "mesh", "nub", "end", "ik", "pole", "ctrl", "target", "site",
+    "marker", "tip", "part",
+))  # fmt: skip
+_SHARE = 0.5  # least share of the joints that begin with a word that is the skeleton's own
+# MikuMikuDance; longer words first.
+_JAPANESE = {
+    "左": "left", "右": "right", "上半身": "spine", "下半身": "pelvis", "センター": "center", "足首": "ankle",
+    "手首": "wrist", "つま先": "toe", "ひざ": "knee", "ひじ": "elbow", "足": "leg", "腕": "arm", "肩": "shoulder",
+    "首": "neck", "頭": "head",
+}  # fmt: skip
+_PIECES = re.compile(r"[\W_]+")
+# Numbers stay with a single letter (the vertebrae L3 and T8 of Xsens): no side is written L3.
+_WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|[^\W\da-zA-Z_]+")
+_VERTEBRA = re.compile(r"[A-Z]\d+")
+
+
+class JointName(NamedTuple):
+    """What a joint's name says.
+
+    Attributes
+    ----------
+    side : str
+        ``left``, ``right``, or empty.
+    bare : str
+        The other words in lower case, in one: ``upperarm``.
+    noisy : bool
+        Whether words such as *joint* or *stretch* are left out of `bare`: a name without them is the more likely one.
+    helper : bool
+        Whether it is a twist, a tip, or another joint that is no part of the body.
+    """
+
+    side: str
+    bare: str
+    noisy: bool
+    helper: bool
+
+
+def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozenset[str]) -> tuple[JointName, ...]:
+    """Side and words of every joint's name.
+
+    Parameters
+    ----------
+    joints : tuple of str
+        Names as the file gives them.
+    sided, central : frozenset of str
+        Words of the body that have a side, and that have none.
+    """
+    split = [_words(joint) for joint in joints]
+    while True:
+        leading = Counter(words[0] for words in split if len(words) > 1)
+        word, n = leading.most_common(1)[0] if leading else ("", 0)
+        of_body = len(word) > 1 and any(alias.startswith(word) for alias in sided | central)
+        if n < _SHARE * len(joints) or of_body or word in _SIDES:
+            break
+        split = [words[1:] if len(words) > 1 and words[0] == word else words for words in split]
+    return tuple(_read(words, sided) for words in split)
+
+
+def _words(name: str) -> list[str]:
+    """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
+    name = unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
+    for text, word in _JAPANESE.items():
+        name = name.replace(text, f" {word} ")
+    words: list[str] = []
+    for piece in _PIECES.split(name):
+        if _VERTEBRA.fullmatch(piece):
+            words.append(piece.lower())
+            continue
+        found = [word for word in _WORDS.findall(piece) if not word.isdecimal()]
+        # LFArm is the left forearm (OptiTrack), LF_Arm the left arm.
+        if len(found) > 1 and found[0] in ("LF", "RF"):
+            found = ["".join(found)]
+        words.extend(word.lower() for word in found)
+    return words
+
+
+def _read(words: list[str], sided: frozenset[str]) -> JointName:
+    side = next((_SIDES[word] for word in words if word in _SIDES), "")
+    kept = [word for word in words if word not in _SIDES]
+    if not side and not _CENTRE.issuperset(kept):
+        kept = [word for word in kept if word not in _CENTRE]
+    bare = "".join(word for word in kept if word not in _NOISE)
+    noisy, helper = not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
+    if not side:
+        for mark in _SIDES:
+            rest = bare.removeprefix(mark)
+            if rest != bare and rest in sided and bare not in sided:
+                return JointName(_SIDES[mark], rest, noisy, helper)
+    return JointName(side, bare, noisy, helper)

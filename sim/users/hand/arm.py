@@ -1,0 +1,228 @@
+"""The simulated hand: the impedance of an arm on the stylus, from position and velocity alone, never the field."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from controllers.easing import smooth_step
+from controllers.state import Array
+from sim.errors import SimError
+from sim.users.hand.actions import Grab, Push, Turn, grab_table, push_table, turn_table
+
+
+@njit
+def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) -> None:
+    """Add the pushes active at time t to a force.
+
+    Parameters
+    ----------
+    pushes : Array
+        Rows of `sim.users.hand.actions.push_table`, shape (n, 11).
+    begun : Array
+        When each push began [s], NaN if it has not; shape (n,), updated.
+    t : float
+        Time [s].
+    p : Array
+        Hand position in H [m], shape (3,).
+    force : Array
+        Added to [N], in H, shape (3,).
+    """
+    for i in range(pushes.shape[0]):
+        start, duration, peak = pushes[i, 0], pushes[i, 1], pushes[i, 2]
+        if math.isnan(begun[i]):
+            radius = pushes[i, 10]
+            away = math.sqrt((p[0] - pushes[i, 7]) ** 2 + (p[1] - pushes[i, 8]) ** 2 + (p[2] - pushes[i, 9]) ** 2)
+            if t < start or (radius > 0.0 and away > radius):
+                continue
+            begun[i] = t if radius > 0.0 else start
+        phase = (t - begun[i]) / duration
+        if phase > 1.0:
+            continue
+        bump = peak * math.sin(math.pi * phase) ** 2
+        if pushes[i, 6] == 0.0:
+            for k in range(3):
+                force[k] += bump * pushes[i, 3 + k]
+        else:
+            reach = math.sqrt(p[0] ** 2 + p[1] ** 2)
+            if reach > 1e-9:
+                force[0] += bump * p[0] / reach
+                force[1] += bump * p[1] / reach
+
+
+@njit
+def arm_force(
+    stiffness: float, damping: float, samples: Array, period: float, t: float, p: Array, v: Array, force: Array
+) -> None:
+    """Set the force of an arm that tracks its own intended path: F = k (p_d − p) + b (ṗ_d − v).
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N/m], b [N s/m].
+    samples : Array
+        The intended path in H, sampled every `period`, shape (n, 3); n = 0: no grip, no force. The path ends at rest in
+        its last sample.
+    period : float
+        Sampling period [s].
+    t, p, v, force
+        Time [s], hand position [m], velocity [m/s] and result [N], in H.
+    """
+    force[:] = 0.0
+    n = samples.shape[0]
+    if n == 0:
+        return
+    place = t / period
+    i = min(int(place), n - 1)
+    j = min(i + 1, n - 1)
+    s = place - i if j > i else 0.0
+    for k in range(3):
+        wanted = samples[i, k] + s * (samples[j, k] - samples[i, k])
+        speed = (samples[j, k] - samples[i, k]) / period
+        force[k] = stiffness * (wanted - p[k]) + damping * (speed - v[k])
+
+
+@njit
+def _least_jerk(s: float) -> tuple[float, float]:
+    """Minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
+    s = min(max(s, 0.0), 1.0)
+    return smooth_step(s), 30.0 * s * s * (1.0 - s) * (1.0 - s)
+
+
+@njit
+def grab_force(
+    stiffness: float, damping: float, grabs: Array, held: Array, t: float, p: Array, v: Array, force: Array
+) -> float:
+    """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N/m], b [N s/m].
+    grabs : Array
+        Rows of `sim.users.hand.actions.grab_table`, shape (n, 11).
+    held : Array
+        Position of the hand when each grab began [m], NaN if it has not; shape (n, 3), updated.
+    t, p, v, force
+        Time [s], hand position [m], velocity [m/s], and the force that is added to [N], in H.
+
+    Returns
+    -------
+    float
+        1 while the switch is pressed, else 0.
+    """
+    for i in range(grabs.shape[0]):
+        pressed_at = grabs[i, 0] + grabs[i, 1]
+        if not grabs[i, 0] <= t < pressed_at + grabs[i, 8] + grabs[i, 9]:
+            continue
+        if math.isnan(held[i, 0]):
+            held[i] = p
+        reached, reaching = (1.0, 0.0) if grabs[i, 1] == 0.0 else _least_jerk((t - grabs[i, 0]) / grabs[i, 1])
+        share = (t - pressed_at) / grabs[i, 8]
+        carried, carrying = _least_jerk(share)
+        if grabs[i, 10] != 0.0:
+            carried, carrying = min(max(share, 0.0), 1.0), 1.0 if 0.0 <= share < 1.0 else 0.0
+        for k in range(3):
+            way = 0.0 if math.isnan(grabs[i, 2]) else grabs[i, 2 + k] - held[i, k]
+            wanted = held[i, k] + reached * way + carried * grabs[i, 5 + k]
+            speed = carrying * grabs[i, 5 + k] / grabs[i, 8]
+            if reaching > 0.0:
+                speed += reaching * way / grabs[i, 1]
+            force[k] += stiffness * (wanted - p[k]) + damping * (speed - v[k])
+        return 1.0 if t >= pressed_at else 0.0
+    return 0.0
+
+
+class CompiledArm(NamedTuple):
+    """An `Arm` as plain numbers and arrays.
+
+    Its state is `begun`, when each push began; `held`, where the hand was when each grab began; and `switch` (1,).
+    """
+
+    stiffness: float
+    damping: float
+    path: Array
+    period: float
+    pushes: Array
+    begun: Array
+    grabs: Array
+    held: Array
+    switch: Array
+    turn_stiffness: float
+    turn_damping: float
+    turns: Array
+
+
+@njit
+def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
+    """Set the force of the hand on the stylus, in H: arm impedance plus pushes and grabs; and the switch."""
+    if arm.path.shape[0] + arm.pushes.shape[0] + arm.grabs.shape[0] == 0:
+        force[0], force[1], force[2] = 0.0, 0.0, 0.0
+    else:
+        arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
+        push_force(arm.pushes, arm.begun, t, p, force)
+        arm.switch[0] = grab_force(arm.stiffness, arm.damping, arm.grabs, arm.held, t, p, v, force)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A simple user: an arm that is relaxed or tracks a path of its own, with pushes, grabs and turns of the stylus.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        Impedance of the arm about its intended path or that of a grab [N/m], [N s/m]; unused without either.
+    path : Array
+        Intended positions in H [m], shape (n, 3), `period` apart; empty for a relaxed hand.
+    period : float
+        Sampling period of the path [s].
+    pushes : sequence of Push
+        Additional forces of the hand.
+    grabs : sequence of Grab
+        When and where the hand takes hold, one after the other; only for an arm without a path.
+    turns : sequence of Turn
+        Rotations of the stylus. If there are any, the hand holds the stylus upright in between; if there are none, the
+        gimbal swings freely.
+    turn_stiffness, turn_damping : float
+        Impedance of the fingers about the intended orientation [N m/rad], [N m s/rad]; unused without turns. The
+        defaults damp the stylus about critically.
+
+    Raises
+    ------
+    SimError
+        If an impedance is negative or not finite, the path is not an (n, 3) array of finite numbers or its period not
+        positive, there are both a path and grabs, or grabs overlap.
+    """
+
+    stiffness: float = 300.0
+    damping: float = 5.0
+    path: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    period: float = 1e-3
+    pushes: Sequence[Push] = ()
+    grabs: Sequence[Grab] = ()
+    turns: Sequence[Turn] = ()
+    turn_stiffness: float = 0.1
+    turn_damping: float = 2.5e-3
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping", "turn_stiffness", "turn_damping"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SimError(f"the arm's {name} is {value}; it must be finite and not negative")
+        if not (math.isfinite(self.period) and self.period > 0.0):
+            raise SimError(f"the period of the arm's path is {self.period} s; it must be positive")
+        if self.path.ndim != 2 or self.path.shape[1] != 3 or not np.all(np.isfinite(self.path)):
+            raise SimError(f"the arm's path has shape {self.path.shape}; expected (n, 3), all finite")
+        if len(self.path) > 0 and len(self.grabs) > 0:
+            raise SimError(f"an arm that traces a path cannot grab as well; got {len(self.grabs)} grabs")
+        grab_table(self.grabs)
+
+    def compiled(self) -> CompiledArm:
+        """The arm as arrays for the servo loop."""
+        return CompiledArm(self.stiffness, self.damping, np.ascontiguousarray(self.path), self.period,
+                           push_table(self.pushes), np.full(len(self.pushes), np.nan),
+                           grab_table(self.grabs), np.full((len(self.grabs), 3), np.nan), np.zeros(1),
+                           self.turn_stiffness, self.turn_damping, turn_table(self.turns))  # fmt: skip

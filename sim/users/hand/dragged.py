@@ -1,0 +1,58 @@
+r"""A hand dragged interactively: an arm whose intended point is set anew for every block of ticks.
+
+.. math:: F = k\,(p_d - p) + b\,(\dot p_d - v), \qquad p_d(t) = a + (b - a)\,(t - t_0)/T
+
+It is the arm of `sim.users.hand.arm` with other numbers: in a block the intended point moves from a to b at constant
+speed, as a path of two samples or, with the switch pressed, as a steady grab. So nothing new is compiled, and the force
+law is the same as for every simulated hand.
+"""
+
+import numpy as np
+
+from controllers.state import Array
+from sim.users.hand.actions import GRAB_COLUMNS
+from sim.users.hand.arm import CompiledArm
+
+_SPAN = 1e6  # [s] between the two samples of a path, longer than any run
+_FOR_EVER = 1e9  # [s] hold time of a grab
+_TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
+_TREMBLES = 1e-4  # [m] amplitude of the tremor
+
+
+def relaxed(arm: CompiledArm) -> CompiledArm:
+    """The arm of a hand that has let go of the stylus, and of its switch."""
+    arm.switch[0] = 0.0
+    return arm._replace(path=np.zeros((0, 3)), grabs=np.zeros((0, GRAB_COLUMNS)), held=np.zeros((0, 3)))
+
+
+def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array, pressed: bool) -> CompiledArm:
+    """The arm of a hand that drags the stylus from one point to another within a block.
+
+    Parameters
+    ----------
+    arm : CompiledArm
+        Gives the impedance.
+    t, seconds : float
+        Start and duration of the block [s].
+    start, end : Array
+        a and b in H [m], shape (3,).
+    pressed : bool
+        Whether the switch is pressed.
+    """
+    carry = np.asarray(end, dtype=np.float64) - start
+    if pressed:
+        # A grab at a place that is reached at once, [at, reach, place, carry, seconds, hold, steady].
+        row = np.array([[t, 0.0, *start, *carry, seconds, _FOR_EVER, 1.0]])
+        return arm._replace(path=np.zeros((0, 3)), grabs=row, held=np.full((1, 3), np.nan))
+    speed = carry / seconds
+    first = start - speed * t
+    return relaxed(arm)._replace(path=np.array([first, first + _SPAN * speed]), period=_SPAN)
+
+
+def tremor(t: float) -> Array:
+    """Physiological tremor of an outstretched hand at a time [s], in H [m], shape (3,): 8 to 12 Hz, a tenth of a mm.
+
+    A real hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54), so the plausibility check of a device
+    takes constant readings for a fault.
+    """
+    return np.array([_TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])

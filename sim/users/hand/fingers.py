@@ -1,0 +1,59 @@
+"""The simulated fingers: the moment that turns the stylus; its tip is moved by the arm (see `sim.users.hand.arm`)."""
+
+import math
+
+from numba import njit
+
+from controllers.rotations import angular_velocity, exponential, logarithm, multiply
+from controllers.state import Array
+from controllers.work_array import work_array
+
+
+@njit
+def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
+    """Set the rotation vector r [rad] of the intended orientation at time t, and ṙ [rad/s], shape (3,) each.
+
+    Parameters
+    ----------
+    turns : Array
+        Rows of `sim.users.hand.actions.turn_table`, shape (n, 5).
+    t, turn, rate
+        Time [s] and results, in H.
+    """
+    turn[:], rate[:] = 0.0, 0.0
+    for i in range(turns.shape[0]):
+        phase = math.pi * (t - turns[i, 0]) / turns[i, 1]
+        if 0.0 < phase < math.pi:
+            share, change = math.sin(phase) ** 2, math.pi / turns[i, 1] * math.sin(2.0 * phase)
+            for k in range(3):
+                turn[k] += share * turns[i, 2 + k]
+                rate[k] += change * turns[i, 2 + k]
+
+
+@njit
+def turning_moment(
+    stiffness: float, damping: float, turns: Array, t: float, q: Array, w: Array, moment: Array
+) -> None:  # fmt: skip
+    r"""Set the moment of fingers that hold the stylus at the intended orientation R_d: k log(R_d Rᵀ) + b (ω_d − ω).
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N m/rad], b [N m s/rad].
+    turns : Array
+        Rows of `sim.users.hand.actions.turn_table`, shape (n, 5).
+    t : float
+        Time [s].
+    q, w : Array
+        R_H (unit quaternion wxyz) and ω_H [rad/s] of the stylus, shapes (4,), (3,).
+    moment : Array
+        Set [N m], in H, shape (3,).
+    """
+    r, rate = work_array(3), work_array(3)
+    wanted_turn(turns, t, r, rate)
+    a, b, c, d = exponential(r[0], r[1], r[2])
+    error = logarithm(*multiply(a, b, c, d, q[0], -q[1], -q[2], -q[3]))
+    # With −r and ṙ this is ω_d in the frame H, not in the frame of the stylus.
+    speed = angular_velocity(-r[0], -r[1], -r[2], rate[0], rate[1], rate[2])
+    for k in range(3):
+        moment[k] = stiffness * error[k] + damping * (speed[k] - w[k])

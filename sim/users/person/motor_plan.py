@@ -1,0 +1,129 @@
+"""Motor planning of a person: when a submovement begins, its goal and duration, and the scatter of its endpoint."""
+
+import math
+
+from numba import njit
+
+from controllers.state import Array
+from controllers.work_array import work_array
+from sim.users.person.chance import normal
+from sim.users.person.person_state import (
+    BEGUN,
+    BELIEF,
+    CALM,
+    CAUTION,
+    CORRECTION,
+    DECIDED,
+    DRIVEN_A,
+    DRIVEN_P,
+    DRIVEN_V,
+    INTENDED,
+    LASTS,
+    MOTOR_NOISE,
+    PERIOD,
+    REFRACTORY,
+    SEEN_TICKS,
+    TARGET,
+    TICKS,
+    PersonState,
+)
+from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
+from sim.users.person.wishes import PLACE
+
+ACROSS = 0.85  # endpoint scatter across the direction over that along it (below 1: Gordon et al. 1994 I; the value: m)
+LEAST_SECONDS = 0.16  # [s] duration of the shortest submovement
+WATCHED = 0.8  # share of a submovement's time, 94 % of its way, after which its endpoint can be seen
+SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan [m] that is corrected, and after what time [s]
+
+
+@njit
+def may_decide(person: PersonState, waits: bool) -> bool:
+    """Whether a new submovement may begin: in the second half of the last one, or earlier after a deviation from it.
+
+    A person who aims at a target `waits` until she has seen where the last submovement ends.
+    """
+    n, m, V = person.numbers, person.memory, person.vectors
+    now = m[TICKS] * n[PERIOD]
+    if now - m[DECIDED] < n[REFRACTORY]:
+        return False
+    elapsed = now - m[BEGUN]
+    if waits:
+        return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], WATCHED * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
+    if m[LASTS] == 0.0 or elapsed >= m[LASTS]:
+        return True
+    believed = work_array((3, 3))
+    submovement(person.plans[1], m[LASTS], elapsed, believed)
+    off = 0.0
+    for k in range(3):
+        off += (V[BELIEF, k] - believed[0, k]) ** 2
+    if off < SURPRISE * SURPRISE:
+        m[CALM] = now
+    return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION
+
+
+@njit
+def aim(person: PersonState, goal: Array, width: float) -> bool:
+    """Begin a submovement to a target; returns True, and begins none, if the target is already reached.
+
+    A target is a strip across the line from the previous target, as in Fitts 1954; the first one is a ball.
+    """
+    n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[TARGET])
+    away, along, apart = 0.0, 0.0, 0.0
+    for k in range(3):
+        away += (goal[0, k] - V[BELIEF, k]) ** 2
+        if 0 < turn < rows.shape[0]:
+            way = rows[turn, PLACE + k] - rows[turn - 1, PLACE + k]
+            along += way * (goal[0, k] - V[BELIEF, k])
+            apart += way * way
+    away = math.sqrt(away) if apart == 0.0 else abs(along) / math.sqrt(apart)
+    if away < 0.5 * width:
+        return True
+    overhead = n[PERIOD] * n[SEEN_TICKS]
+    seconds = aimed_seconds(2.0 * away / width, n[CAUTION] * n[MOTOR_NOISE], overhead, LEAST_SECONDS)
+    submove(person, goal, seconds)
+    return False
+
+
+@njit
+def submove(person: PersonState, goal: Array, seconds: float) -> None:
+    r"""Begin a submovement from the believed place of the hand to a goal.
+
+    Its endpoint scatters with σ = K A/D along its direction and less across (`ACROSS`), A its length and D its duration
+    (Schmidt et al. 1979; ellipses of endpoints: Gordon et al. 1994), because the noise of a motor command grows with
+    the command (Harris & Wolpert 1998).
+    """
+    n, m, V = person.numbers, person.memory, person.vectors
+    start, end, way, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
+    end[:] = goal
+    for k in range(3):
+        way[k] = goal[0, k] - V[BELIEF, k]
+        length += way[k] * way[k]
+    length = math.sqrt(length)
+    start[0], start[1], start[2] = V[BELIEF], V[DRIVEN_V], V[DRIVEN_A]
+    set_submovement(person.plans[1], start, goal, seconds)
+    scatter = n[MOTOR_NOISE] * length / seconds
+    across = ACROSS * scatter
+    along = math.sqrt(scatter * scatter - across * across) * normal(person.chance)
+    for k in range(3):
+        unit = way[k] / length if length > 0.0 else 0.0
+        miss = along * unit + across * normal(person.chance)
+        end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + miss
+    start[0] = V[DRIVEN_P]
+    set_submovement(person.plans[0], start, end, seconds)
+    m[LASTS], m[BEGUN] = seconds, m[TICKS] * n[PERIOD]
+    m[DECIDED] = m[BEGUN]
+
+
+@njit
+def drive(person: PersonState) -> None:
+    """Follow the submovement in progress, and accumulate the intended displacement."""
+    n, m, V = person.numbers, person.memory, person.vectors
+    if m[LASTS] == 0.0:
+        return
+    state = work_array((3, 3))
+    elapsed = m[TICKS] * n[PERIOD] - m[BEGUN]
+    submovement(person.plans[1], m[LASTS], elapsed, state)
+    for k in range(3):
+        V[INTENDED, k] += n[PERIOD] * state[1, k]
+    submovement(person.plans[0], m[LASTS], elapsed, state)
+    V[DRIVEN_P], V[DRIVEN_V], V[DRIVEN_A] = state[0], state[1], state[2]

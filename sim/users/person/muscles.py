@@ -1,0 +1,84 @@
+r"""Muscles, arm and fingers of a person in one physics step; see `sim.users.person.body` for the arm.
+
+Fatigue follows a three-compartment model of muscle (Frey-Law, Looft & Heitsman 2012, J. Biomech. 45: 1803-1808): the
+capacity C, as a share of her strength, falls by F times the exerted force f, and recovers at the rate R:
+
+.. math:: \dot C = R (1 - C) - F f, \qquad f \le C
+"""
+
+import math
+
+from numba import njit
+
+from controllers.state import Array
+from controllers.work_array import work_array
+from sim.users.person.person_state import (
+    CAPACITY,
+    DRIVEN_A,
+    DRIVEN_P,
+    DRIVEN_V,
+    ENGAGED_SHARE,
+    FATIGUE,
+    GRIP_DAMPING,
+    GRIP_STIFFNESS,
+    HAND_P,
+    HAND_V,
+    REFLEX,
+    REFLEX_GAIN,
+    SKILL,
+    STIFFER,
+    STRENGTH,
+    TREMOR,
+    UNSTEADY,
+    WANTED_FORCE,
+    PersonState,
+)
+
+SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
+RECOVERY = 0.04  # R [1/min] of fatigued muscle, for grip (Frey-Law et al. 2012, m)
+RESTED, RESTING = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m); share of strength below which it is rest
+
+
+@njit
+def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> None:
+    """Advance the hand by a physics step dt [s] (semi-implicit Euler), and set its force on the stylus [N].
+
+    `p` and `v` are position and velocity of the stylus in H, shape (3,); see `sim.users.person.body`.
+    """
+    n, m, V = person.numbers, person.memory, person.vectors
+    engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
+    spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
+    damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
+    muscle, size, held = work_array(3), 0.0, 0.0
+    for k in range(3):
+        pull = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
+        for j in range(3):
+            pull += spring * person.stiffness[k, j] * (V[DRIVEN_P, j] - V[HAND_P, j])
+            pull += damper * person.damping[k, j] * (V[DRIVEN_V, j] - V[HAND_V, j])
+            pull += person.inertia[k, j] * (n[SKILL] * V[DRIVEN_A, j] + V[TREMOR, j])
+        muscle[k] = pull
+        size += pull * pull
+    size = math.sqrt(size)
+    for k in range(3):
+        muscle[k] += size * V[UNSTEADY, k]
+    most = n[STRENGTH] * m[CAPACITY]
+    scale = min(1.0, most / max(size, 1e-12))
+    for k in range(3):
+        muscle[k] *= scale
+        force[k] = stiffer * (n[GRIP_STIFFNESS] * (V[HAND_P, k] - p[k]) + n[GRIP_DAMPING] * (V[HAND_V, k] - v[k]))
+        held += force[k] * force[k]
+    held = math.sqrt(held)
+    if held > n[STRENGTH]:  # the stylus slips between the fingers
+        for k in range(3):
+            force[k] *= n[STRENGTH] / held
+    for k in range(3):
+        acceleration = 0.0
+        for j in range(3):
+            acceleration += person.mobility[k, j] * (muscle[j] - force[j])
+        V[HAND_V, k] += dt * acceleration
+    for k in range(3):
+        V[HAND_P, k] += dt * V[HAND_V, k]
+    if n[FATIGUE] > 0.0:
+        load = min(size, most) / n[STRENGTH]
+        recovery = RECOVERY * (RESTED if load < RESTING else 1.0)
+        m[CAPACITY] += dt / 60.0 * (recovery * (1.0 - m[CAPACITY]) - n[FATIGUE] * load)

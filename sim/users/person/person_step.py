@@ -1,0 +1,75 @@
+"""A person's time step: senses and decides once per servo tick, moves her arm at every physics step.
+
+Her inputs are those of a real person: force and motion of the stylus with noise and reflex delay, vision with visual
+delay, and her wishes. She has no access to field, phase or limiter.
+"""
+
+from numba import njit
+
+from controllers.state import Array
+from sim.users.person.body import REFERENCE_GRIP
+from sim.users.person.muscles import move
+from sim.users.person.person_state import (
+    BELIEF,
+    CAPACITY,
+    DECIDED,
+    DRIVEN_P,
+    GRIP,
+    HAND_P,
+    HAND_V,
+    REFRACTORY,
+    SEEN,
+    SENSED,
+    SHOWN,
+    STARTED,
+    STIFFENING,
+    STIFFER,
+    PersonState,
+)
+from sim.users.person.senses import sense
+from sim.users.person.will import want
+
+
+@njit
+def person_step(
+    person: PersonState, t: float, dt: float, substep: int, p: Array, v: Array, force: Array, switch: Array
+) -> None:
+    """Set the force of a person's hand on the stylus, and the switch.
+
+    Parameters
+    ----------
+    person : PersonState
+        Updated.
+    t, dt : float
+        Time, and the physics step [s].
+    substep : int
+        Number of the physics step within the servo tick.
+    p, v : Array
+        True position [m] and velocity [m/s] of the stylus in H, shape (3,).
+    force : Array
+        Force of the last step [N], in H, shape (3,); set to that of this step.
+    switch : Array
+        Set to 1 while the switch is pressed, shape (1,).
+    """
+    if substep == 0:
+        if person.memory[STARTED] == 0.0:
+            _begin(person, p, v)
+        sense(person, p, force)
+        want(person, switch)
+    move(person, dt, p, v, force)
+
+
+@njit
+def _begin(person: PersonState, p: Array, v: Array) -> None:
+    """Initialise the person with her hand at the stylus, moving with its velocity."""
+    memory, vectors = person.memory, person.vectors
+    vectors[:] = 0.0
+    for place in (HAND_P, DRIVEN_P, BELIEF, SHOWN):
+        vectors[place] = p
+    vectors[HAND_V] = v
+    for row in range(person.past.shape[0]):
+        person.past[row, SENSED : SENSED + 3] = p
+        person.past[row, SEEN : SEEN + 3] = p
+    memory[STARTED], memory[CAPACITY] = 1.0, 1.0
+    memory[STIFFER] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
+    memory[DECIDED] = -person.numbers[REFRACTORY]

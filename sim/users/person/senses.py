@@ -1,0 +1,143 @@
+"""Senses of a person: proprioception and vision with delay and noise, and her estimate of her hand's position.
+
+The estimate is the delayed felt position, corrected by vision when that arrives, plus the displacement intended since
+(a forward model: Miall et al. 1993, J. Mot. Behav. 25: 203-216).
+"""
+
+import math
+
+from numba import njit
+
+from controllers.state import Array
+from controllers.work_array import work_array
+from sim.users.person.chance import normal
+from sim.users.person.eye import seen_place
+from sim.users.person.person_state import (
+    ASTRAY,
+    BELIEF,
+    BLUR,
+    DEVIATING,
+    DEVIATION,
+    DIRECTION_NOISE,
+    DRIFT,
+    DRIVEN_P,
+    DRIVEN_V,
+    FELT_FORCE,
+    FELT_FORCE_NOISE,
+    FELT_NOISE,
+    FORCE_NOISE,
+    HAND_P,
+    HAND_V,
+    INTENDED,
+    INTENT,
+    LOOK_TICKS,
+    MISFELT,
+    OFFSET,
+    PERIOD,
+    PRESSED,
+    REFLEX,
+    REFLEX_GAIN,
+    REFLEX_TICKS,
+    SEEN,
+    SEEN_NOISE,
+    SEEN_TICKS,
+    SENSED,
+    SHOWN,
+    TICKS,
+    TREMOR,
+    TREMOR_A,
+    TREMOR_B,
+    TREMOR_BEFORE,
+    TREMOR_GAIN,
+    UNSTEADY,
+    VEERED,
+    WISH_PERIOD,
+    PersonState,
+)
+
+DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
+BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
+CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
+DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen further from the felt one is rejected
+VEER_TIME = 0.5  # [s] correlation time of the error of felt direction
+ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
+UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
+
+
+@njit
+def sense(person: PersonState, p: Array, force: Array) -> None:
+    """Store what is felt and seen now, and update the estimate, reflexes and tremor from what arrives now."""
+    n, m, V, past = person.numbers, person.memory, person.vectors, person.past
+    _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
+    go_astray(person)
+    _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
+    _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
+    if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
+        _noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
+    size = past.shape[0]
+    tick = int(m[TICKS])
+    now = past[tick % size]
+    felt, seen = past[(tick - int(n[REFLEX_TICKS])) % size], past[(tick - int(n[SEEN_TICKS])) % size]
+    _look(person, p)
+    kept = math.exp(-n[PERIOD] / CALIBRATION_TIME)
+    for k in range(3):
+        now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k], V[SHOWN, k] + V[BLUR, k]
+        now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
+        now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
+        now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
+        V[OFFSET, k] = kept * V[OFFSET, k] + (1.0 - kept) * (seen[SEEN + k] - seen[SENSED + k])
+        V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
+        V[FELT_FORCE, k] = (1.0 + V[MISFELT, k]) * felt[PRESSED + k]
+    for k in range(3):
+        V[REFLEX, k] = 0.0
+        for j in range(3):
+            V[REFLEX, k] += person.stiffness[k, j] * felt[DEVIATION + j] + person.damping[k, j] * felt[DEVIATING + j]
+        V[REFLEX, k] *= n[REFLEX_GAIN]
+    wave = n[TREMOR_GAIN]
+    for k in range(3):
+        fresh = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + wave * normal(person.chance)
+        V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], fresh
+    m[TICKS] += 1.0
+
+
+@njit
+def _noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
+    """Advance a noise vector, an Ornstein–Uhlenbeck process of given standard deviation and correlation time [s]."""
+    kept = math.exp(-person.numbers[PERIOD] / seconds)
+    fresh = deviation * math.sqrt(1.0 - kept * kept)
+    for k in range(3):
+        person.vectors[which, k] = kept * person.vectors[which, k] + fresh * normal(person.chance)
+
+
+@njit
+def go_astray(person: PersonState) -> None:
+    r"""Advance the error e of the felt position that arises because the felt direction of a movement is wrong.
+
+    .. math:: \dot e = \delta \times v - e / T
+
+    with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
+    (Gordon, Ghilardi & Ghez 1994 I).
+    """
+    _noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
+    V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
+    period = person.numbers[PERIOD]
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        V[ASTRAY, k] += period * (angle[i] * v[j] - angle[j] * v[i] - V[ASTRAY, k] / ASTRAY_TIME)
+
+
+@njit
+def _look(person: PersonState, p: Array) -> None:
+    """Look at the figure or, if there is none, at the stylus (p)."""
+    m, V, eye = person.memory, person.vectors, person.eye
+    if eye.pose.shape[0] == 0:
+        V[SHOWN] = p
+    elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
+        felt, away = work_array(3), 0.0
+        for k in range(3):
+            felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k]
+        seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
+        for k in range(3):
+            away += (V[SHOWN, k] - felt[k]) ** 2
+        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # rejected: taken for another pose
+            V[SHOWN] = felt

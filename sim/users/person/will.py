@@ -1,0 +1,150 @@
+"""A person's decisions at a tick: reading her wish, starting submovements, adapting her clock, learning forces."""
+
+import math
+
+from numba import njit
+
+from controllers.state import Array
+from controllers.work_array import work_array
+from sim.users.person.body import REFERENCE_GRIP
+from sim.users.person.motor_plan import aim, drive, may_decide, submove
+from sim.users.person.own_intent import call_intent
+from sim.users.person.person_state import (
+    BELIEF,
+    CLOCK,
+    DECIDED,
+    DRIVEN_A,
+    DRIVEN_P,
+    DRIVEN_V,
+    ENGAGED_SHARE,
+    ENTRAINMENT,
+    FELT_FORCE,
+    GRIP,
+    HORIZON,
+    LAP,
+    LASTS,
+    LEARNED_PARTS,
+    LEARNING,
+    PERIOD,
+    REFRACTORY,
+    STIFFENING,
+    STIFFER,
+    TARGET,
+    TICKS,
+    WANTED_FORCE,
+    WISH_PERIOD,
+    PersonState,
+)
+from sim.users.person.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
+from sim.users.person.wishes import GRIP as WISHED_GRIP
+
+ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise
+YIELDING_TIME = 0.15  # [s] time constant with which a relaxed arm's rest position follows the hand
+RETAINED = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
+BEND = 0.1  # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
+
+
+@njit
+def want(person: PersonState, switch: Array) -> None:
+    """Read the current wish, begin a submovement if it is time to, and follow the one in progress."""
+    n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
+    wanted, goal = work_array((3, 3)), work_array((3, 3))
+    wanted[:], goal[:] = 0.0, 0.0
+    aims, owns = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
+    if owns:
+        if person.units[1] != 0:
+            call_intent(person.units[1], (m[TICKS] * n[PERIOD], V[BELIEF], V[FELT_FORCE], rows))
+        row = rows[0]
+        wanted[0], wanted[1], goal[1] = row[PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3]
+        for k in range(3):
+            goal[0, k] = wanted[0, k] + n[HORIZON] * wanted[1, k]
+        switch[0] = row[SWITCH]
+    elif aims:
+        row = rows[min(int(m[TARGET]), rows.shape[0] - 1)]
+        wanted[0], goal[0] = row[PLACE : PLACE + 3], row[PLACE : PLACE + 3]
+        switch[0] = 0.0
+    else:
+        row = rows[wanted_motion(rows, n[WISH_PERIOD], m[CLOCK], wanted)]
+        _foresee(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
+        switch[0] = row[SWITCH]
+    engaged = row[ENGAGED] > 0.0
+    m[CLOCK] += n[PERIOD] * (
+        1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
+    )
+    grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
+    follow = n[PERIOD] / ENGAGING_TIME
+    m[ENGAGED_SHARE] += follow * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
+    m[STIFFER] += follow * (max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFER])
+    for k in range(3):
+        V[WANTED_FORCE, k] += follow * (row[FORCE + k] - V[WANTED_FORCE, k])
+    if not engaged:
+        _yield(person)
+        return
+    if aims:
+        if may_decide(person, True) and aim(person, goal, row[WIDTH]):
+            m[TARGET] += 1.0
+            switch[0] = 1.0
+    elif may_decide(person, False):
+        submove(person, goal, n[HORIZON])
+    drive(person)
+    _learn(person, wanted)
+
+
+@njit
+def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
+    """Set the motion that will be wanted at time t [s]; its acceleration is averaged over ± `BEND`, also at corners."""
+    before, bend = work_array((3, 3)), work_array(3)
+    before[:] = 0.0
+    wanted_motion(rows, period, t - BEND, before)
+    wanted_motion(rows, period, t + BEND, goal)
+    for k in range(3):
+        bend[k] = (goal[1, k] - before[1, k]) / (2.0 * BEND)
+    wanted_motion(rows, period, t, goal)
+    goal[2] = bend
+
+
+@njit
+def _ahead(entrainment: float, place: Array, wanted: Array) -> float:
+    """Relative speed-up of her clock [1], −0.5 to 0.5: positive if the hand is ahead of the wanted motion."""
+    speed, way = 0.0, 0.0
+    for k in range(3):
+        speed += wanted[1, k] * wanted[1, k]
+        way += wanted[1, k] * (place[k] - wanted[0, k])
+    return 0.0 if speed < 1e-6 else min(max(entrainment * way / speed, -0.5), 0.5)
+
+
+@njit
+def _yield(person: PersonState) -> None:
+    """Be passive: the arm's rest position follows the believed position of the hand."""
+    n, m, V = person.numbers, person.memory, person.vectors
+    for k in range(3):
+        V[DRIVEN_P, k] += n[PERIOD] / YIELDING_TIME * (V[BELIEF, k] - V[DRIVEN_P, k])
+    V[DRIVEN_V], V[DRIVEN_A] = 0.0, 0.0
+    m[LASTS], m[DECIDED] = 0.0, m[TICKS] * n[PERIOD] - n[REFRACTORY]
+
+
+@njit
+def _learn(person: PersonState, wanted: Array) -> None:
+    r"""Learn the force that keeps the hand on the wanted motion, for each part of a lap.
+
+    .. math:: f_{n+1} = A f_n + B K (p_d - p)
+
+    per repetition (Thoroughman & Shadmehr 2000). The learned force is applied earlier by the time of muscle activation.
+    """
+    n, m, V = person.numbers, person.memory, person.vectors
+    if n[LEARNING] == 0.0 or n[LAP] == 0.0:
+        return
+    part, ready = _part(m[CLOCK] / n[LAP]), _part((m[CLOCK] + ENGAGING_TIME) / n[LAP])
+    share = n[PERIOD] * LEARNED_PARTS / n[LAP]
+    for k in range(3):
+        pull = 0.0
+        for j in range(3):
+            pull += person.stiffness[k, j] * (wanted[0, j] - V[BELIEF, j])
+        person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETAINED) * person.learned[part, k])
+        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[ready, k]
+
+
+@njit
+def _part(laps: float) -> int:
+    """Index of the part of a lap after a number of laps."""
+    return int(LEARNED_PARTS * (laps - math.floor(laps))) % LEARNED_PARTS

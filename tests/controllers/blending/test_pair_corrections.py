@@ -1,0 +1,71 @@
+"""Corrections of any number of clips: two at a time, zero where one is alone, with the derivatives that they say."""
+
+import numpy as np
+import pytest
+
+from controllers.blending.pair_corrections import (
+    neighbouring_pairs,
+    packed_pairs,
+    pair_channels,
+    pair_correction,
+)
+from controllers.legs.footfalls import foot_corrections
+from tests.controllers.legs.test_footfalls import LEGS, REST, N, kicking, walking
+
+CLIPS = np.stack([kicking(0, 0.1, 0.4), kicking(1, 0.2, 0.5), walking(0.6, 0.03)], axis=1)
+DRIFTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.6, 0.0, 0.0]])
+PAIRS = [(0, 1), (0, 2), (1, 2)]
+NUMBERS = packed_pairs(CLIPS, DRIFTS, LEGS, PAIRS)
+ALL = np.arange(3)
+
+
+def correction(angle, w, changes=None, clips=ALL):
+    d = np.empty((4, pair_channels(NUMBERS)))
+    none = np.zeros((3, len(w)))
+    pair_correction(NUMBERS, angle, clips, np.asarray(w, dtype=float), none if changes is None else changes, d)
+    return d
+
+
+@pytest.mark.parametrize(("i", "j"), PAIRS)
+@pytest.mark.parametrize("share", [1 / 4, 1 / 2, 3 / 4])
+def test_between_two_clips_it_is_what_the_footfalls_are(i, j, share):
+    w = np.zeros(3)
+    w[i], w[j] = 1.0 - share, share
+    expected = foot_corrections(CLIPS, DRIFTS, LEGS, w[None])[:, 0]
+    assert np.abs(expected).max() > 0.002
+    for row in range(0, N, 7):
+        np.testing.assert_allclose(correction(2.0 * np.pi * row / N, w)[0], expected[row], atol=1e-12)
+
+
+def test_a_clip_alone_is_left_as_it_is_and_the_order_of_the_clips_does_not_matter():
+    for w in np.eye(3):
+        np.testing.assert_array_equal(correction(1.3, w)[0], 0.0)
+    w, order = np.array([0.5, 0.2, 0.3]), np.array([2, 0, 1])
+    np.testing.assert_allclose(correction(1.3, w)[0], correction(1.3, w[order], clips=order)[0], atol=1e-15)
+
+
+def test_its_derivatives_agree_with_differences():
+    rng, step = np.random.default_rng(0), 1e-5
+    for _ in range(50):
+        angle, w, changes = rng.uniform(0.1, 6.1), rng.uniform(-0.2, 0.8, 3), rng.normal(size=(3, 3))
+        found = correction(angle, w, changes)
+        for way in range(3):
+            sides = []
+            for h in (step, -step):
+                at = angle + h if way == 0 else angle
+                sides.append(correction(at, w + h * changes[way])[0])
+            expected = (sides[0] - sides[1]) / (2.0 * step)
+            np.testing.assert_allclose(found[1 + way], expected, atol=1e-6 * (1.0 + np.abs(expected).max()))
+
+
+def test_neighbours_are_those_with_no_other_between_them_anywhere_round_the_lap():
+    line = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    assert neighbouring_pairs(np.stack([line, line])) == [(0, 1), (1, 2)]
+    away = line.copy()
+    away[1, 1] = 3.0
+    assert neighbouring_pairs(np.stack([line, away])) == [(0, 1), (0, 2), (1, 2)]
+    assert neighbouring_pairs(np.zeros((4, 1, 2))) == []
+
+
+def test_without_limbs_nothing_is_corrected():
+    assert pair_channels(packed_pairs(CLIPS[..., :REST], DRIFTS, [], PAIRS)) == 0

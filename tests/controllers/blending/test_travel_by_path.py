@@ -1,0 +1,56 @@
+"""How far a figure has come is its hand's path: going aside changes how fast it walks, not where it is."""
+
+import numpy as np
+import pytest
+
+from controllers.blending.combination import fresh_lap
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, update_lap
+from tests.controllers.clips_for_maps import stylus
+from tests.controllers.haptic_map.test_cylindrical_map import MOVING
+from tests.controllers.haptic_map.test_lifted_map import MAP
+
+TURN = 2.0 * np.pi
+
+
+def walked(path):
+    """Where a figure is in the end, x, y and heading, on a path of angles (n,) and drifts (n, 3)."""
+    memory = fresh_lap()
+    for angle, drift in path:
+        update_lap(memory, np.mod(angle, TURN), drift)
+    s, (x, y, turn) = np.mod(path[-1][0], TURN) / TURN, path[-1][1]
+    assert turn == 0.0
+    c, n = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
+    return np.array([memory[LAP_X] + s * (c * x - n * y), memory[LAP_Y] + s * (n * x + c * y), memory[LAP_HEADING]])
+
+
+def test_the_way_is_the_integral_of_the_drift_over_the_path():
+    angles = np.linspace(0.2, 15.0, 3000)
+    drifts = np.column_stack([1.0 + np.sin(0.7 * angles), 0.3 * np.cos(angles), 0.0 * angles])
+    expected = np.trapezoid(drifts, angles / TURN, axis=0) + 0.2 / TURN * drifts[0]
+    np.testing.assert_allclose(walked(list(zip(angles, drifts, strict=True))), expected, atol=1e-9)
+
+
+def test_there_and_back_is_where_it_was():
+    angles = np.concatenate([np.linspace(0.2, 9.0, 900), np.linspace(9.0, 0.2, 900)])
+    drifts = np.column_stack([1.0 + np.sin(0.7 * angles), 0.3 * np.cos(angles), 0.0 * angles])
+    np.testing.assert_allclose(
+        walked(list(zip(angles, drifts, strict=True)))[:2], 0.2 / TURN * drifts[0, :2], atol=1e-9
+    )
+
+
+def test_a_steady_drift_that_turns_is_as_it_was():
+    memory, drift = fresh_lap(), np.array([0.4, 0.1, 1.0])
+    for angle in np.mod(np.linspace(0.1, 4.0 * TURN + 0.1, 400), TURN):
+        update_lap(memory, angle, drift)
+    assert memory[LAP_HEADING] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(("haptic_map", "middle"), [(MAP, 0.05), (MOVING, 0.045)])
+def test_a_hand_that_goes_aside_late_in_a_lap_does_not_carry_the_figure_off(haptic_map, middle):
+    memory, angle = haptic_map.compiled().memory, 5.8
+    places = [stylus(middle + 0.008 * np.sin(s), angle, 0.006 * np.sin(s)) for s in np.linspace(0.0, 0.5 * np.pi, 200)]
+    with_memory = np.array([haptic_map.pose(x, memory)[:2] for x in places])
+    alone = np.array([haptic_map.pose(x)[:2] for x in places])
+    carried, moved = (np.linalg.norm(p[-1] - p[0]) for p in (alone, with_memory))
+    assert carried > 0.1
+    assert moved < 0.35 * carried

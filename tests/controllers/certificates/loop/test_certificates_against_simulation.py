@@ -1,0 +1,140 @@
+"""Certificates predict what MuJoCo does under the servo's own kernels: each test could refute them."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from controllers.certificates.loop.energy import energy, terminal_speed
+from controllers.certificates.loop.hand import HandImpedance, HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.passivity import passivity
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, stability
+from controllers.curves.closest_point import closest_phases
+from controllers.curves.trajectory import Trajectory
+from experiments.certify.certified_device import phantom_device
+from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
+from experiments.studies.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
+from sim.users.hand.arm import Arm
+
+pytestmark = pytest.mark.slow
+
+CIRCLE = Trajectory.circle(0.0477, 4.0)
+STILL = Trajectory.circle(0.0477, LAP)
+RIVER = River(FOLLOW_LAW, 300.0, 4.0, 0.25, CIRCLE, phantom_device(), Sampling(1e-3))
+EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+
+
+def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
+    return Trial(STILL, phase * LAP / 4.0, river.b_d, river.sampling, hand, np.array(direction))
+
+
+def test_onset_of_instability_is_where_it_is_predicted():
+    rng = np.random.default_rng(11)
+    trials = [draw_trial(rng) for _ in range(6)]
+    errors = [abs(observed(trial, predicted(trial), Conditions()) / predicted(trial) - 1.0) for trial in trials]
+    assert max(errors) < 0.05
+    assert np.median(errors) < 0.02
+
+
+def test_coulomb_friction_moves_the_onset_as_its_describing_function_says():
+    sampling = Sampling(1.2e-3, 3.6e-3)
+    trial = Trial(STILL, 0.2 * LAP, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
+    rubbing = with_friction(trial, 1e-3)
+    assert rubbing.k_r > 1.03 * predicted(trial)
+    assert observed_with_friction(trial, rubbing, 1e-3, Conditions(coulomb=True)) == pytest.approx(
+        rubbing.k_r, rel=0.03
+    )
+    assert observed_with_friction(trial, rubbing, 1e-3, Conditions(coulomb=True, rounded=True)) == pytest.approx(
+        rubbing.k_r, rel=0.05
+    )
+
+
+def test_the_worlds_own_integrator_leads_by_half_a_step():
+    trial = Trial(STILL, 0.2 * LAP, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    expected = predicted(trial)
+    own = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    coarse, fine = (observed(trial, expected, Conditions(steps, own)) / expected - 1.0 for steps in (8, 64))
+    assert coarse > 0.05
+    assert fine == pytest.approx(coarse / 8.0, rel=0.25)
+
+
+def test_a_refuted_river_does_what_its_counterexample_says():
+    river = RIVER._replace(k_r=3000.0, sampling=Sampling(1e-3, 1e-3))
+    verdict = stability(river, [HandImpedance(), HandImpedance(0.1, 2.0, 200.0)])
+    assert verdict.verdict == "refuted"
+    example = verdict.counterexample
+    trial = _trial(river, example["phase"], example["hand"])
+    path = simulate(trial, river.k_r, 120, Conditions(), 1e-3 * example["state"])
+    size = np.linalg.norm(path, axis=1)
+    assert size[-20:].max() > 3.0 * size[:20].max()
+    assert np.log(growth(path)) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.02)
+
+
+def test_the_spring_that_refutes_passivity_makes_it_unstable():
+    example = passivity(RIVER).counterexample
+    trial = _trial(RIVER, example["phase"], example["hand"])
+    # The spring is felt at every physics step, so it takes fine ones.
+    path = simulate(trial, RIVER.k_r, 300, Conditions(substeps=1024), 1e-3 * example["state"])
+    assert np.log(growth(path)) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.1)
+
+
+def test_nothing_certified_diverges():
+    hands = HandRange()
+    assert stability(RIVER, hands.hands()).verdict == "certified"
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        hand = HandImpedance(*(rng.uniform(low, high) for low, high in (hands.mass, hands.damping, hands.stiffness)))
+        trial = _trial(RIVER, rng.uniform(0.0, 4.0), hand)
+        state = np.zeros(12)
+        loop = trial.loop()
+        inverse = np.linalg.inv(loop.linear.jacobian[0])
+        state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.1, size=3)
+        state[6:9], state[9:12] = state[:3], state[3:6]
+        path = simulate(trial, RIVER.k_r, 400, EVERYTHING, state)
+        assert len(path) == 400
+        # Friction holds it short of the curve: at f_c/k_r, 0.06 N over 300 N/m.
+        assert np.linalg.norm(path[300:], axis=1).max() < 6e-4
+
+
+def test_a_bounded_force_moves_the_hand_no_farther_than_its_bound():
+    push = 1.0
+    verdict = energy(RIVER, push, 8.5)
+    assert verdict.verdict == "certified"
+    trial = Trial(CIRCLE, 0.5, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    loop = SampledLoop(RIVER.still(), RIVER.sampling)
+    basis, projection = loop.across
+    maps, force = loop.frozen(300.0, 4.0)[6], (projection @ loop.push)[6]
+    farthest = 0.0
+    for axis in np.eye(3):
+        row, course = axis @ loop.linear.jacobian[6] @ basis[6, :3], []
+        for _ in range(400):
+            course.append(row @ force / max(np.linalg.norm(row @ force), 1e-300))
+            row = row @ maps
+        course = push * np.array(course[::-1])
+        # A spring as soft as this, with its end so far away, is a force of any course.
+        soft = 1e-4
+        user = Arm(soft, 0.0, course / soft + CIRCLE.point(0.5), RIVER.sampling.period)
+        path = hand_path(trial, RIVER.k_r, 420, Conditions(coulomb=True), user=user)
+        distance = closest_phases(CIRCLE.packed(), path)[1]
+        farthest = max(farthest, float(distance.max()))
+    assert 0.5 * verdict.figures["distance_bound"] < farthest < verdict.figures["distance_bound"]
+
+
+def test_a_relaxed_hand_is_carried_at_the_terminal_speed():
+    trial = Trial(CIRCLE, 0.0, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    path = hand_path(trial, RIVER.k_r, 750, Conditions(8, coulomb=True))
+    phases = np.unwrap(closest_phases(CIRCLE.packed(), path)[0], period=4.0)
+    assert len(path) == 750
+    pace = (phases[-1] - phases[249]) / 0.5 * 0.0749269
+    moving = RIVER.moving()
+    inside = (moving.phases > phases[249]) & (moving.phases < phases[-1])
+    assert pace == pytest.approx(float(1.0 / np.mean(1.0 / terminal_speed(RIVER, moving)[inside])), rel=0.02)
+
+
+def test_the_critical_gain_does_not_depend_on_where_the_hand_starts():
+    trial = draw_trial(np.random.default_rng(5))
+    expected = predicted(trial)
+    rates = [np.log(growth(simulate(trial, 1.05 * expected, 150, Conditions(start=start)))) for start in (1e-6, 3e-6)]
+    assert rates[0] == pytest.approx(rates[1], rel=1e-2)

@@ -1,0 +1,352 @@
+"""Lifting: motions as points, the common lap, transitions, the arrangement, and what is refused."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, arrange, is_apart, on_lap
+from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
+from controllers.haptic_map.lifting.common_lap import common_lap
+from controllers.haptic_map.lifting.layouts import lattice, scaled
+from controllers.haptic_map.lifting.lift import lift
+from controllers.haptic_map.lifting.motion_features import Features, Motion, features
+from controllers.haptic_map.lifting.room import Rectangle, Room
+from controllers.haptic_map.lifting.transitions import Transition, compare, find_transitions
+from tests.controllers.clips_for_maps import JOINTS, difference, swinging, wxyz
+
+WEIGHTS = np.array([0.4, 0.2, 0.15, 0.1])
+ROOM = Room()
+
+
+def motion(poses, name="clip", fps=30.0, closed=True, supports=None):
+    return Motion(poses, fps, name, closed, np.ones((len(poses), 2), bool) if supports is None else supports)
+
+
+def lifted_at(motions, room=ROOM, seed=1):
+    return lift(motions, WEIGHTS, room, np.random.default_rng(seed))
+
+
+FOUR = [motion(swinging(k, frames=60 + 20 * k, amplitude=0.3 + 0.2 * k), f"clip {k}") for k in range(4)]
+
+
+@cache
+def four_lifted():
+    return lifted_at(FOUR)
+
+
+def test_the_distance_of_near_poses_is_that_of_their_tangent_in_metres_of_the_body():
+    rng = np.random.default_rng(0)
+    poses = swinging(1, frames=8)
+    nearby = poses.copy()
+    nearby[:, 2] += 1e-4 * rng.normal(size=9)
+    for first in range(7, 19, 4):
+        turn = Rotation.from_rotvec(1e-4 * rng.normal(size=(9, 3)))
+        nearby[:, first : first + 4] = wxyz(Rotation.from_quat(np.roll(poses[:, first : first + 4], -1, axis=1)) * turn)
+    here, there = (features(motion(p), WEIGHTS, 9).pose for p in (poses, nearby))
+    for k in range(9):
+        tangent = difference(nearby[k], poses[k])
+        turns = WEIGHTS[1:, None] * tangent[6:].reshape(JOINTS, 3)
+        wanted = np.sqrt(tangent[2] ** 2 + (turns**2).sum())
+        assert np.linalg.norm(there[k] - here[k]) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_where_a_motion_is_and_which_way_it_faces_does_not_matter():
+    poses = swinging(2, travel=1.0)
+    moved, turn = poses.copy(), Rotation.from_rotvec([0.0, 0.0, 2.1])
+    moved[:, :3] = turn.apply(poses[:, :3]) + np.array([3.0, -1.0, 0.0])
+    moved[:, 3:7] = wxyz(turn * Rotation.from_quat(np.roll(poses[:, 3:7], -1, axis=1)))
+    for here, there in zip(*(features(motion(p), WEIGHTS, 50) for p in (poses, moved)), strict=True):
+        np.testing.assert_allclose(there, here, atol=1e-9)
+
+
+def test_velocities_are_the_derivatives_of_poses():
+    poses = swinging(3, frames=240)
+    own = features(motion(poses), WEIGHTS, 241)
+    step = np.array([difference(poses[k + 1], poses[k - 1]) * 15.0 for k in range(1, 240)])
+    spin = (step[:, 3:].reshape(239, -1, 3) * WEIGHTS[:, None]).reshape(239, -1)
+    np.testing.assert_allclose(own.velocity[1:-1, 3:], spin, atol=2e-3)
+    assert np.linalg.norm(own.velocity[120, :3]) == pytest.approx(np.linalg.norm(step[119, :3]), rel=1e-2)
+
+
+def test_a_clip_that_begins_elsewhere_is_shifted_back():
+    clips = [motion(swinging(5), "a"), motion(swinging(5, phase=0.3), "b")]
+    a, b = common_lap(clips, [features(m, WEIGHTS, STEPS) for m in clips])
+    # b at share s is a at s + 0.3.
+    lag = np.mod(a.share(np.array([0.2])) - b.share(np.array([0.2])), 1.0)
+    assert lag == pytest.approx(0.3, abs=0.5 / 96)
+
+
+def test_a_clip_with_another_timing_is_warped_to_it():
+    even = swinging(6, frames=200)
+    s = np.linspace(0.0, 1.0, 201)
+    late = s - 0.05 * np.sin(2.0 * np.pi * s)
+    warped = np.stack([np.interp(late, s, column) for column in even.T], axis=1)
+    warped[:, 3:] /= np.repeat(np.linalg.norm(warped[:, 3:].reshape(201, -1, 4), axis=2), 4, axis=1)
+    clips = [motion(even, "even"), motion(warped, "late")]
+    a, b = common_lap(clips, [features(m, WEIGHTS, STEPS) for m in clips])
+    lap = np.arange(96) / 96
+    error = np.interp(np.mod(b.share(lap), 1.0), s, late) - np.mod(a.share(lap), 1.0)
+    error -= np.round(error)
+    # Unwarped it would be 0.05.
+    assert np.abs(error).max() < 0.02
+
+
+def test_steps_meet_steps_where_poses_do_not_tell():
+    """Two clips that stand still but for which foot bears: the contacts alone align them."""
+    still = np.tile(swinging(1)[:1], (101, 1))
+    s = np.linspace(0.0, 1.0, 101)
+    walks = []
+    for name, lead in (("a", 0.0), ("b", 0.35)):
+        left = np.mod(s + lead, 1.0) < 0.5
+        walks.append(motion(still, name, supports=np.stack([left, ~left], axis=1)))
+    a, b = common_lap(walks, [features(m, WEIGHTS, STEPS) for m in walks])
+    lap = np.arange(96) / 96
+    bears = [np.mod(phase.share(lap) + lead, 1.0) < 0.5 for phase, lead in ((a, 0.0), (b, 0.35))]
+    assert np.mean(bears[0] == bears[1]) > 0.97
+
+
+def test_angles_increase_and_leave_a_gap_where_a_clip_is_open():
+    clips = [*FOUR[:2], motion(swinging(3)[:70], "open", closed=False)]
+    found = lifted_at(clips)
+    for clip, angles in zip(clips, found.angles, strict=True):
+        assert angles.shape == (len(clip.poses),)
+        assert (np.diff(angles) > 0.0).all()
+        if clip.closed:
+            assert angles[-1] - angles[0] == pytest.approx(2.0 * np.pi, abs=1e-12)
+        else:
+            assert angles[0] > 0.0
+            assert 2.0 * np.pi * 0.7 - 1e-9 <= angles[-1] - angles[0] <= 2.0 * np.pi * 0.9 + 1e-9
+            assert angles[-1] < 2.0 * np.pi
+    # Pace and its change are continuous: third differences are small beside the step.
+    step = np.diff(found.angles[0])
+    assert np.abs(np.diff(step, 2)).max() < 0.02 * step.mean()
+
+
+def meeting_clips():
+    """Two motions that differ but for one moment, at which pose and velocity are the same."""
+    s = np.linspace(0.0, 1.0, 121)
+    base = swinging(7, amplitude=0.2)
+    other = base.copy()
+    bump = np.sin(np.pi * (s - 0.4)) ** 4
+    turn = Rotation.from_rotvec(np.outer(bump, [0.0, 1.2, 0.3]))
+    other[:, 7:11] = wxyz(Rotation.from_quat(np.roll(base[:, 7:11], -1, axis=1)) * turn)
+    return motion(base, "base"), motion(other, "other")
+
+
+def test_a_transition_is_found_where_two_motions_agree_and_the_curves_meet_there_and_only_there():
+    found = lifted_at(meeting_clips())
+    (at,) = found.transitions
+    base = common_lap([meeting_clips()[0]], [features(meeting_clips()[0], WEIGHTS, STEPS)])[0]
+    assert base.start == 0.0
+    assert np.hypot(at.pose, at.velocity) < 0.1
+    assert at.support == 0.0
+    share = np.interp(at.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
+    assert share == pytest.approx(0.4, abs=0.1)
+    (meeting,) = found.after.meetings
+    assert meeting.distance < 5e-3
+    assert np.degrees(meeting.slant) < 10.0
+    assert found.after.separation >= ROOM.separation
+    # Before the arrangement the curves were far apart there too.
+    assert found.before.meetings[0].distance > 5.0 * meeting.distance
+
+
+def moments(rng, poses, bears):
+    """Features of a motion at 200 steps of a lap: how far it is from another, and when its one foot stands."""
+    own = rng.normal(size=(200, 6))
+    own[:, 0] += poses
+    return Features(own, np.tile([1.5, 0.0, 0.0, 0.5], (200, 1)), np.asarray(bears, float)[:, None])
+
+
+def test_a_transition_is_where_motions_agree_for_a_while_and_stand_on_the_same_feet():
+    steps, feet = np.arange(200), np.arange(200) % 100 < 50
+
+    def found(apart, bears):
+        rng = np.random.default_rng(3)
+        one, other = moments(rng, 0.0 * steps, feet), moments(np.random.default_rng(3), apart, bears)
+        return find_transitions(compare([one, other], np.ones((200, 2), bool), np.full(2, 2.0)), 0.5)
+
+    # The same pose for a moment at step 40, nearly the same for 0.4 s about step 120.
+    apart = np.full(200, 6.0)
+    apart[40], apart[95:146] = 0.0, 0.5
+    (at,) = found(apart, feet)
+    assert np.degrees(at.angle) == pytest.approx(120 * 1.8, abs=10.0)
+    assert at.support == 0.0
+    assert at.speeds == pytest.approx((1.5, 1.5))
+    # On the other foot there, it is none.
+    other = feet.copy()
+    other[80:160] = ~feet[80:160]
+    assert found(apart, other) == []
+
+
+def test_motions_that_never_agree_have_no_transition():
+    low = motion(swinging(1), "low")
+    bent = swinging(1)
+    bent[:, 7:11] = wxyz(Rotation.from_quat(np.roll(bent[:, 7:11], -1, axis=1)) * Rotation.from_rotvec([0.0, 2.0, 0.0]))
+    assert lifted_at([low, motion(bent, "bent")]).transitions == ()
+
+
+def test_the_gradient_of_the_energy_agrees_with_differences():
+    rng = np.random.default_rng(0)
+    n = 4
+    distance = 0.1 * np.abs(rng.normal(size=(SAMPLES, n, n)))
+    distance = distance + distance.transpose(0, 2, 1)
+    # Limits low enough to be broken.
+    task = Task(
+        Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 0.1, 0.5, distance,
+        [Transition(0, 1, 1.0, 0.0, 0.0, 0.0, (0.0, 0.0)), Transition(1, 2, 3.0, 0.0, 0.0, 0.0, (0.0, 0.0))],
+        6.0 + rng.normal(size=(SAMPLES, n)), rng.normal(size=(SAMPLES, n)),
+    )  # fmt: skip
+    energy = Energy(task)
+    start = np.tile(scaled(task.scale * distance.mean(axis=0), np.arange(4.0), task.rectangle), (ROWS, 1, 1))
+    x = (start + 2e-3 * rng.normal(size=start.shape)).ravel()
+    gradient = energy(x)[1]
+    for _ in range(5):
+        way = rng.normal(size=x.size)
+        slope = (energy(x + 1e-7 * way)[0] - energy(x - 1e-7 * way)[0]) / 2e-7
+        assert gradient @ way == pytest.approx(slope, rel=1e-6)
+
+
+def test_sites_stay_in_the_rectangle_apart_and_mirror_the_motions_better_than_before():
+    lifted = four_lifted()
+    low, high = ROOM.rectangle.low, ROOM.rectangle.high
+    assert (lifted.sites >= low - 1e-12).all()
+    assert (lifted.sites <= high + 1e-12).all()
+    assert lifted.after.separation >= ROOM.separation
+    assert lifted.after.stress < lifted.before.stress
+
+
+def test_what_is_measured_is_what_the_map_s_curves_are():
+    lifted = four_lifted()
+    """Independent means: the trajectories of the map that is made of it."""
+    h = Lifted([(m.poses, m.fps) for m in FOUR], [True] * 4, lifted.angles, lifted.sites)
+    for i, curve in enumerate(lifted.after.curves):
+        path = h.curve(i)
+        t = np.linspace(path.start, path.end, 800)
+        assert np.linalg.norm(path.velocity(t), axis=1).max() == pytest.approx(curve.speed, rel=0.02)
+        assert 1.0 / path.curvature(t).max() == pytest.approx(curve.radius, rel=0.05)
+        assert np.linalg.norm(path.acceleration(t), axis=1).max() == pytest.approx(curve.acceleration, rel=0.1)
+    for m, poses in zip(FOUR, (h.placed(i) for i in range(4)), strict=True):
+        np.testing.assert_allclose(poses[:, 7:], m.poses[:, 7:], atol=1e-12)
+
+
+def test_the_same_seed_gives_the_same_curves():
+    lifted = four_lifted()
+    again = lifted_at(FOUR)
+    np.testing.assert_array_equal(again.sites, lifted.sites)
+    for a, b in zip(again.angles, lifted.angles, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_fast_clip_is_kept_where_the_device_can_follow():
+    fast = [FOUR[1], FOUR[2], motion(FOUR[3].poses, "fast", fps=150.0)]
+    free = lifted_at(fast, Room(acceleration=100.0)).after.curves[2].acceleration
+    # At the innermost radius it is 0.9 of that.
+    bound = lifted_at(fast, Room(acceleration=0.93 * free)).after.curves[2].acceleration
+    assert bound <= 0.93 * free
+
+
+def test_the_faster_a_curve_is_gone_round_the_less_it_bends():
+    # Two motions that are alike twice a lap.
+    lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, SAMPLES, endpoint=False))
+    distance = lap[:, None, None] * (1.0 - np.eye(2))
+    bends = list[float]()
+    for rate in (1.0, 3.0, 9.0):
+        still = np.zeros((SAMPLES, 2))
+        task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
+        bends.append(np.ptp(arrange(task, np.random.default_rng(0))[0], axis=0).max())
+    assert bends[0] > 3e-3
+    assert bends[1] < 0.8 * bends[0]
+    assert bends[2] < 0.1 * bends[0]
+
+
+def test_many_clips_are_kept_apart():
+    many = [motion(swinging(k, amplitude=0.2 + 0.05 * k), f"{k}") for k in range(12)]
+    found = lifted_at(many)
+    assert found.after.separation >= ROOM.separation
+
+
+def test_a_lattice_is_as_dense_as_it_may_be():
+    rectangle = Rectangle(0.02, 0.072, -0.05, 0.05)
+    for separation in (0.004, 0.01, 0.03):
+        points = lattice(rectangle, separation)
+        apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
+        assert apart.min() >= separation * (1.0 - 1e-9)
+        assert (points >= rectangle.low - 1e-12).all()
+        assert (points <= rectangle.high + 1e-12).all()
+        # Squares would hold no more.
+        assert len(points) >= (int(0.052 / separation) + 1) * (int(0.1 / separation) + 1) * 0.9
+
+
+# What is unusual, and what is refused.
+
+
+def test_clips_of_any_length_and_rate_are_lifted():
+    clips = [motion(swinging(1, frames=40), "short", 25.0), motion(swinging(2, frames=500), "long", 120.0)]
+    found = lifted_at(clips)
+    h = Lifted([(m.poses, m.fps) for m in clips], [True, True], found.angles, found.sites)
+    assert h.curve(0).duration == pytest.approx(40 / 25)
+    assert h.curve(1).duration == pytest.approx(500 / 120)
+    assert found.after.separation >= ROOM.separation
+
+
+def test_the_same_clip_twice_is_held_apart_and_said():
+    found = lifted_at([FOUR[0], motion(FOUR[0].poses, "again"), FOUR[1]])
+    assert found.same == ((0, 1),)
+    assert all({t.first, t.second} != {0, 1} for t in found.transitions)
+    assert found.after.separation >= ROOM.separation
+
+
+def test_a_clip_that_stands_still_has_a_curve_and_is_named():
+    found = lifted_at([FOUR[0], motion(np.tile(FOUR[1].poses[:1], (31, 1)), "still")])
+    assert found.still == (1,)
+    assert np.isfinite(found.sites).all()
+    assert found.after.separation >= ROOM.separation
+
+
+def test_a_single_clip_has_a_curve():
+    found = lifted_at(FOUR[:1])
+    assert found.after.separation == np.inf
+    assert found.transitions == ()
+
+
+def cut_short():
+    return swinging(3)[:80]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: lifted_at([]), "no clips to lift"),
+        (lambda: lifted_at([motion(swinging(1)[:1], "one")]), "clip 'one': a clip needs at least 2 frames, got 1"),
+        (lambda: lifted_at([motion(swinging(1)[:3], "few", closed=False)]), "'few' has 3 frames, and a curve needs 4"),
+        (lambda: lifted_at([motion(cut_short(), "cut")]), "'cut' is said to be cyclic.*lift it as an open"),
+        (lambda: lifted_at([FOUR[0], FOUR[1]], Room(separation=0.2)), "2 clips do not fit 200 mm apart .* 1 do"),
+        (lambda: lifted_at([FOUR[0]] * 120, Room(separation=0.008)), r"120 clips do not fit.*separation of \d\.\d mm"),
+        (lambda: lifted_at([motion(swinging(1), "fast", fps=3000.0)]), "'fast' goes round in 0.04 s.*slow it down to"),
+        (lambda: lift([FOUR[0]], WEIGHTS[:2], ROOM, np.random.default_rng(0)), "4 rotations, there are 2 weights"),
+        (lambda: Room(approach=0.02), "approach at transitions is 20 mm, more than the separation"),
+        (lambda: Room(r_range=(0.05, 0.02)), "r_range must increase"),
+        (lambda: Room(separation=np.nan), "separation"),
+        (lambda: motion(swinging(1), supports=np.ones((3, 2), bool)), "supports have shape"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_lifted_is_refused_with_what_would_help(make, says):
+    with pytest.raises(ParameterError, match=says):
+        make()
+
+
+def test_curves_that_are_not_apart_are_told():
+    """The check that `arrange` relies on can fail."""
+    task = Task(
+        Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 1.0, 8.0, np.ones((SAMPLES, 2, 2)), [],
+        np.ones((SAMPLES, 2)), np.zeros((SAMPLES, 2)),
+    )  # fmt: skip
+    controls = np.tile(np.array([[0.03, 0.0], [0.05, 0.0]]), (ROWS, 1, 1))
+    assert is_apart(task, controls)
+    controls[10:20, 1, 0] = 0.035
+    assert not is_apart(task, controls)
+    assert on_lap(controls)[0].shape == (SAMPLES, 2, 2)

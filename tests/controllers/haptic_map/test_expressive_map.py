@@ -1,0 +1,189 @@
+"""The expressive map: the base at an upright stylus, its derivative, the ends of the joints' ranges, and C² edges."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
+from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
+from sim.compilation.kernel_units import map_units
+from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging, wxyz
+
+CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
+BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))
+# The clips swing farther than these ranges: all that the ends do to the derivative is met.
+HEAD = ExpressiveJoint(3, (0.1, 0.6, -0.7), (-0.6, -0.4, -0.5), (0.5, 0.7, 0.6))
+TRUNK = ExpressiveJoint(1, (0.5, 0.3, 0.2), (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+MAP = Expressive(BASE, (TRUNK, HEAD))
+
+
+def turned(x, rotation):
+    return np.concatenate([x[:3], wxyz(rotation)])
+
+
+def anywhere(rng, largest=np.pi):
+    """A stylus within the map's domain, turned by up to an angle about any axis."""
+    axis = rng.normal(size=3)
+    turn = Rotation.from_rotvec(rng.uniform(0.0, largest) * axis / np.linalg.norm(axis))
+    return turned(stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.03, 0.03)), turn)
+
+
+def moved(x, tangent):
+    return turned(x[:3] + tangent[:3], Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1)))
+
+
+def room_left(x):
+    """The least distance of a joint that is turned from the ends of its range."""
+    pose = BASE.pose(x)
+    there = [(j, Rotation.from_quat(np.roll(pose[3 + 4 * j.joint :][:4], -1)).as_rotvec()) for j in (TRUNK, HEAD)]
+    return min(min((joint.high - v).min(), (v - joint.low).min()) for joint, v in there)
+
+
+def test_an_upright_stylus_gives_the_base_map_to_the_last_bit():
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        x = turned(anywhere(rng), Rotation.identity())
+        np.testing.assert_array_equal(MAP.pose(x), BASE.pose(x))
+        np.testing.assert_array_equal(MAP.pose(-x * [-1, -1, -1, 1, 1, 1, 1]), BASE.pose(x))
+        jacobian = MAP.jacobian(x)
+        np.testing.assert_allclose(jacobian[:, :3], BASE.jacobian(x)[:, :3], atol=1e-14)
+
+
+def test_small_turns_turn_each_joint_by_its_gains_and_nothing_else():
+    x, small = stylus(0.05, 1.0, 0.0), np.array([2e-5, -3e-5, 1e-5])
+    change = difference(MAP.pose(turned(x, Rotation.from_rotvec(small))), MAP.pose(x))
+    free = Expressive(BASE, (ExpressiveJoint(2, (0.5, 0.3, 0.2), (-3.0,) * 3, (3.0,) * 3),))
+    np.testing.assert_allclose(change[6:9], small * TRUNK.gain, atol=1e-12)
+    np.testing.assert_allclose(np.delete(change, [6, 7, 8, 12, 13, 14]), 0.0, atol=1e-12)
+    change = difference(free.pose(turned(x, Rotation.from_rotvec(small))), free.pose(x))
+    np.testing.assert_allclose(change[9:12], small * [0.5, 0.3, 0.2], atol=1e-12)
+    np.testing.assert_allclose(np.delete(change, [9, 10, 11]), 0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_derivative_agrees_with_differences_on_the_manifold():
+    lower_leg = Composite(
+        *[(np.hstack([poses, swinging(9, len(poses) - 1)[:, 7:11]]), fps) for poses, fps in CLIPS[:3]],
+        (4,), (0.03, 0.07), [LEG],
+    )  # fmt: skip
+    upper = Expressive(lower_leg, (ExpressiveJoint(4, HEAD.gain, HEAD.low, HEAD.high),))
+    rng, step = np.random.default_rng(0), 1e-5
+    for h_map in (MAP, upper):
+        errors, largest = [], 0.0
+        for _ in range(500):
+            x = anywhere(rng)
+            jacobian = h_map.jacobian(x)
+            numeric = np.empty_like(jacobian)
+            for axis in range(6):
+                d = step * np.eye(6)[axis]
+                near = difference(h_map.pose(moved(x, d)), h_map.pose(moved(x, -d))) / (2 * step)
+                far = difference(h_map.pose(moved(x, 2 * d)), h_map.pose(moved(x, -2 * d))) / (4 * step)
+                numeric[:, axis] = (4.0 * near - far) / 3.0
+            errors.append(np.abs(numeric - jacobian).max() / (1.0 + np.abs(jacobian).max()))
+            largest = max(largest, np.abs(jacobian[:, 3:]).max())
+        assert max(errors) < 1e-6
+        assert largest > 0.5
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
+def test_twice_differentiable_along_lines_through_every_edge(seed):
+    """A turn about an axis by 0 to 360°: past the rooms' ends, into the fade, through half a turn and back."""
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    x = next(x for x in (anywhere(rng) for _ in range(1000)) if room_left(x) > 0.2)
+
+    def roughness(steps):
+        angles = np.linspace(0.0, 2.0 * np.pi, steps + 1)
+        lines = [turned(x, Rotation.from_rotvec(angle * axis)) for angle in angles]
+        poses, slopes = [MAP.pose(y) for y in lines], np.array([MAP.jacobian(y)[:, 3:] @ axis for y in lines])
+        jumps = [np.abs(difference(end, start)).max() for start, end in itertools.pairwise(poses)]
+        return max(jumps), np.abs(np.diff(slopes, axis=0)).max(), np.abs(np.diff(slopes, 2, axis=0)).max()
+
+    coarse, fine = roughness(1500), roughness(6000)
+    assert coarse[0] > 1e-3
+    # A jump would not shrink, a corner of h_* only as the step does: its second difference shrinks with the square.
+    assert fine[0] < 0.3 * coarse[0]
+    assert fine[1] < 0.3 * coarse[1]
+    assert fine[2] < 0.12 * coarse[2]
+
+
+def test_a_joint_yields_smoothly_to_the_end_of_its_range_and_never_passes_it():
+    there, low, high = 0.2, -0.5, 0.9
+    wanted = np.linspace(-30.0, 30.0, 6001)
+    passed = np.array([yielded(y, there, low, high)[0] for y in wanted])
+    assert (np.diff(passed) >= 0.0).all()
+    assert low < there + passed.min() < low + 0.03
+    assert high - 0.03 < there + passed.max() < high
+    np.testing.assert_allclose(passed[np.abs(wanted) < 0.2], wanted[np.abs(wanted) < 0.2], rtol=0.02)
+    # Also where the clip is past the end already: no room, and not turned back.
+    assert 0.0 <= yielded(1.0, 1.1, low, high)[0] < 1e-3
+
+
+def test_a_half_turn_one_way_is_the_half_turn_the_other_way():
+    turn, rates = np.empty(3), np.empty((3, 3))
+    for axis in np.random.default_rng(1).normal(size=(20, 3)):
+        vector = np.pi * axis / np.linalg.norm(axis)
+        for sign in (1.0, -1.0):
+            stylus_turn(turned(np.zeros(3), Rotation.from_rotvec(sign * (1.0 - 1e-9) * vector)), turn, rates)
+            np.testing.assert_allclose(turn, 0.0, atol=1e-15)
+            np.testing.assert_allclose(rates, 0.0, atol=1e-12)
+
+
+def test_the_compiled_entry_gives_the_same_to_the_last_bit():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        compiled, x = MAP.compiled(), anywhere(rng)
+        pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
+        units = map_units([(compiled.kind, compiled.params)])
+        evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
+        evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
+        np.testing.assert_array_equal(pose, MAP.pose(x))
+        np.testing.assert_array_equal(other, pose)
+        np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+
+
+def test_what_is_wrapped_can_be_asked_for_what_it_does_apart_from_poses():
+    base, whole = BASE.compiled(), MAP.compiled()
+    for asked in (whole, base):
+        kind, params = base_of(asked.kind, asked.params)
+        assert kind == base.kind
+        np.testing.assert_array_equal(params, base.params)
+
+
+def test_the_lap_of_the_base_goes_on():
+    memory, alone = MAP.compiled().memory, BASE.compiled().memory
+    for angle in np.linspace(0.1, 13.0, 200):
+        x = stylus(0.05, angle, 0.0)
+        tilted = turned(x, Rotation.from_rotvec([0.3, 0.2, -0.4]))
+        pose, jacobian_memory = MAP.pose(tilted, memory), memory.copy()
+        MAP.jacobian(tilted, jacobian_memory)
+        np.testing.assert_array_equal(pose[:7], BASE.pose(x, alone)[:7])
+        np.testing.assert_array_equal(memory, alone)
+        np.testing.assert_array_equal(jacobian_memory, memory)
+    assert memory.any()
+
+
+@pytest.mark.parametrize(
+    ("joints", "says"),
+    [
+        ((), "at least one joint"),
+        ((ExpressiveJoint(0, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression wants to turn 0"),
+        ((ExpressiveJoint(4, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression wants to turn 4"),
+        ((ExpressiveJoint(1, (1.0, np.nan, 1.0), (-1.0,) * 3, (1.0,) * 3),), "gains of joint 1 must be three finite"),
+        ((ExpressiveJoint(1, (1.0,) * 3, (1.0,) * 3, (1.0,) * 3),), "range of joint 1 must be three intervals"),
+    ],
+)
+def test_what_cannot_be_expressed_is_refused(joints, says):
+    with pytest.raises(ParameterError, match=says):
+        Expressive(BASE, joints)
+
+
+def test_an_expressive_map_is_not_wrapped_again():
+    with pytest.raises(ParameterError, match="give all joints to one of them"):
+        Expressive(MAP, (HEAD,))

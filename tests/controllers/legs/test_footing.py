@@ -1,0 +1,144 @@
+"""Feet that stand keep their footing: held at the points that touch, let go in the air, left alone where a clip is."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers.haptic_map.lifted import Lifted
+from controllers.legs.footing import fresh_footing, go_on, keep_footing, mixed
+from controllers.motion.lap import MEMORY
+from tests.controllers.clips_for_maps import LEG, difference, matrices, stylus, swinging, wxyz
+from tests.controllers.haptic_map.test_lifted_map import ring
+
+SOLE = LEG.points - LEG.points.mean(axis=0)
+FLAT = -float(SOLE[:, 2].min())  # height of the centre of a sole that lies flat
+TURN = 2.0 * np.pi
+
+
+def shown(path, mixture=1.0, frame=(0.0, 0.0, 0.0), angles=None):
+    """Offsets (n, 3) and places of the sole's points (n, k, 3), in the frame, of an end asked for on a path.
+
+    A row of the path: x, y, height of the lowest point, heading, roll about the foot's length.
+    """
+    footing, offsets, points = fresh_footing(1), [], []
+    angles = 0.01 * np.arange(len(path)) if angles is None else angles
+    for (x, y, z, heading, roll), angle in zip(path, angles, strict=True):
+        turn = Rotation.from_euler("zx", [heading, roll])
+        end, q = np.array([x, y, z - turn.apply(SOLE)[:, 2].min()]), wxyz(turn)
+        keep_footing(footing, 0, go_on(footing, np.mod(angle, TURN)), mixture, SOLE, 0.0, np.array(frame), end, q)
+        offsets.append(footing[3:6].copy())
+        points.append(end + SOLE @ matrices(q).T)
+    return np.array(offsets), np.array(points)
+
+
+def path(n, **ways):
+    rows = np.zeros((n, 5))
+    for k, name in enumerate(("x", "y", "z", "heading", "roll")):
+        rows[:, k] = ways.get(name, 0.0)
+    return rows
+
+
+S = np.linspace(0.0, 1.0, 200)
+DRAGGED = path(200, x=0.01 * S, y=-0.02 * S**2, heading=0.1 * S)
+
+
+@pytest.mark.parametrize("frame", [(0.0, 0.0, 0.0), (3.0, -1.0, 2.0)])
+def test_a_foot_on_the_ground_stays_where_it_came_down(frame):
+    offsets, points = shown(DRAGGED, frame=frame)
+    # Dragged by 2 cm and 6°, of which the bound on offsets lets a fiftieth through.
+    assert np.abs(points - points[0]).max() < 1e-3
+    np.testing.assert_allclose(offsets[-1, :2], -DRAGGED[-1, :2], atol=1e-3)
+
+
+def test_it_may_roll_over_its_edge():
+    # Rolled by 0.5 rad about its own length, on the spot of the points that touch: they are where they were.
+    roll = 0.5 * S
+    edge = np.array([Rotation.from_rotvec([r, 0.0, 0.0]).apply(SOLE[2]) for r in roll])
+    rolling = path(200, x=-edge[:, 0], y=-edge[:, 1], roll=roll)
+    offsets, points = shown(rolling[20:])
+    assert np.abs(offsets).max() < 1e-3
+    assert np.abs(points[:, 2, :2] - points[0, 2, :2]).max() < 1e-3
+
+
+def test_a_clip_alone_and_a_foot_in_the_air_are_left_as_they_are_asked_for():
+    for mixture, height in ((0.0, 0.0), (1.0, 0.01)):
+        offsets, _ = shown(DRAGGED + path(200, z=height), mixture)
+        np.testing.assert_array_equal(offsets, 0.0)
+
+
+def test_weights_of_one_clip_are_no_mixture():
+    assert mixed(np.array([1.0, 0.0, 0.0])) == mixed(np.array([0.99, 0.01])) == 0.0
+    assert mixed(np.array([0.5, 0.5])) == mixed(np.array([0.7, 0.3])) == 1.0
+    assert 0.0 < mixed(np.array([0.9, 0.1])) < 1.0
+
+
+def test_in_the_air_what_was_held_is_made_up_for_and_comes_again_on_the_way_back():
+    lifted = path(200, x=0.01, z=0.02)
+    there = np.concatenate([path(200, x=0.01 * S), lifted])
+    angles = np.concatenate([np.zeros(200), 0.004 * np.arange(200)])
+    offsets, points = shown(there, angles=angles)
+    held = offsets[199, 0]
+    assert held == pytest.approx(-0.01, rel=0.02)
+    np.testing.assert_allclose(offsets[200:, 0], held * np.exp(-5.0 * angles[200:]), rtol=1e-9)
+    assert abs(points[-1, 0, 0] - points[0, 0, 0] - 0.01) < 3e-4
+    back = np.concatenate([angles, angles[-1] - 0.004 * np.arange(1, 30)])
+    offsets, _ = shown(np.concatenate([there, lifted[:29]]), angles=back)
+    np.testing.assert_allclose(offsets[-1], offsets[-59], rtol=1e-9)
+
+
+def test_a_hand_that_turned_goes_on_the_other_way():
+    footing = fresh_footing(1)
+    assert go_on(footing, 1.0) == 0.0
+    assert go_on(footing, 1.1) == pytest.approx(0.1)
+    assert go_on(footing, 1.0) == pytest.approx(-0.1)
+    assert go_on(footing, 0.9) == pytest.approx(-0.1)
+    assert go_on(footing, 0.8) == pytest.approx(0.1)
+    # Over the seam.
+    assert go_on(footing, TURN - 0.1) == pytest.approx(0.9)
+
+
+def test_differences_to_either_side_are_velocity_and_acceleration():
+    """As the figure's reference takes them: from one memory a moment on and a moment back, while a foot comes down."""
+
+    def asked(t):
+        return 0.02 * np.sin(3.0 * t), 0.01 * t**2, 0.0045 - 0.004 * t, 0.2 * t, 0.0
+
+    def step(footing, t):
+        x, y, z, heading, roll = asked(t)
+        turn = Rotation.from_euler("zx", [heading, roll])
+        end, q = np.array([x, y, z - turn.apply(SOLE)[:, 2].min()]), wxyz(turn)
+        keep_footing(footing, 0, go_on(footing, 1.0 + t), 1.0, SOLE, 0.0, np.zeros(3), end, q)
+        return end
+
+    def measured(tick):
+        footing, ends = fresh_footing(1), []
+        for k in range(-round(0.08 / tick), 1):
+            ends.append(step(footing, tick * k))
+        after, before = (step(footing.copy(), sign * tick) for sign in (1.0, -1.0))
+        return (after - before) / (2.0 * tick), (after + before - 2.0 * ends[-1]) / tick**2
+
+    coarse, fine = measured(2e-3), measured(2.5e-4)
+    for a, b in zip(coarse, fine, strict=True):
+        assert np.abs(b).max() > 0.01
+        np.testing.assert_allclose(a, b, atol=0.02 * np.abs(b).max())
+
+
+CLIPS = [(swinging(k, 120, travel=0.4 * k), 30.0) for k in (1, 2, 3)]
+MAP = Lifted(CLIPS, [True] * 3, [TURN * np.linspace(0.0, 1.0, 121)] * 3, ring(3), [LEG])
+
+
+@pytest.mark.slow
+def test_the_derivative_is_that_at_a_given_offset():
+    rng, step = np.random.default_rng(3), 1e-6
+    for r, angle, z in rng.uniform([0.035, 0.1, -0.015], [0.065, 6.1, 0.015], (40, 3)):
+        memory = MAP.compiled().memory
+        memory[MEMORY + 3 : MEMORY + 6] = rng.uniform(-0.04, 0.04, 3)
+        x = stylus(r, angle, z)
+        jacobian = MAP.jacobian(x, memory.copy())
+        assert np.abs(difference(MAP.pose(x, memory.copy()), MAP.pose(x))).max() > 1e-3
+        for axis in range(3):
+            near, far = (
+                difference(MAP.pose(x + d, memory.copy()), MAP.pose(x - d, memory.copy())) / (2.0 * k * step)
+                for k, d in ((k, k * step * np.eye(7)[axis]) for k in (1, 2))
+            )
+            assert np.abs((4.0 * near - far) / 3.0 - jacobian[:, axis]).max() < 1e-6 * np.abs(jacobian).max()

@@ -1,0 +1,111 @@
+"""A limb that steps: where its joints would leap its foot gives way, and elsewhere it is where it is asked for."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from controllers.legs.footsteps import FLOOR, STEP, limb_end
+from controllers.legs.stepping_limbs import put_limb, shortfall
+from controllers.rotations import multiply
+from experiments.fitting.figure_legs import packed_legs
+from models.humanoid.skeleton import figure_model
+from models.mocap.motion.clip import pose_difference
+
+FIGURE = figure_model()
+LEG = packed_legs(FIGURE)[0]
+KNEE = FIGURE.joint("left_knee").dofadr[0]
+LENGTH = sum(np.linalg.norm(LEG[first : first + 3]) for first in (6, 9))
+STANDING = np.zeros(STEP)
+
+
+def _pose() -> np.ndarray:
+    """Knees a little bent, as clips have them."""
+    pose = FIGURE.qpos0.copy()
+    half = 0.4
+    for joint, angle in (("left_hip", -half), ("left_knee", 2 * half), ("left_ankle", -half)):
+        start = FIGURE.joint(joint).qposadr[0]
+        pose[start : start + 4] = [np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]
+    return pose
+
+
+def _end(pose: np.ndarray) -> np.ndarray:
+    end = np.empty(7)
+    limb_end(LEG, pose, end)
+    return end
+
+
+def _put(end: np.ndarray, share: float, step: np.ndarray = STANDING) -> np.ndarray:
+    pose = _pose()
+    put_limb(LEG, step, pose, end.copy(), share)
+    return pose
+
+
+def _leaps(ends: np.ndarray, share: float, step: np.ndarray = STANDING) -> float:
+    """Largest second difference of a joint along a path of the foot, over the time step of 1 ms [rad/s]."""
+    poses = np.array([_put(end, share, step) for end in ends])
+    return float(np.abs(np.diff(pose_difference(poses[:-1], poses[1:]), axis=0)).max() / 1e-3)
+
+
+def _path(start: np.ndarray, velocity: np.ndarray, seconds: float) -> np.ndarray:
+    ends = np.tile(start, (round(seconds / 1e-3), 1))
+    ends[:, :3] += np.arange(len(ends))[:, None] * 1e-3 * velocity
+    return ends
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_foot_within_easy_reach_is_where_it_is_asked_for(share: float) -> None:
+    end = _end(_pose())
+    end[:3] += [0.1, 0.02, 0.1]
+    np.testing.assert_allclose(_end(_put(end, share))[:3], end[:3], atol=1e-9)
+
+
+def test_a_foot_that_is_left_behind_does_not_snap_the_knee_straight() -> None:
+    # A root that goes on at 3 m/s, from a leg within reach to one far beyond it.
+    ends = _path(_end(_pose()), np.array([-3.0, 0.0, 0.0]), 0.3)
+    assert _leaps(ends, 1.0) < 2.0
+    assert _leaps(ends, 0.0) > 10.0
+    bent = [np.linalg.norm(pose_difference(FIGURE.qpos0, _put(end, 1.0))[KNEE : KNEE + 3]) for end in ends]
+    assert min(bent) > 0.2
+
+
+def test_a_foot_that_passes_its_hip_closely_goes_by_below_it() -> None:
+    hip = np.array([0.0, LEG[4], _pose()[2] + LEG[5]])
+    start = _end(_pose())
+    start[:3] = hip + np.array([-0.4, 0.02, -0.12])
+    ends = _path(start, np.array([4.0, 0.0, 0.0]), 0.2)
+    assert _leaps(ends, 1.0) < 0.5 * _leaps(ends, 0.0)
+    ankles = np.array([_end(_put(end, 1.0))[:3] for end in ends])
+    assert np.linalg.norm(ankles - hip, axis=1).min() > 0.2 * LENGTH
+
+
+def test_a_foot_in_mid_swing_that_turns_right_round_against_its_leg_does_not_flip() -> None:
+    start = _end(_pose())
+    start[2] += 0.3
+    ends = np.tile(start, (200, 1))
+    for end, turn in zip(ends, np.linspace(0.0, 1.8 * np.pi, len(ends)), strict=True):
+        end[3:] = multiply(np.cos(0.5 * turn), 0.0, np.sin(0.5 * turn), 0.0, *end[3:])
+    low = STANDING.copy()
+    # The control: the same turn of a foot near the floor.
+    low[FLOOR] = start[2]
+    assert _leaps(ends, 1.0) < 30.0
+    assert _leaps(ends, 1.0, low) > 100.0
+
+
+def test_the_root_has_to_go_down_by_what_the_leg_is_too_short() -> None:
+    pose, step = _pose(), STANDING.copy()
+    end = _end(pose)
+    data = mujoco.MjData(FIGURE)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(FIGURE, data)
+    hip, ankle = (data.xanchor[FIGURE.joint(name).id] for name in ("left_hip", "left_ankle"))
+    end[0] += 0.3
+    end[2] -= 0.05
+    step[FLOOR] = end[2]
+    line = ankle - hip + [0.3, 0.0, -0.05]
+    expected = -line[2] - np.sqrt((0.95 * LENGTH) ** 2 - line[0] ** 2 - line[1] ** 2)
+    assert expected > 0.03
+    assert shortfall(LEG, step, pose, end) == pytest.approx(expected, abs=0.01)
+    # A foot in the air does not ask for it, nor one that is within reach.
+    step[FLOOR] = end[2] - 0.3
+    assert shortfall(LEG, step, pose, end) == 0.0
+    assert shortfall(LEG, STANDING, pose, _end(pose)) == 0.0

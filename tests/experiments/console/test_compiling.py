@@ -1,0 +1,130 @@
+"""Compilation before a run: what it needs is known before it is wired, and only what is missing is compiled."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from numba import typeof, types
+from rich.console import Console
+
+from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.words import run_config
+from experiments.console.compiling import compile_once
+from experiments.setups.robot_arm import wire_arm
+from experiments.setups.wiring import wire
+from sim.compilation import side_by_side
+from sim.compilation.unit_workers import compile_units, missing_units
+from sim.compilation.units import Unit, unit_function
+from sim.errors import SimError
+
+TOYS = Path(__file__).parents[2] / "sim" / "compilation"
+
+
+class _Told(Exception):
+    """Stops a wiring when it has said what it needs."""
+
+
+def _names(units: tuple[Unit, ...]) -> list[str]:
+    return [unit.name for unit in units]
+
+
+def _stop(units: tuple[Unit, ...]) -> None:
+    raise _Told(units)
+
+
+@pytest.fixture
+def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TOYS), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.syspath_prepend(str(TOYS))
+    unit_function.cache_clear()
+    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # compiled for another folder
+    import toy_kernels  # pyright: ignore[reportMissingImports]
+
+    vector = types.Array(types.float64, 1, "C")
+    spring = typeof(toy_kernels.Spring(1.0, 0.0))
+    return (
+        Unit.of(toy_kernels.other, types.float64, vector),
+        Unit.of(toy_kernels.force, spring, types.float64, vector),
+    )
+
+
+def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
+    assert missing_units((*toys, *toys)) == (toys[1], toys[0])
+    compile_once(Console(), toys)
+    told = capsys.readouterr().out
+    assert "Compiling" in told
+    assert "2 of 2" in told
+    assert missing_units(toys) == ()
+    compile_once(Console(), toys)
+    assert not capsys.readouterr().out
+
+
+def test_only_what_is_missing_is_compiled(toys):
+    done: list[Unit] = []
+    toys[0].load()
+    compile_units(toys, done.append)
+    assert done == [toys[1]]
+
+
+def test_what_cannot_be_compiled_is_left_to_the_run(toys):
+    done: list[Unit] = []
+    wrong = Unit(toys[0].module, "other", (types.float64, types.float64))
+    compile_units((wrong, toys[1]), done.append)
+    assert done == [toys[1]]
+    assert missing_units((wrong, toys[1])) == (wrong,)
+
+
+def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
+    for unit in toys:
+        unit.load()
+    monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
+    compile_units(toys)
+    assert missing_units(toys) == ()
+
+
+def test_a_unit_is_a_function_of_a_module():
+    with pytest.raises(SimError, match="no_such"):
+        unit_function("sim.world.plant", "no_such")
+    assert "toy_kernels" not in sys.modules or hasattr(sys.modules["toy_kernels"], "force")
+
+
+def test_a_robot_arm_says_what_it_needs_before_it_is_made():
+    with pytest.raises(_Told) as told:
+        wire_arm(ArmConfig(), _stop)
+    assert _names(told.value.args[0]) == [
+        "run_block", "update_reference", "robot_torque", "robot_arm_map", "follow_wrench", "_poses_along",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("config", "more"),
+    [
+        (run_config(), ["cylindrical_map", "follow_wrench", "_poses_along"]),
+        (
+            run_config(mode="bunny", expressive=True),
+            ["express", "cylindrical_map", "bunny_wrench"],
+        ),
+        (run_config(mode="rivers", map="rivers"), ["river_clips_map", "_derivative", "_reference_along"]),
+        (run_config(mode="lead"), ["led_map", "leading_wrench", "_poses_along"]),
+        (run_config(mode="stretch"), ["stretchy_wrench", "stood"]),
+    ],
+    ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
+)
+def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: list[str]):
+    with pytest.raises(_Told) as told:
+        wire(config, ready=_stop)
+    names = _names(told.value.args[0])
+    update = "update_river_reference" if config.mode.kind == "rivers" else "update_reference"
+    assert names[:3] == ["run_block", update, "figure_torque"]
+    assert set(more) <= set(names)
+
+
+def test_runs_of_the_figure_share_the_loop_and_all_that_drives_it():
+    parts: list[tuple[Unit, ...]] = []
+    for config in (run_config(), run_config(mode="bunny"), run_config(mode="lead")):
+        with pytest.raises(_Told) as told:
+            wire(config, ready=_stop)
+        parts.append(told.value.args[0][:3])
+    assert parts[0] == parts[1] == parts[2]

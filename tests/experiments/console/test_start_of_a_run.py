@@ -1,0 +1,70 @@
+"""A run begins soon: it imports nothing that it does not need, and compiles nothing in its own process."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifted import Lifted
+from experiments.files.map_files import save_map
+from experiments.fitting.figure_legs import figure_legs
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
+from tests.experiments.own_process import RUNS, TELLS, compiled, process
+
+HEAVY = ("matplotlib", "casadi", "viser", "trimesh", "scipy.stats", "scipy.signal", "scipy.integrate")
+
+_IMPORTS = f"""
+import sys
+import experiments.cli, experiments.runs.run
+print(*(name for name in {HEAVY} if name in sys.modules))
+"""
+
+_COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
+
+
+def test_what_a_run_does_not_need_is_not_imported_before_it() -> None:
+    assert not process(_IMPORTS).stdout.split()
+
+
+def test_a_command_that_is_named_is_the_only_one_imported() -> None:
+    code = "import sys; from experiments.cli import parsed; parsed(['track', 'walk']); print(*sys.modules)"
+    found = {name for name in process(code).stdout.split() if name.startswith("experiments.commands.")}
+    assert found == {"experiments.commands.track"}
+
+
+def test_what_a_process_compiles_is_told() -> None:
+    assert "compiles smooth_step" in compiled(process(TELLS + _COMPILES))
+
+
+@pytest.fixture(scope="module")
+def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = [embedded(name) for name in ("cheer", "angry")]
+    sites = np.tile([[0.05, 0.0], [0.06, 0.0]], (64, 1, 1))
+    angles = [np.linspace(0.0, 2.0 * np.pi, clip.n_frames) for clip in clips]
+    motions = [(clip.poses, clip.fps) for clip in clips]
+    path = tmp_path_factory.mktemp("start") / "map.npz"
+    save_map(Lifted(motions, [True, True], angles, sites, figure_legs(figure_model()), ("cheer", "angry")), path)
+    return path
+
+
+@pytest.mark.slow
+def test_a_robot_arm_compiles_nothing_in_the_process_of_its_run(tmp_path: Path) -> None:
+    ran = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    assert "The stylus ran" in ran.stdout
+    assert compiled(ran) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls")],
+    ids=["cylinder", "lifted", "expressive"],
+)
+def test_a_run_compiles_nothing_in_its_own_process(
+    arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path
+) -> None:
+    given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
+    ran = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
+    assert "The stylus ran" in ran.stdout
+    assert compiled(ran) == []

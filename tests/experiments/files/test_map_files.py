@@ -1,0 +1,195 @@
+"""Maps in files: they come back to the last bit, a file that is none is refused, and a run takes its map from one."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.river import River
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.lifted import Lifted
+from experiments.cli import main
+from experiments.config.part import to_dict
+from experiments.config.words import run_config
+from experiments.files.archives import read_archive, write_archive
+from experiments.files.field_files import save_field
+from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
+from experiments.fitting.figure_legs import figure_legs
+from experiments.results.folder import RECORDING
+from experiments.setups.wiring import wire
+from models.mocap.library import embedded
+from models.world.scene import SceneConfig
+from sim.errors import SimError
+from sim.recording.recorder import Group, Recorder
+from sim.world.world import World
+
+R, Z = (0.03, 0.06), (-0.02, 0.02)
+
+
+@cache
+def clips():
+    return [(clip.poses, clip.fps) for clip in map(embedded, ("walk", "angry", "jump"))]
+
+
+@cache
+def legs():
+    return figure_legs(World(SceneConfig()).figure)
+
+
+@cache
+def lifted():
+    lap = np.arange(16)[:, None] * 2.0 * np.pi / 16
+    around = np.arange(3) * 2.0 * np.pi / 3 + 0.2 * np.sin(lap)
+    sites = np.stack([0.045 + 0.01 * np.cos(around), 0.01 * np.sin(around)], axis=-1)
+    angles = [np.linspace(0.0, 2.0 * np.pi, len(poses)) for poses, _ in clips()[:2]]
+    angles.append(np.linspace(0.2, 5.5, len(clips()[2][0])))
+    return Lifted(clips(), [True, True, False], angles, sites, legs(), ("walk", "a/b", "../jump"))
+
+
+def swaying():
+    h_map = Cylindrical([*clips(), clips()[0]], R, Z, legs())
+    return h_map.with_sway(np.random.default_rng(3).normal(scale=0.01, size=(24, len(h_map.mixtures), 2)))
+
+
+def apart():
+    return Composite(*clips(), (1, 2, 3), R, legs(), apart=True).with_share(0.5)
+
+
+def upper_body():
+    return Cylindrical([*clips(), clips()[0]], R, Z, legs(), upper=(3, 4), legs_of=2).with_share(0.25)
+
+
+@pytest.mark.parametrize("made", [swaying, apart, lifted, upper_body])
+def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
+    haptic_map, path = made(), tmp_path / "map.npz"
+    save_map(haptic_map, path)
+    again = load_map(path)
+    assert type(again) is type(haptic_map)
+    assert again.names == haptic_map.names
+    np.testing.assert_array_equal(again.compiled().params, haptic_map.compiled().params)
+    for x in np.random.default_rng(0).uniform([0.02, -0.04, -0.03], [0.05, 0.04, 0.03], (20, 3)):
+        stylus = np.append(x, [1.0, 0.0, 0.0, 0.0])
+        np.testing.assert_array_equal(again.pose(stylus), haptic_map.pose(stylus))
+
+
+def test_a_damaged_file_is_refused_by_name(tmp_path):
+    whole, damaged = tmp_path / "whole.npz", tmp_path / "damaged.npz"
+    save_map(lifted(), whole)
+    data, rng = whole.read_bytes(), np.random.default_rng(1)
+    for _ in range(40):
+        cut = int(rng.integers(len(data)))
+        damaged.write_bytes(data[:cut])
+        with pytest.raises(SimError, match=r"damaged\.npz"):
+            load_map(damaged)
+    for _ in range(40):
+        at = int(rng.integers(len(data) - 64))
+        flipped = bytearray(data)
+        flipped[at : at + 64] = rng.bytes(64)
+        damaged.write_bytes(bytes(flipped))
+        # Padding of the archive may be anything; what is read is whole, or is refused.
+        try:
+            again = load_map(damaged)
+        except SimError:
+            continue
+        np.testing.assert_array_equal(again.compiled().params, lifted().compiled().params)
+
+
+def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
+    path = tmp_path / "other.npz"
+    save_field(RiverBundle((River(Trajectory.circle(0.05, 4.0)),), ("one",)), path)
+    with pytest.raises(SimError, match=r"other\.npz: holds a RiverBundle; expected a map: one of Cylindrical, Comp"):
+        load_map(path)
+    np.savez(path, a=np.zeros(3))
+    with pytest.raises(SimError, match="is no file of a map"):
+        load_map(path)
+    np.save(path.with_suffix(".npy"), np.zeros(3))
+    path.with_suffix(".npy").rename(path)
+    with pytest.raises(SimError, match="is no file of a map"):
+        load_map(path)
+    what = r"missing\.npz: cannot be read \(No such file or directory\); expected the \.npz file of a map"
+    with pytest.raises(SimError, match=what):
+        load_map(tmp_path / "missing.npz")
+
+
+@pytest.mark.parametrize("key", ["clip/walk/fps", "closed/a/b", "sites", "limb/1/axis", "margin", "angles/../jump"])
+def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
+    path, arrays = tmp_path / "map.npz", lifted().arrays()
+    del arrays[key]
+    write_archive(path, "Lifted", arrays)
+    with pytest.raises(SimError, match=f"the map lacks '{key}'"):
+        load_map(path)
+    arrays[key] = np.zeros((1, 2, 3, 4))
+    write_archive(path, "Lifted", arrays)
+    with pytest.raises(SimError, match=r"of the map has shape \(1, 2, 3, 4\)"):
+        load_map(path)
+    arrays[key] = np.array(["words"])
+    write_archive(path, "Lifted", arrays)
+    with pytest.raises(SimError, match="does not hold numbers"):
+        load_map(path)
+
+
+def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "map.npz"
+    monkeypatch.setattr("experiments.files.archives.VERSION", 2)
+    write_archive(path, "Lifted", {})
+    monkeypatch.undo()
+    with pytest.raises(SimError, match="of version 2 of the format, this program reads 1"):
+        read_archive(path, ("Lifted",), "map")
+
+
+def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
+    path = tmp_path / "map.npz"
+    save_map(lifted(), path)
+    session = wire(run_config(map=str(path), seconds=1.0))
+    assert [clip.name for clip in session.clips] == ["walk", "a/b", "../jump"]
+    np.testing.assert_array_equal(session.haptic_map.compiled().params, lifted().compiled().params)
+    assert any("clips are those of the map: walk, a/b" in remark for remark in session.remarks)
+
+
+def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
+    path = tmp_path / "map.npz"
+    small = [(np.ascontiguousarray(poses[:, :19]), fps) for poses, fps in clips()]
+    save_map(Cylindrical([*small, small[0]], R, Z), path)
+    with pytest.raises(SimError, match="its poses have 19 numbers, the figure's have 75"):
+        load_figure_map(path)
+
+
+@pytest.mark.slow
+def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_path, capsys):
+    path = tmp_path / "map.npz"
+    save_map(lifted(), path)
+    command = ["certify", "--map", str(path), "--no-hand", "--json", "--out", str(tmp_path)]
+    assert main(command) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {name for name in told if name.startswith("stability")} == {
+        "stability", "stability_a/b", "stability_../jump",
+    }  # fmt: skip
+    assert told["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
+    assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
+    assert main([*command, "--curve", "a/b", "--verify", str(tmp_path / "certificate.json")]) == 1
+    assert "changed: curve;" in capsys.readouterr().err
+    assert main([*command, "--curve", "hop"]) == 2
+
+
+def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_path, capsys):
+    path, folder = tmp_path / "map.npz", tmp_path / "run"
+    folder.mkdir()
+    save_map(lifted(), path)
+    config = run_config(map=str(path), seconds=1.0)
+    static = wire(config).static()
+    groups = {"ticks": Group(1000.0, {"t": ()}), "frames": Group(100.0, {"t": ()})}
+    with Recorder(folder / RECORDING, to_dict(config), 1, groups, static) as recorder:
+        recorder.append("ticks", {"t": np.zeros(1)})
+    save_map(swaying(), path)
+    assert main(["reproduce", str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert f"{path}: the map has changed since the run was recorded" in told
+    assert map_digest(path)[:12] in told
+    assert str(static["map_sha256"])[:12] in told
+    path.unlink()
+    assert main(["reproduce", str(folder)]) == 2
+    assert "No such file" in capsys.readouterr().err

@@ -1,0 +1,292 @@
+"""What a person meets who runs a device: permits, one line where something is wrong, a folder with what happened."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.report import (
+    Certificate,
+    CertificateError,
+    ChangedInputs,
+    Verdict,
+    hash_of,
+    hashes_of,
+)
+from controllers.safety.arming import TRANSITIONS, mermaid
+from experiments.certify.certified_field import certificate_inputs, certified_options
+from experiments.cli import main
+from experiments.config.modes import Follow
+from experiments.config.run_config import Clock, Phantom, RunConfig
+from experiments.files.certificate_files import OPTIONS
+from experiments.files.device_files import (
+    Calibration,
+    calibrated_json,
+    identified_json,
+    linkage_from,
+    linkage_of,
+    read_device_file,
+    save_device,
+)
+from experiments.files.json_text import json_text
+from experiments.hardware.calibrate import still_readings
+from experiments.hardware.permit import HAND_PUSH, check_device, verified
+from experiments.setups.defaults import resolved
+from models.world.scene import SceneConfig
+from sim.devices.driver import DeviceIdentity
+from sim.errors import SimError
+from sim.hardware.emulated import EmulatedPhantom
+from sim.hardware.identification import NAMES, Identified
+from sim.recording.recording import Recording
+
+KNOWN = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True)
+
+
+def found(**values: float) -> Identified:
+    return Identified(np.array([values.get(name, 1e-3) for name in NAMES]), np.full(len(NAMES), 1e-4), 1000, 0.001)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["hardware", *arguments]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    return said.err
+
+
+def test_nobody_at_the_terminal_and_no_arm_is_refused(tmp_path: Path, capsys) -> None:
+    assert "expected --arm" in refused(capsys, "run", "--out", str(tmp_path / "run"))
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
+    said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
+    assert "expected --certificate" in said
+
+
+@pytest.mark.parametrize(
+    "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
+)
+def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
+    said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
+    assert limit[0] in said
+    assert "on a real device" in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_holds_a_run_is_kept(tmp_path: Path, capsys) -> None:
+    (tmp_path / "run.h5").write_bytes(b"")
+    assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
+
+
+def test_a_certificate_of_something_else_arms_nothing(tmp_path: Path) -> None:
+    with pytest.raises(CertificateError, match="expected a certificate"):
+        verified(tmp_path / "certificate.json", RunConfig(), 0.0)
+    (tmp_path / "certificate.json").write_text(json.dumps({"inputs": "0" * 16, "parts": {}}))
+    with pytest.raises(CertificateError, match="certify again"):
+        verified(tmp_path, RunConfig(), 0.0)
+
+
+def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: Path, monkeypatch) -> None:
+    for outcome, says in (("unknown", "stability is unknown"), ("certified", "")):
+        certificate = Certificate({"stability": Verdict(outcome, "because")}, "0" * 16)
+        monkeypatch.setattr("experiments.hardware.permit.verify_certificate", lambda file, inputs, c=certificate: c)
+        if says:
+            with pytest.raises(SimError, match=says):
+                verified(tmp_path, RunConfig(), 0.0)
+        else:
+            assert verified(tmp_path, RunConfig(), 0.0) is certificate
+    save_device(identified_json(found(delay=8e-4), [], {}), tmp_path / "device.json")
+    config = RunConfig(device=Phantom(device_file=str(tmp_path / "device.json")))
+    with pytest.raises(SimError, match=r"a delay of 0\.0008 s"):
+        verified(tmp_path, config, 0.0)
+    assert verified(tmp_path, config, 1e-3)
+
+
+def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog_is_announced() -> None:
+    assert check_device(KNOWN, None) == []
+    assert "no watchdog" in check_device(KNOWN._replace(watchdog=False), None)[0]
+    assert "no Phantom by build" in check_device(KNOWN._replace(own_weight=True), None)[0]
+    assert check_device(KNOWN._replace(own_weight=True), None, identified=True) == []
+    with pytest.raises(SimError, match="not calibrated"):
+        check_device(KNOWN._replace(calibrated=False), None)
+    with pytest.raises(SimError, match="no motors"):
+        check_device(KNOWN._replace(forces=False), None)
+
+
+def test_a_calibration_is_of_one_device_and_outlives_no_power_up_of_encoders_that_forget() -> None:
+    forgets = KNOWN._replace(calibrated=False, serial="7", power_up=3)
+    assert check_device(forgets, Calibration("arm", "7", 3)) == []
+    assert check_device(forgets._replace(calibrated=True, power_up=4), Calibration("arm", "7", 3)) == []
+    with pytest.raises(SimError, match="calibrated before the device was switched off"):
+        check_device(forgets._replace(power_up=4), Calibration("arm", "7", 3))
+    with pytest.raises(SimError, match="is calibrated for arm 8, this is arm 7"):
+        check_device(forgets, Calibration("arm", "8", 3))
+
+
+def test_a_device_file_comes_back_as_it_was_and_changes_simulation_and_certificate(tmp_path: Path) -> None:
+    file = tmp_path / "device.json"
+    save_device(identified_json(found(coulomb2=0.02, offset3=-0.01, viscous1=-1e-6), ["a"], {}), file)
+    linkage = linkage_from(read_device_file(file))
+    assert (linkage.coulomb[1], linkage.offset, linkage.viscous[0]) == (0.02, (0.0, 1e-3, -0.01), 0.0)
+    config = RunConfig(device=Phantom(device_file=str(file)))
+    assert linkage_of(config.device) == linkage
+    plain = certificate_inputs(RunConfig(), 0.0, HandRange(), 1.0)
+    assert certificate_inputs(config, 0.0, HandRange(), 1.0)["device"] != plain["device"]
+
+
+def test_identify_and_calibrate_leave_in_a_device_file_what_the_other_found(tmp_path: Path) -> None:
+    calibrated = calibrated_json([0.01, -0.02, 0.03], [1e-4] * 3, KNOWN, {})
+    both = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
+    assert linkage_from(both).offset == pytest.approx((0.01, -0.019, 0.028))
+    assert both["calibration"] == {"name": "arm", "serial": "", "power_up": 0}
+    again = calibrated_json([0.0, 0.0, 0.5], [1e-4] * 3, KNOWN, both)
+    assert linkage_from(again).offset == (0.0, 0.0, 0.5)
+    assert linkage_from(again).coulomb == linkage_from(both).coulomb
+    save_device(again, tmp_path / "device.json")
+    assert read_device_file(tmp_path / "device.json") == again
+    config = RunConfig(device=Phantom(device_file=str(tmp_path / "device.json")))
+    save_device(both, tmp_path / "other.json")
+    other = RunConfig(device=Phantom(device_file=str(tmp_path / "other.json")))
+    of, of_other = (certificate_inputs(c, 0.0, HandRange(), 1.0)["device"] for c in (config, other))
+    assert of == of_other  # where the zero is changes no verdict
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [({"mode": Follow(stiffness=400.0)}, r"certifies another field or device: stiffness 300.0 \(here 400.0\)"),
+     ({"clock": Clock(servo_period=0.002)}, r"servo_period 0.001 \(here 0.002\)"),
+     ({"device": Phantom(cutoff=90.0)}, r"cutoff 150.0 \(here 90.0\)")],
+)  # fmt: skip
+def test_a_certificate_of_another_field_says_which_option_differs(tmp_path: Path, changed, says) -> None:
+    config = resolved(RunConfig())
+    inputs = certificate_inputs(config, 0.0, HandRange(), HAND_PUSH)
+    certificate = Certificate({"stability": Verdict("certified", "it is")}, hash_of(inputs), hashes_of(inputs))
+    (tmp_path / "certificate.json").write_text(json.dumps(certificate.to_json()))
+    (tmp_path / OPTIONS).write_text(json_text(certified_options(config, 0.0, HandRange(), HAND_PUSH)))
+    assert verified(tmp_path, config, 0.0).inputs == certificate.inputs
+    with pytest.raises(ChangedInputs, match=says) as refused:
+        verified(tmp_path, resolved(replace(RunConfig(), **changed)), 0.0)
+    assert "\n" not in str(refused.value)
+
+
+def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_said(tmp_path: Path, capsys) -> None:
+    hidden = {"format": "hvf-device-1", "offset": {"value": [0.02, -0.03, 0.015]}}
+    file, other = tmp_path / "device.json", tmp_path / "hidden.json"
+    save_device(hidden, other)
+    save_device({"format": "hvf-device-1", "delay": {"value": [1e-4], "margin": [1e-5]}}, file)
+    arguments = ["calibrate", "--emulate", str(other), "--out", str(file), "--seconds", "0.2"]
+    assert main(["hardware", *arguments, "--pose", "0.1", "-0.2", "0.3"]) == 0
+    told = read_device_file(file)
+    margin = np.array(told["offset"]["margin"])
+    assert np.all(np.abs(np.array(told["offset"]["value"]) - [0.02, -0.03, 0.015]) <= margin)
+    assert margin.max() < 5e-4
+    assert told["delay"]["value"] == [1e-4]
+    assert told["calibration"]["name"] == "emulated Phantom"
+    assert "--overwrite" in refused(capsys, *arguments)
+    capsys.readouterr()
+    assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == read_device_file(file)
+
+
+def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
+    device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)
+    for _ in range(50):  # it falls
+        device.write(np.zeros(3), False)
+    with pytest.raises(SimError, match="hold the stylus still"):
+        still_readings(device, 0.3)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", '{"format": "other"}', '{"format": "hvf-device-1", "coulomb": 3}',
+     '{"format": "hvf-device-1", "offset": {"value": [NaN, 0, 0]}}',
+     '{"format": "hvf-device-1", "offset": {"value": [1e300, 0, 0]}}',
+     '{"format": "hvf-device-1", "viscous": {"value": [Infinity, 0, 0]}}',
+     '{"format": "hvf-device-1", "delay": {"value": [NaN]}}'],
+)  # fmt: skip
+def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "device.json").write_text(text)
+    with pytest.raises(SimError, match="expected what hvf hardware identify or calibrate writes"):
+        read_device_file(tmp_path / "device.json")
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [('{"format": "hvf-device-1", "delay": {"value": [0.5]}}', "a delay of 0.5 s; expected at most"),
+     ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
+)  # fmt: skip
+def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_was(
+    tmp_path: Path, capsys, content, says
+) -> None:
+    file, kept = tmp_path / "device.json", tmp_path / "run" / "kept"
+    kept.parent.mkdir()
+    kept.write_text("")
+    if content is not None:
+        file.write_text(content)
+    assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
+    assert kept.exists()
+
+
+def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> None:
+    assert "expected folders" in refused(capsys, "identify", "--out", str(tmp_path / "device.json"))
+    (tmp_path / "device.json").write_text("{}")
+    assert "--overwrite" in refused(capsys, "identify", str(tmp_path), "--out", str(tmp_path / "device.json"))
+
+
+def test_the_diagram_of_the_documents_is_the_table() -> None:
+    picture = (Path(__file__).parents[3] / "docs" / "pictures" / "gate-states.svg").read_text(encoding="utf-8")
+    shown = {edge.replace("&gt;", ">") for edge in re.findall(r'data-edge="([^"]*)"', picture)}
+    assert shown == {line.strip() for line in mermaid().splitlines() if "-->" in line}
+    assert len(shown) == len(TRANSITIONS) + 1
+
+
+@pytest.mark.processes
+def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tmp_path: Path, capsys) -> None:
+    out = tmp_path / "run"
+    arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",
+                 "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
+    for _ in range(3):  # a machine that is too busy for the device is no failure of ours
+        code = main([*arguments, "--overwrite"])
+        said = capsys.readouterr().out
+        if "no new reading" not in said:
+            break
+    assert code == 0, said
+    assert "mm RMS from the curve" in said
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["ticks"] > 500
+    assert summary["active"] > 1.0
+    assert summary["recorded"] == summary["ticks"]
+    with Recording(out / "run.h5") as recording:
+        assert recording.summary is not None
+        assert recording.channel("ticks", "distance")[-100:].max() < 5e-3
+
+
+@pytest.mark.processes
+def test_hidden_numbers_are_calibrated_recorded_and_identified_from_the_command_line(
+    tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hidden = {
+        "coulomb": [0.012, 0.009, 0.011], "viscous": [0.001, 0.0012, 0.0009], "inertia": [3e-4, 1e-4, 8e-5],
+        "delay": [5e-4], "offset": [0.02, -0.015, 0.01],
+    }  # fmt: skip
+    content = {"format": "hvf-device-1"} | {name: {"value": value} for name, value in hidden.items()}
+    save_device(content, Path("hidden.json"))
+    run = ("run", "--emulate", "hidden.json", "--arm", "--no-dead-man", "--wave", "0.02", "--small", "2", "--late", "9",
+           "--seconds", "14", "--overwrite")  # fmt: skip
+    assert main(["hardware", *run, "--out", "runs/4"]) == 2  # not calibrated
+    assert main(["hardware", "calibrate", "--emulate", "hidden.json", "--out", "device.json"]) == 0
+    for lap in ("4", "2.5"):
+        assert main(["hardware", *run, "--device-file", "device.json", "--lap", lap, "--out", f"runs/{lap}"]) in (0, 1)
+    assert main(["hardware", "identify", "runs/4", "runs/2.5", "--out", "found.json"]) == 0
+    told = read_device_file(Path("found.json"))
+    for name, value in hidden.items():
+        assert np.all(np.abs(np.array(told[name]["value"]) - value) <= np.array(told[name]["margin"])), name
+    linkage = linkage_from(told)
+    assert linkage_of(Phantom(device_file="found.json")) == linkage
+    assert main(["run", "--figure", "none", "--seconds", "1", "--device-file", "found.json", "--out", "runs/sim"]) == 0

@@ -1,0 +1,145 @@
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from controllers.errors import ParameterError
+from experiments.trials.design.design import balanced_rows, conditions, meetings
+from experiments.trials.design.errors import StudyError
+from experiments.trials.design.plan import file_digest, planned
+from experiments.trials.design.study_config import read_toml, study_from
+from experiments.trials.study import Study
+
+EXAMPLES = sorted((Path(__file__).resolve().parents[4] / "examples/studies").glob("*.toml"))
+
+
+def study(**values: object):
+    return study_from({"name": "s", "factors": {"stiffness": [100, 300]}} | values, "study")
+
+
+@pytest.mark.parametrize("n", range(2, 9))
+def test_every_condition_stands_in_every_place_and_follows_every_other_one_equally_often(n: int) -> None:
+    rows = balanced_rows(n)
+    places = Counter((place, condition) for row in rows for place, condition in enumerate(row))
+    follows = Counter(pair for row in rows for pair in pairwise(row))
+    assert set(places.values()) == {len(rows) // n}
+    assert len(places) == n * n
+    assert set(follows.values()) == {len(rows) // n}
+    assert len(follows) == n * (n - 1)
+
+
+def test_within_users_every_user_meets_every_condition_as_often_as_it_is_repeated() -> None:
+    made = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
+    met = meetings(made)
+    assert len(conditions(made)) == 6
+    assert set(Counter((m.user, m.number) for m in met).values()) == {2}
+    assert all(sorted(m.position for m in met if m.user == user) == list(range(12)) for user in range(7))
+
+
+def test_between_users_a_user_meets_one_level_and_the_groups_are_equally_large() -> None:
+    made = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
+    levels = {user: {m.condition.levels["damping"] for m in meetings(made) if m.user == user} for user in range(9)}
+    assert all(len(met) == 1 for met in levels.values())
+    assert set(Counter(next(iter(met)) for met in levels.values()).values()) == {3}
+
+
+def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
+    few, many = (planned(study(users={"number": number})) for number in (3, 5))
+    assert [trial.key for trial in few] == [trial.key for trial in many[: len(few)]]
+    assert len({trial.key for trial in many}) == len(many)
+
+
+def test_people_lead_where_the_mode_is_to_lead() -> None:
+    made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
+    assert {trial.config.user.does for trial in planned(made)} == {"lead"}
+
+
+def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
+    file, keys = tmp_path / "device.json", set[str]()
+    for content in ("{}", '{"identified": {}}'):
+        file.write_text(content, encoding="utf-8")
+        file_digest.cache_clear()
+        keys.add(planned(study(run={"device_file": str(file)}))[0].key)
+    assert len(keys) == 2
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"factors": {}}, "has no factors"),
+        ({"factors": {"stiffness": []}}, "'stiffness' has no levels"),
+        ({"factors": {"stiffness": [1]}}, "has one level"),
+        ({"factors": {"stifness": [1, 2]}}, "--stifness is not known"),
+        ({"factors": {"stiffness": [-1, 2]}}, "--stiffness"),
+        ({"factors": {"map": ["cylindrical", "spherical"]}}, "spherical"),
+        ({"factors": {"guidance": {"none": {}, "river": {"mode": "flood"}}}}, "flood"),
+        ({"factors": {"stiffness": [1, 2], "k": {"a": {"stiffness": 3}, "b": {"damping": 1}}}}, "both set 'stiffness'"),
+        ({"factors": {"gain": {"a": {"stiffness": 3}, "b": {"stiffness": 3.0}}}}, "are the same"),
+        ({"factors": {"user": ["trace", "exaggerate"]}}, "'user' has the name of another column"),
+        ({"factors": {"effort": {"a": {"stiffness": 3}, "b": {"stiffness": 4}}}}, "'effort' has the name of another"),
+        ({"users": {"does": "fly"}}, "no user 'fly'"),
+        ({"between": ["map"]}, "no factor 'map'"),
+        ({"between": ["stiffness"], "users": {"number": 1}}, "2 groups between users and 1 users"),
+        ({"run": {"seconds": 3}}, "sets 'seconds' as a word of its runs"),
+        ({"factors": {"clips": {"a": {"clips": ["gone.bvh"]}, "b": {"clips": ["walk"]}}}}, "gone.bvh"),
+        ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
+    ],
+)  # fmt: skip
+def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
+    with pytest.raises(StudyError, match=says) as raised:
+        planned(study(**values))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"repetitions": 0}, "--repetitions"),
+        ({"order": "random"}, "--order"),
+        ({"subjects": 3}, "subjects"),
+        ({"factors": "map"}, "factors is 'map'"),
+        ({"factors": {"map": {"a": 3, "b": 4}}}, "factors.map.a is 3"),
+        ({"users": 3}, "users is 3"),
+        ({"between": "map"}, "between is 'map'"),
+    ],
+)
+def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says: str) -> None:
+    with pytest.raises(ParameterError, match=says) as raised:
+        study(**values)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("levels", "says"),
+    [([1, 2, 1], "has level 1 twice"), (3, "'stiffness' is 3; expected a list of values, or a table of levels")],
+)
+def test_levels_that_are_none_or_the_same_are_refused(levels: object, says: str) -> None:
+    with pytest.raises(StudyError, match=says):
+        study(factors={"stiffness": levels})
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"measures": ["speed"]}, "no measure 'speed'"),
+        ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical"),
+        ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
+    ],
+)
+def test_a_measure_that_nobody_takes_is_refused(values: dict[str, object], says: str) -> None:
+    with pytest.raises(StudyError, match=says):
+        Study(study(**values)).run("nowhere")
+
+
+@pytest.mark.parametrize("path", [p for p in EXAMPLES if "space" not in p.read_text()], ids=lambda path: path.stem)
+def test_the_shipped_studies_can_be_planned(path: Path) -> None:
+    assert planned(study_from(read_toml(path, "a study"), str(path)))
+
+
+def test_a_file_that_is_no_toml_is_refused_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text("name = ]\n", encoding="utf-8")
+    with pytest.raises(StudyError, match="line 1"):
+        read_toml(tmp_path / "s.toml", "a study")
+    with pytest.raises(StudyError, match="No such file"):
+        read_toml(tmp_path / "gone.toml", "a study")

@@ -1,0 +1,169 @@
+"""What is in a file and is no part of its motion: a calibration pose in front, frames that were lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigs import Rig, write_rig
+from scipy.spatial.transform import Rotation
+
+from models.humanoid.skeleton import BODIES
+from models.mocap.library import embedded, embedded_names, load, read_motion
+from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.retargeting.body_lines import body_lines
+from models.mocap.retargeting.broken_frames import repaired
+from models.mocap.retargeting.leading_pose import leading_frames
+from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.skeleton_roles import roles_of
+
+LIVELY = ("spin", "jump", "run", "backflip", "squat_dance")
+RATES = (20.0, 25.0, 30.0)
+UP = Hints(up="+Y")  # a body that somersaults does not tell it
+
+
+def at_rate(name, fps):
+    clip = embedded(name)
+    every = round(clip.fps / fps)
+    return Clip(clip.poses[::every], clip.fps / every, name)
+
+
+def leading(motion, roles):
+    rotations = motion.global_rotations()
+    return leading_frames(motion, roles, body_lines(motion, roles, motion.global_positions(rotations), rotations))
+
+
+def largest_angle(ours, theirs):
+    ours, theirs = global_rotations(ours.poses), global_rotations(theirs.poses)
+    assert ours.shape == theirs.shape
+    return np.rad2deg(np.linalg.norm(quaternions.logarithm(quaternions.product(quaternions.conjugate(ours), theirs)),
+                                     axis=2).max())  # fmt: skip
+
+
+@pytest.mark.parametrize("held", [1, 2])
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize("name", LIVELY)
+def test_a_rest_pose_before_a_fast_motion_is_left_out(name, fps, held, tmp_path):
+    """Zero rotations, whatever the pose is."""
+    clip = at_rate(name, fps)
+    for zero in ("T", "A", "random", "legs up"):
+        write_rig(Rig(zero=zero), clip, tmp_path / "plain.bvh")
+        write_rig(Rig(zero=zero, leading=held), clip, tmp_path / "led.bvh")
+        plain, (led, report, _) = load(tmp_path / "plain.bvh", UP), load(tmp_path / "led.bvh", UP)
+        assert (plain.report.dropped, report.dropped) == (0, held)
+        np.testing.assert_allclose(led.poses, plain.clip.poses, atol=1e-9)
+
+
+@pytest.mark.parametrize("drop", [0.0, 45.0], ids=["T", "A"])
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize("name", LIVELY)
+def test_arms_held_out_before_a_fast_motion_are_left_out(name, fps, drop, tmp_path):
+    """On a rig whose zero pose is another one."""
+    clip = at_rate(name, fps)
+    pose = np.concatenate((clip.poses[0, :3], np.tile([1.0, 0.0, 0.0, 0.0], len(BODIES))))
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        k = 3 + 4 * BODIES.index(f"{side}_upper_arm")
+        pose[k : k + 4] = Rotation.from_euler("x", sign * drop, degrees=True).as_quat(scalar_first=True)
+    rig = Rig(zero="random", seed=5)
+    write_rig(rig, clip, tmp_path / "plain.bvh")
+    write_rig(rig, Clip(np.vstack((pose, clip.poses)), clip.fps, name), tmp_path / "led.bvh")
+    led = load(tmp_path / "led.bvh", UP)
+    assert led.report.dropped == 1
+    np.testing.assert_allclose(led.clip.poses, load(tmp_path / "plain.bvh", UP).clip.poses, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", embedded_names())
+def test_a_motion_that_begins_anywhere_keeps_its_frames(name, tmp_path):
+    write_rig(Rig(), embedded(name), tmp_path / "r.bvh")
+    motion = read_motion(tmp_path / "r.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    for every in {1, round(motion.fps / 30), round(motion.fps / 20)}:
+        for first in range(0, motion.n_frames - 12 * every, max(1, motion.n_frames // 12)):
+            kept = slice(first, None, every)
+            part = replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept])
+            assert leading(part, roles) == 0, (every, first)
+            found = repaired(replace(part, fps=motion.fps / every), roles)
+            assert (found.frames, found.jumps) == ((), ()), (every, first)
+
+
+def test_a_motion_that_goes_out_from_its_rest_pose_keeps_it(tmp_path):
+    """Evenly, from the zero pose: as a keyframe there, not a calibration pose."""
+    clip = at_rate("spin", 30.0)
+    rest = np.concatenate((clip.poses[0, :3], np.tile([1.0, 0.0, 0.0, 0.0], len(BODIES))))
+    way = [np.concatenate((clip.poses[0, :3], quaternions.slerped(
+        rest[3:].reshape(-1, 4), clip.poses[0, 3:].reshape(-1, 4), share).ravel())) for share in (0.0, 0.25, 0.5, 0.75)
+    ]  # fmt: skip
+    write_rig(Rig(), Clip(np.vstack((way, clip.poses)), clip.fps, "spin"), tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").report.dropped == 0
+
+
+def test_only_the_rest_poses_of_captures_are_left_out(mocap):
+    dropped = {}
+    for path in sorted((*mocap.rglob("*.bvh"), *mocap.glob("cmu_amc/*.amc"), *mocap.glob("deepmimic/*_[a-z]*.txt"))):
+        if path.stem.endswith("character"):
+            continue
+        motion = read_motion(path)
+        roles = roles_of(motion.joints, motion.parents)
+        if isinstance(roles, str):
+            continue
+        for every in {1, max(1, round(motion.fps / 30)), max(1, round(motion.fps / 20))}:
+            part = replace(motion, rotations=motion.rotations[::every], translations=motion.translations[::every])
+            if part.n_frames >= 10 and (n := leading(part, roles)):
+                dropped[path.name, every] = n
+            assert repaired(replace(part, fps=motion.fps / every), roles).frames == () or "16_09" in path.name
+    assert {name for name, _ in dropped} == {"01_01.bvh", "dme_example.bvh"}
+    assert set(dropped.values()) == {1}
+
+
+@pytest.fixture
+def walked(tmp_path):
+    """Rows of a walk's file at 30 frames per second, and a function that loads changed ones."""
+    write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
+    head, rows = (tmp_path / "r.bvh").read_text().split("Frame Time: ")
+    seconds, *rows = rows.strip().splitlines()
+    table = np.array([row.split() for row in rows], dtype=float)
+
+    def loaded(rows):
+        text = "\n".join(" ".join(map(str, row)) for row in rows)
+        (tmp_path / "b.bvh").write_text(f"{head}Frame Time: {seconds}\n{text}\n")
+        return load(tmp_path / "b.bvh")
+
+    return table, loaded
+
+
+@pytest.mark.parametrize(("first", "n"), [(20, 1), (20, 3)])
+def test_lost_frames_are_interpolated_and_said(walked, first, n):
+    table, loaded = walked
+    whole = loaded(table)
+    lost = table.copy()
+    lost[first : first + n] = 0.0
+    clip, report, _ = loaded(lost)
+    assert largest_angle(clip, whole.clip) < 8.0
+    which = "frame 20" if n == 1 else "3 frames, the first of them frame 20,"
+    assert any(line.startswith(f"{which} (0.67 s) did not belong") for line in report.remarks)
+    assert not any("did not belong" in line for line in whole.report.remarks)
+
+
+@pytest.mark.parametrize("degrees", [60.0, 120.0])
+def test_a_joint_that_flips_for_a_frame_is_interpolated(walked, degrees):
+    table, loaded = walked
+    popped = table.copy()
+    popped[17, 30:33] += degrees
+    clip, report, _ = loaded(popped)
+    assert largest_angle(clip, loaded(table).clip) < 5.0
+    assert any(line.startswith("frame 17 (0.57 s) did not belong") for line in report.remarks)
+
+
+def test_a_root_that_is_elsewhere_for_a_frame_is_interpolated(walked):
+    table, loaded = walked
+    popped = table.copy()
+    popped[12, :3] = 0.0
+    clip, _, _ = loaded(popped)
+    np.testing.assert_allclose(clip.poses[:, :3], loaded(table).clip.poses[:, :3], atol=0.01)
+
+
+def test_a_long_gap_is_said_and_left(walked):
+    table, loaded = walked
+    lost = table.copy()
+    lost[12:22] = 0.0
+    assert any("the whole body jumps in a frame at 0.37 s, 0.70 s:" in line for line in loaded(lost).report.remarks)

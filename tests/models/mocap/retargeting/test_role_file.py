@@ -1,0 +1,104 @@
+"""Roles that a person states: the same motion as by names, or an error that says what would be right."""
+
+import re
+
+import numpy as np
+import pytest
+from rigs import Rig, write_rig
+
+from experiments.cli import main
+from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.retargeting.retarget import Hints
+
+JOINT = re.compile(r"(ROOT|JOINT) (\S+)")
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """The same rig twice, with a vendor's names and with numbers; and the roles of the second, by its joints."""
+    walk = embedded("walk")
+    path, bare = tmp_path / "named.bvh", tmp_path / "bare.bvh"
+    write_rig(Rig(zero="random", twists=True, fingers=True), Clip(walk.poses[::3], walk.fps / 3, "walk"), path)
+    text = path.read_text()
+    numbers = {name: f"Bone.{k:03d}" for k, (_, name) in enumerate(JOINT.findall(text))}
+    bare.write_text(JOINT.sub(lambda found: f"{found[1]} {numbers[found[2]]}", text))
+    report = load(path).report
+    toes = {"left_toe": "LeftToeBase", "right_toe": "RightToeBase"}
+    return path, bare, {role: numbers[joint] for role, joint in (report.taken | toes).items()}
+
+
+def written(roles, tmp_path):
+    path = tmp_path / "roles.toml"
+    path.write_text("".join(f'{role} = "{joint}"\n' for role, joint in roles.items()))
+    return path
+
+
+def test_stated_roles_give_the_motion_that_names_give(rig, tmp_path):
+    named, bare, roles = rig
+    with pytest.raises(MotionFileError, match=r"no joint is taken for the left_thigh among .*--roles FILE"):
+        load(bare)
+    ours = load(bare, Hints(roles=written(roles, tmp_path))).clip
+    np.testing.assert_allclose(ours.poses, load(named).clip.poses, atol=1e-12)
+
+
+def test_the_middle_of_the_body_may_be_left_out(rig, tmp_path):
+    _, bare, roles = rig
+    limbs = {role: joint for role, joint in roles.items() if role.startswith(("left", "right"))}
+    report = load(bare, Hints(roles=written(limbs, tmp_path))).report
+    assert report.taken == {role: joint for role, joint in roles.items() if "toe" not in role and role != "head"}
+    assert report.missing == ("head (follows chest)",)
+
+
+def changed(roles, **changes):
+    return {role: joint for role, joint in (roles | changes).items() if joint is not None}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"left_knee": "Bone.001"}, r"roles.toml: no role 'left_knee'; expected one of pelvis, abdomen, .*left_toe"),
+        ({"left_thigh": "Bone.999"}, r"left_thigh: no joint of bare.bvh called 'Bone.999'; expected one of Bone.000"),
+        ({"left_thigh": None}, r"no joint for left_thigh; expected left_thigh = \"NAME OF A JOINT\""),
+        ({"left_toe": "Bone.000"}, r"Bone.000 is both pelvis and left_toe; expected a joint for one role"),
+    ],
+)
+def test_errors_say_what_would_be_right(rig, tmp_path, capsys, changes, said):
+    _, bare, roles = rig
+    path = written(changed(roles, **changes), tmp_path)
+    for command in ("convert", "prepare"):
+        assert main([command, str(bare), str(tmp_path / "out.bvh"), "--roles", str(path)]) == 2
+        assert re.search(said, capsys.readouterr().err)
+    assert not (tmp_path / "out.bvh").exists()
+
+
+def test_parts_of_a_limb_in_the_wrong_order_are_refused(rig, tmp_path):
+    _, bare, roles = rig
+    swapped = changed(roles, left_forearm=roles["left_hand"], left_hand=roles["left_forearm"])
+    with pytest.raises(MotionFileError, match=r"is above .* in the skeleton; expected clavicle and then upper_arm and"):
+        load(bare, Hints(roles=written(swapped, tmp_path)))
+
+
+@pytest.mark.parametrize("text", ["left_thigh = Bone", "left_thigh = 3", "[roles]\nleft_thigh = 'a'", ""])
+def test_a_file_of_another_form_is_refused(rig, tmp_path, text):
+    (tmp_path / "roles.toml").write_text(text)
+    with pytest.raises(MotionFileError, match=r"roles.toml"):
+        load(rig[1], Hints(roles=tmp_path / "roles.toml"))
+
+
+def test_names_that_two_joints_have_are_refused(rig, tmp_path):
+    _, bare, roles = rig
+    bare.write_text(bare.read_text().replace(f"{roles['right_shank']}\n", f"{roles['left_shank']}\n"))
+    with pytest.raises(MotionFileError, match=r"left_shank: 2 joints of bare.bvh called"):
+        load(bare, Hints(roles=written(roles, tmp_path)))
+
+
+def test_a_joint_that_names_call_otherwise_can_be_stated(mocap, tmp_path):
+    """CMU's hand beyond the wrist, and the wrist as the forearm's end."""
+    source = mocap / "cmu_amc/02_01.amc"
+    loaded = load(source)
+    ends = {f"{side}_{end}": f"{side[0]}{joint}" for side in ("left", "right")
+            for end, joint in (("toe", "toes"), ("wrist", "wrist"))}  # fmt: skip
+    ours = load(source, Hints(roles=written(loaded.report.taken | ends, tmp_path)))
+    np.testing.assert_allclose(ours.clip.poses, loaded.clip.poses, atol=1e-12)

@@ -1,0 +1,92 @@
+"""A figure in the physics, one that is only shown, and none: what is recorded, read and drawn of each."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from experiments.config.part import to_dict
+from experiments.config.words import run_config
+from experiments.results.report_of import write_report_of
+from experiments.runs.run import record, write_animations
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from models.world.scene import FIGURE, device_world_model, world_model
+from sim.errors import SimError
+from sim.loop.loop import make_logs
+from sim.loop.servo import run_block
+from sim.recording.recording import Recording
+from sim.world.world import World
+
+CLIPS = ("cheer", "angry")
+
+
+def session_of(kind: str, seconds: float = 1.0, **words: object) -> Session:
+    return wire(run_config(clips=CLIPS, seconds=seconds, figure=kind, **words))
+
+
+def logged(session: Session, n: int):
+    ticks, frames = make_logs(session.servo, n)
+    run_block(session.servo, 0, n, False, ticks, frames)
+    return ticks, frames
+
+
+def test_the_world_without_a_figure_is_the_first_part_of_the_one_with_it() -> None:
+    scene = run_config().scene
+    whole, device = world_model(scene), device_world_model(scene)
+    assert int(whole.joint(FIGURE + "root").qposadr[0]) == device.nq
+    assert [whole.joint(j).name for j in range(device.njnt)] == [device.joint(j).name for j in range(device.njnt)]
+
+
+def test_a_figure_that_is_only_shown_is_where_the_animation_has_it() -> None:
+    physical, shown = session_of("physical"), session_of("kinematic")
+    (ticks, frames), (same, others) = logged(physical, 1000), logged(shown, 1000)
+    # Two solvers round differently, and encoders count.
+    np.testing.assert_allclose(same.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
+    np.testing.assert_allclose(others.reference[:, 7:], frames.reference[:, 7:], atol=0.02)
+    assert others.qpos.shape == frames.qpos.shape
+    np.testing.assert_array_equal(others.qpos[:, -75:], others.reference)
+    assert np.abs(np.diff(others.reference, axis=0)).max() > 1e-3
+    assert not same.residual.any()
+
+
+def test_without_a_figure_the_stylus_goes_as_with_one() -> None:
+    (ticks, _), (same, frames) = logged(session_of("physical"), 1000), logged(session_of("none"), 1000)
+    np.testing.assert_allclose(same.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
+    assert frames.reference.shape[1] == 0
+    assert frames.qpos.shape[1] == device_world_model(run_config().scene).nq
+
+
+def test_a_kind_that_there_is_not_is_refused() -> None:
+    with pytest.raises(SimError, match="'ghost'; expected one of physical, kinematic, none"):
+        World(kind="ghost")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "none"])
+def test_its_recording_is_measured_and_drawn(kind: str, tmp_path: Path) -> None:
+    session = session_of(kind, 1.5, user="push")
+    summary = record(session, tmp_path, to_dict(session.config), 1.5, time.perf_counter(), Console(quiet=True))
+    write_animations(tmp_path, session)
+    write_report_of(tmp_path)
+    assert summary.figure is None
+    assert (summary.animation is None) == (kind == "none")
+    assert not any("physical figure" in line for line in summary.lines())
+    page = (tmp_path / "report.html").read_text()
+    assert "physical figure" not in page
+    assert (tmp_path / "edited.bvh").exists() == (kind == "kinematic")
+    assert not (tmp_path / "figures" / "figure.png").exists()
+    with Recording(tmp_path / "run.h5") as recording:
+        names = {"t", "qpos"} | ({"reference"} if kind == "kinematic" else set())
+        assert set(recording.groups["frames"]) == names
+
+
+def test_a_fault_is_said_first_and_recorded(tmp_path: Path) -> None:
+    session = session_of("none")
+    session.servo.field.limiter[0] = np.nan
+    summary = record(session, tmp_path, to_dict(session.config), 1.0, time.perf_counter(), Console(quiet=True))
+    assert summary.lines()[0] == "The device let go at 0.000 s: the limiter's memory held nan."
+    with Recording(tmp_path / "run.h5") as recording:
+        assert (recording.channel("ticks", "fault")[:] == 2.0).all()
+        assert recording.summary is not None

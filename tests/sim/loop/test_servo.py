@@ -1,0 +1,169 @@
+"""The compiled tick: what the sensors tell, what the motors do, and that a run is a pure function of its inputs."""
+
+import numpy as np
+import pytest
+
+from controllers.fields.program import evaluate
+from controllers.safety.limiter import limit_force
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.setups.clips import load_clips
+from experiments.setups.hands import lap_pushes
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from models.humanoid.skeleton import rest_pose
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import R_HP, jacobian
+from models.world.scene import SceneConfig
+from sim.errors import SimError
+from sim.loop.loop import Loop, make_logs, tick_channels
+from sim.loop.servo import run_block
+from sim.users.hand.arm import Arm
+from sim.world.encoders import PEAK_TORQUE
+from sim.world.phantom_port import actuate, phantom_port, sense, sense_in_motion, true_motion
+from sim.world.world import World, phantom_angles
+from tests.sim.bare_servos import Stepped
+
+CLIPS = ("cheer", "angry")
+CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def clips() -> tuple:
+    return load_clips(CLIPS)[0]
+
+
+def session_of(clips: tuple, config: RunConfig = CONFIG) -> Session:
+    return wire(config, clips)
+
+
+def run_logged(session: Session, n: int, replay: bool = False, ticks=None):
+    made, frames = make_logs(session.servo, n)
+    ticks = made if ticks is None else ticks
+    run_block(session.servo, 0, n, replay, ticks, frames)
+    return ticks, frames
+
+
+def test_the_encoders_tell_the_tip_to_a_few_hundredths_of_a_millimetre() -> None:
+    world = World()
+    for p in ([0.03, 0.02, 0.04], [-0.05, 0.03, -0.02], [0.0, -0.06, 0.05]):
+        world.reset(np.array(p), rest_pose())
+        port = phantom_port(world.model, world.data, 1e-3, 150.0)
+        sense(port, 0.0, 0.0)
+        np.testing.assert_allclose(port.hand[1:4], p, atol=5e-5)
+        true_p, true_v = np.zeros(3), np.zeros(3)
+        true_motion(port, true_p, true_v, np.zeros((3, 3)))
+        np.testing.assert_allclose(true_p, p, atol=1e-12)
+        site = world.data.site("phantom/tip")
+        np.testing.assert_allclose(true_p, site.xpos - world.data.body("phantom/base").xpos, atol=1e-9)
+        np.testing.assert_allclose(port.hand[4:8], quaternion_of(site.xmat), atol=2e-3)
+
+
+def quaternion_of(matrix: np.ndarray) -> np.ndarray:
+    import mujoco
+
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, matrix)
+    return quaternion
+
+
+def test_the_motors_get_the_transposed_jacobian_of_the_force_and_the_weight_of_the_linkage() -> None:
+    world = World()
+    world.reset(np.array([0.02, -0.03, 0.04]), rest_pose())
+    port = phantom_port(world.model, world.data, 1e-3, 150.0)
+    sense(port, 0.0, 0.0)
+    force = np.array([0.4, -0.7, 0.9])
+    actuate(port, force)
+    theta = port.memory[:3]
+    expected = np.array(jacobian(theta)).T @ (np.array(R_HP).T @ force) + np.array(gravity_torques(theta))
+    np.testing.assert_allclose(port.torque, expected, rtol=1e-12)
+    np.testing.assert_array_equal(world.data.ctrl[list(port.motor)], port.torque)
+
+
+def test_the_motors_never_get_more_than_their_peak_torque() -> None:
+    world = World()
+    world.reset(np.array([0.02, -0.03, 0.04]), rest_pose())
+    port = phantom_port(world.model, world.data, 1e-3, 150.0)
+    sense(port, 0.0, 0.0)
+    actuate(port, np.array([1e3, -1e3, 1e3]))
+    assert np.all(np.abs(port.torque) <= PEAK_TORQUE)
+    assert np.any(np.abs(port.torque) == PEAK_TORQUE)
+
+
+def test_a_stylus_without_force_floats() -> None:
+    """Gravity compensation: it stays within a tenth of a millimetre for half a second."""
+    world = World()
+    start = np.array([0.03, 0.02, 0.02])
+    world.reset(start, rest_pose())
+    phantom = Stepped(world)
+    for _ in range(500):
+        state = phantom.read()
+        phantom.write(np.zeros(3))
+    assert np.linalg.norm(state.p - start) < 1e-4
+
+
+def test_a_recorded_run_replays_to_the_same_states_bit_for_bit(clips: tuple) -> None:
+    first, second = session_of(clips), session_of(clips)
+    ticks, frames = run_logged(first, 400)
+    _, again = run_logged(second, 400, replay=True, ticks=ticks)
+    np.testing.assert_array_equal(first.world.data.qpos, second.world.data.qpos)
+    np.testing.assert_array_equal(first.world.data.qvel, second.world.data.qvel)
+    np.testing.assert_array_equal(frames.qpos, again.qpos)
+
+
+def test_a_run_is_a_pure_function_of_configuration_and_seed(clips: tuple) -> None:
+    def trace(seed: int) -> dict:
+        config = run_config(clips=CLIPS, seconds=0.2, seed=seed)
+        ticks, _ = run_logged(wire(config, clips), 200)
+        return tick_channels(ticks, 200)
+
+    first, same, other = trace(3), trace(3), trace(4)
+    for name, block in first.items():
+        np.testing.assert_array_equal(block, same[name], err_msg=name)
+    assert not np.array_equal(first["p"], other["p"])
+
+
+def test_blocks_do_not_show(clips: tuple) -> None:
+    """A run in one block and the same run in pieces are the same to the last bit."""
+    whole, pieces = session_of(clips), session_of(clips)
+    run_logged(whole, 400)
+    blocks: list[int] = []
+    Loop(pieces.servo, pieces.world, lambda ticks, frames, n: blocks.append(n)).run(0.4)
+    assert len(blocks) > 1
+    np.testing.assert_array_equal(whole.world.data.qpos, pieces.world.data.qpos)
+
+
+def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: tuple) -> None:
+    """Read, evaluate, limit, write from Python: the same stylus, but for what the figure does to the solver."""
+    compiled, stepped = session_of(clips), session_of(clips)
+    ticks, _ = run_logged(compiled, 300)
+    arm = Arm(pushes=CONFIG.user.pushes)
+    field = stepped.servo.field
+    phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
+    sense_in_motion(phantom.device.port)
+    for _ in range(300):
+        hand = phantom.read().vector()
+        evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
+        limit_force(field.limits, field.limiter, field.wrench, field.force)
+        phantom.write(field.force)
+        path.append(hand[1:4])
+    np.testing.assert_allclose(np.array(path), ticks.hand[:, 1:4], atol=1e-4)
+
+
+def test_a_physics_step_that_does_not_divide_the_servo_period_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"0\.0003 s does not divide the servo period 0\.001 s"):
+        World(SceneConfig(physics_step=3e-4))
+
+
+def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
+    config = run_config(clips=CLIPS, seconds=0.1, servo_period=2e-3, physics_step=5e-4)
+    session = wire(config, clips)
+    run_logged(session, 50)
+    assert session.world.data.time == pytest.approx(0.1, abs=1e-9)
+    assert session.servo.plant.substeps == 4
+
+
+@pytest.mark.parametrize("p", [[0.5, 0.0, 0.0], [0.0, 0.0, 0.6], [0.15, 0.0, 0.0]])
+def test_a_point_the_phantom_cannot_reach_is_refused_with_the_numbers(p: list[float]) -> None:
+    with pytest.raises(SimError, match=rf"{p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}"):
+        phantom_angles(np.array(p))

@@ -1,0 +1,150 @@
+"""A hand that holds an animation in the middle of a flight has a figure that stands, not one that hovers."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from controllers.curves.stylus import stylus_path
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.haptic_map.cylindrical import Cylindrical
+from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs, packed_legs
+from experiments.setups.clips import load_clips
+from experiments.setups.hands import edited_until
+from experiments.setups.stretch import flight_remarks
+from experiments.setups.wiring import wire
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.mocap.motion.clip import pose_difference
+from models.world.scene import FIGURE
+from sim.loop.loop import Loop, pose_errors
+from sim.loop.servo import FrameLog, TickLog
+from sim.reference.reference import make_reference, reference_along
+from sim.reference.settling import approach, let_down, slowness
+
+FIGURE_MODEL = figure_model()
+LEGS, ENDS = packed_legs(FIGURE_MODEL), np.empty((2, 7))
+PERIOD, LAP = 8e-3, 2.4
+
+
+def _poses(name: str) -> np.ndarray:
+    return load_clips((name,))[0][0].poses.copy()
+
+
+def _lowest(poses: np.ndarray) -> np.ndarray:
+    """Height of the lowest contact sphere of the feet over the floor [m], by MuJoCo."""
+    data, ids = mujoco.MjData(FIGURE_MODEL), [FIGURE_MODEL.geom(name).id for name in FOOT_CONTACTS]
+    heights = np.empty(len(poses))
+    for i, pose in enumerate(poses):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(FIGURE_MODEL, data)
+        heights[i] = data.geom_xpos[ids, 2].min() - CONTACT_RADIUS
+    return heights
+
+
+@pytest.mark.parametrize("name", ["jump", "run"])
+def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str) -> None:
+    poses = _poses(name)
+    before, lowered = _lowest(poses), poses.copy()
+    for pose in lowered:
+        let_down(LEGS, ENDS, 1.0, pose)
+    assert before.max() > 0.03
+    assert _lowest(lowered).max() < 0.006
+    assert _lowest(lowered).min() > before.min() - 1e-9
+    stands = before < 0.001
+    assert np.abs(lowered - poses)[stands].max() < 1e-4
+    # Only the height changes, and nothing without a share.
+    np.testing.assert_array_equal(np.delete(lowered, 2, axis=1), np.delete(poses, 2, axis=1))
+    for pose, own in zip(lowered, poses, strict=True):
+        pose[:] = own
+        let_down(LEGS, ENDS, 0.0, pose)
+    np.testing.assert_array_equal(lowered, poses)
+
+
+def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
+    poses = _poses("backflip")
+    over = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
+    lowered = over.copy()
+    for pose in lowered:
+        let_down(LEGS, ENDS, 1.0, pose)
+    assert len(over) > 5
+    np.testing.assert_array_equal(lowered, over)
+
+
+def test_a_hand_is_slow_until_it_has_the_pace_of_the_clips() -> None:
+    p = np.array([0.05, 0.0, 0.02])
+    along = 0.05 * 2.0 * np.pi / LAP * np.array([0.0, 1.0, 0.0])
+    shares = [slowness(p, pace * along, LAP) for pace in np.linspace(0.0, 1.2, 49)]
+    assert shares[0] == 1.0
+    assert shares[28] == 1.0  # 0.7 of the pace
+    assert max(shares[36:]) < 1e-9  # 0.9 of it
+    assert np.all(np.diff(shares) <= 0.0)
+    # The other way round is as fast; up, down, outwards and on the axis it does not move on.
+    assert slowness(p, -along, LAP) < 1e-9
+    assert slowness(p, np.array([0.3, 0.0, 0.3]), LAP) == 1.0
+    assert slowness(np.zeros(3), along, LAP) == 1.0
+
+
+def test_the_share_goes_over_without_a_jump_or_an_overshoot() -> None:
+    state, rows = np.zeros(3), []
+    for _ in range(125):
+        approach(state, 1.0, PERIOD)
+        rows.append(state.copy())
+    share, rate = np.array(rows)[:, 0], np.array(rows)[:, 1]
+    assert np.all(np.diff(share) >= 0.0)
+    assert share[-1] == pytest.approx(1.0, abs=1e-3)
+    assert share.max() <= 1.0
+    np.testing.assert_allclose(np.diff(share) / PERIOD, 0.5 * (rate[1:] + rate[:-1]), atol=0.05)
+
+
+def _held_in_flight(clip_seconds: float) -> np.ndarray:
+    """Poses of a hand that goes along a jump and stops in mid-air."""
+    poses = _poses("jump")
+    clip = load_clips(("jump",))[0][0]
+    jumps = Cylindrical([(clip.poses, clip.fps)] * 4, (0.02, 0.08), (-0.025, 0.025), figure_legs(FIGURE_MODEL))
+    curve, top = Trajectory.circle(0.05, LAP), LAP * int(_lowest(poses).argmax()) / (len(poses) - 1)
+    t = np.minimum(np.arange(round((top + 1.5) / PERIOD)) * PERIOD, top)
+    reference = make_reference(
+        FIGURE_MODEL, jumps.compiled(), PERIOD, 6.0, limbs=packed_legs(FIGURE_MODEL), clip_seconds=clip_seconds
+    )
+    shown = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(curve.point(t)), np.zeros((len(t), TRACE_SIZE)), shown)
+    return shown
+
+
+@pytest.mark.slow
+def test_a_jump_that_is_held_comes_down_and_without_it_hovers() -> None:
+    shown, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
+    assert _lowest(hovering)[-1] > 0.2
+    assert _lowest(shown)[-1] < 0.006
+    # At its own pace it flies, and it comes down no faster than a body that falls.
+    velocity = pose_difference(shown[:-1], shown[1:])[:, 2] / PERIOD
+    assert _lowest(shown).max() > 0.15
+    assert velocity.min() > -2.5
+    assert np.abs(np.diff(velocity)).max() < 0.5
+
+
+def test_what_nobody_can_do_is_said_beforehand() -> None:
+    assert flight_remarks(load_clips(("walk", "cheer"))[0]) == ()
+    (remark,) = flight_remarks(load_clips(("jump", "run", "walk"))[0])
+    assert "jump, run" in remark
+    assert "let down" in remark
+    assert "turns over" in flight_remarks(load_clips(("backflip",))[0])[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("clips", [("jump",), ("walk", "run", "jump", "angry")])
+def test_a_figure_whose_flights_are_held_and_carried_stands(clips: tuple[str, ...]) -> None:
+    config = run_config(clips=clips, mode="stretch-then-follow", seconds=18.0)
+    session = wire(config, load_clips(clips)[0])
+    root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
+    errors: list[float] = []
+
+    def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        m = -(-n // session.servo.figure_ticks)
+        errors.append(float(pose_errors(frames.qpos[:m, root : root + 75], frames.reference[:m])[1].max()))
+
+    Loop(session.servo, session.world, keep).run(config.seconds)
+    assert config.seconds > edited_until(session.config.user.grabs) + 3.0
+    # It fell at 11.7 s with the jump and at 6.2 s with the four.
+    assert max(errors) < 0.3

@@ -1,0 +1,104 @@
+"""The live page draws the state it is shown, at most thirty times a second."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from models.world.scene import P_WH, SceneConfig, world_model
+from sim.viewer.courses import courses
+from sim.viewer.live_page import LivePage
+from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, taken_at
+from sim.viewer.page import NullPage
+from sim.viewer.shapes import body_shapes, coarser
+from sim.viewer.shown import Shown
+
+ANGLE = np.linspace(0, 6, 30)
+CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
+DRAWN = courses({"river_names": "one\ntwo", "river_curves": CURVES})
+NOWHERE = np.full(3, np.nan)
+
+
+@pytest.fixture
+def page():
+    page = LivePage(world_model(SceneConfig()), DRAWN, 0.02, P_WH, port=0)
+    yield page
+    page.close()
+
+
+def moment(model, p=(0.0, 0.0, 0.0), force=(0.0, 0.0, 0.0), target=NOWHERE, t=0.0, root=0.0) -> Shown:
+    qpos = np.array(model.qpos0)
+    at = int(model.jnt_qposadr[model.joint("figure/root").id])
+    qpos[at] += root
+    return Shown(t, qpos, qpos[at : at + 75], np.array(p), np.array(force), np.zeros(3), np.array(target))
+
+
+def test_the_force_is_drawn_from_the_tip_along_the_force(page):
+    stage, tip = page._stage, np.array([0.01, 0.02, 0.03])
+    page.show(moment(stage._model, tip, (0.0, 0.0, 2.0)))
+    start, end = stage._arrows["force"].points[0]
+    np.testing.assert_allclose(start, drawn_at(tip), atol=1e-6)
+    np.testing.assert_allclose(end - start, [0, 0, 2.0 * METRES_PER_NEWTON], atol=1e-6)
+    assert stage._arrows["force"].visible
+    assert not stage._arrows["user"].visible  # nobody pushes
+
+
+def test_the_lag_of_a_hand_is_drawn_from_the_stylus_to_where_it_means_to_be(page):
+    stage = page._stage
+    page.show(moment(stage._model, (0.0, 0.0, 0.0), target=(0.01, 0.0, 0.0)))
+    assert stage._lag.visible
+    np.testing.assert_allclose(
+        stage._lag.points[0], [drawn_at(np.zeros(3)), drawn_at(np.array([0.01, 0, 0]))], atol=1e-6
+    )
+    stage.show(moment(stage._model))
+    assert not stage._lag.visible
+
+
+def test_states_that_come_too_fast_are_skipped(page):
+    model = page._stage._model
+    page.show(moment(model))
+    page.show(moment(model, (1.0, 1.0, 1.0)))
+    np.testing.assert_allclose(page._stage._arrows["force"].points[0][0], drawn_at(np.zeros(3)), atol=1e-6)
+
+
+def test_the_clock_says_the_time_of_what_is_shown(page):
+    page.show(moment(page._stage._model, t=12.34))
+    assert "12.34 s" in page._clock.content
+
+
+def test_a_figure_that_travels_is_followed_and_one_that_dances_is_not(page):
+    stage = page._stage
+    stage.show(moment(stage._model))
+    stage.show(moment(stage._model, root=1.0))
+    assert np.all(stage._followed == 0.0)
+    for k in range(200):
+        stage.show(moment(stage._model, root=1.0 + 0.02 * k, t=0.02 * k))
+    assert 3.0 < stage._followed[0] < 5.0
+    stage.show(moment(stage._model))  # put back
+    assert np.all(stage._followed == 0.0)
+
+
+def test_where_a_point_is_drawn_tells_the_point():
+    points = np.random.default_rng(1).normal(size=(5, 3))
+    np.testing.assert_allclose(taken_at(drawn_at(points)), points, atol=1e-15)
+
+
+def test_coarser_shapes_lie_within_a_cell_of_the_fine_ones():
+    fine = body_shapes(world_model(SceneConfig()), "figure/")
+    coarse = coarser(fine, 0.01)
+    assert sum(len(s.faces) for s in coarse) < 0.5 * sum(len(s.faces) for s in fine)
+    for a, b in zip(fine, coarse, strict=True):
+        assert b.faces.max() < len(b.vertices)
+        np.testing.assert_allclose(b.vertices.min(axis=0), a.vertices.min(axis=0), atol=0.01)
+        np.testing.assert_allclose(b.vertices.max(axis=0), a.vertices.max(axis=0), atol=0.01)
+
+
+def test_showing_a_state_does_not_touch_the_model_that_runs():
+    model = world_model(SceneConfig())
+    before = model.qpos0.copy(), model.body_pos.copy(), model.geom_rgba.copy()
+    data = mujoco.MjData(model)
+    NullPage().show(moment(model))
+    page = LivePage(model, DRAWN, 0.02, P_WH, port=0)
+    page.show(moment(model)._replace(qpos=data.qpos + 0.1))
+    page.close()
+    for array, kept in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):
+        assert np.array_equal(array, kept)
