@@ -12,11 +12,10 @@ from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept
 from controllers.curves.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, kept_lap
-from controllers.legs.clearance import cleared
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
-from controllers.motion.inbetween import FOOT, ROOT, correction, interpolation, packed_table, table_channels
+from controllers.motion.inbetween import FOOT, ROOT, correction, packed_table, table_channels
 from controllers.state import Array
 from controllers.work_array import work_array
 
@@ -25,7 +24,6 @@ _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _SHARE, _TABLE_SIZE, _TABLE = range(8)
 _NODES = 13  # nodes of the table of corrections along each of r and z
-_BETWEEN = 2 * _NODES - 1  # points along each of r and z at which foot clearance is checked
 _EDGE = 0.05  # eased share at each end of the table's coordinates: nodes are dense where a clip's weight is small
 _ROWS = 512  # largest number of rows of the table round the lap
 
@@ -65,10 +63,10 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
-def _mixtures(steps: int) -> tuple[Array, Array]:
-    """Points (steps², 2) at equal steps of the table's coordinates, as shares of r and z, and weights (steps², 4)."""
+def _mixtures() -> tuple[Array, Array]:
+    """The table's nodes (k, 2), as shares of r and z, and the weights of the clips there (k, 4)."""
     ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
-    nodes = np.interp(np.linspace(0.0, 1.0, steps), [ease(at, _EDGE)[0] for at in share], share)
+    nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [ease(at, _EDGE)[0] for at in share], share)
     z, r = np.meshgrid(nodes, nodes)
     places = np.stack([r.ravel(), z.ravel()], axis=-1)
     a, b = (np.array([ease(at)[0] for at in way]) for way in places.T)
@@ -157,7 +155,7 @@ class Cylindrical(AnimationMap):
         super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
         self._numbers = numbers
-        self._nodes, self.mixtures = _mixtures(_NODES)
+        self._nodes, self.mixtures = _mixtures()
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
         self.corrections: Array = np.empty((0, len(self.mixtures), ROOT))
         if limbs:
@@ -168,10 +166,7 @@ class Cylindrical(AnimationMap):
             return np.zeros((_ROWS, *correction_shape(len(limbs))))
         rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
         channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
-        found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
-        share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
-        shares = np.einsum("ai,bj->abij", share, share).reshape(_BETWEEN**2, _NODES**2)
-        return cleared(found, channels, self.drifts, limbs, self.mixtures, _mixtures(_BETWEEN)[1], shares)
+        return foot_corrections(channels, self.drifts, limbs, self.mixtures)
 
     def _correct(self, values: Array) -> None:
         table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))

@@ -62,27 +62,6 @@ class BlendedFeet(NamedTuple):
     own: Array
 
 
-class MeanEnd(NamedTuple):
-    """Pose of a limb's end in the mean, for k mixtures, at n samples of the lap.
-
-    Attributes
-    ----------
-    place : Array, shape (n, k, 3)
-        Position of the centre of its points [m], in a frame that moves with the drift exp((s + λ) ξ).
-    turn : Array, shape (n, k, 4)
-        Orientation in that frame.
-    shift : Array, shape (n + 1, k, 2)
-        Position of that frame over the ground [m]; the last row is one lap later.
-    angle : Array, shape (n + 1, k)
-        Heading of that frame [rad].
-    """
-
-    place: Array
-    turn: Array
-    shift: Array
-    angle: Array
-
-
 def _raise(lift: Array) -> Array:
     return _RAISE * lift / (lift + _RAISE_FROM)
 
@@ -150,24 +129,24 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     everything = np.concatenate([weights, np.eye(channels.shape[1])])
     found = _found(channels, drifts, limbs, everything)
     own = found[:, len(weights) :]
-    shares = own_shares(channels, weights)
-    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
-
-
-def own_shares(channels: Array, weights: Array) -> Array:
-    """Share of each clip's own foot skate that a mixture keeps, shape (k, m); a clip given twice counts as one."""
+    # A clip given twice counts as one.
     clips = range(channels.shape[1])
     alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in clips] for i in clips])
-    return (weights @ alike) ** _FADE / alike.sum(axis=0)
+    shares = (weights @ alike) ** _FADE / alike.sum(axis=0)
+    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
 
 
 def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:
     """Paths of the feet in the mean; arguments as in `foot_corrections`."""
     own = np.stack([_own_height(channels, limbs, j) for j in range(len(limbs))], axis=2)
     ground = own.min()
-    height, moves, angles = [], [], []
+    height, moves, angles, n = [], [], [], len(channels)
     for j, limb in enumerate(limbs):
-        place, turn, shift, angle = mean_end(channels, drifts, limbs, j, weights)
+        ends, turns = _own_end(channels, limbs, j)
+        # The mean's frame moves over the ground with the drift exp((s + λ) ξ).
+        lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
+        shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
+        place, turn = np.einsum("km,nmx->nkx", weights, ends[..., :3]), _mean_rotations(turns, weights)
         height.append(place[..., 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
         place = np.concatenate([place, place[:1]])[..., :2]
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
@@ -188,15 +167,6 @@ def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Arr
 def _own_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
     end, turn = _own_end(channels, limbs, j)
     return end[..., 2] + lowest_point(turn, limbs[j], _SOFTNESS)
-
-
-def mean_end(channels: Array, drifts: Array, limbs: Sequence[Limb], j: int, weights: Array) -> MeanEnd:
-    """Pose of the end of limb j in the mean; arguments as in `foot_corrections`."""
-    n = len(channels)
-    ends, turns = _own_end(channels, limbs, j)
-    lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
-    shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
-    return MeanEnd(np.einsum("km,nmx->nkx", weights, ends[..., :3]), _mean_rotations(turns, weights), shift, angle)
 
 
 def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:

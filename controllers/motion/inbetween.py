@@ -9,7 +9,6 @@ its turn about the vertical [rad]. It is zero at the corners, where one clip has
 
 import numpy as np
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.state import Array
@@ -29,11 +28,6 @@ def packed_table(values: Array) -> Array:
     inverse = np.linalg.inv(system)[:, :nodes]
     control = np.einsum("ai,bj,nijc->nabc", inverse, inverse, values, optimize=True)
     return np.concatenate([[rows, nodes, channels], control_points(control, np.ones(1)).ravel()])
-
-
-def interpolation(nodes: int, places: Array) -> Array:
-    """Interpolation weights (k, nodes) of values at equal steps of [0, 1], at points (k,), along one coordinate."""
-    return CubicSpline(np.linspace(0.0, 1.0, nodes), np.eye(nodes), bc_type="natural")(places)
 
 
 @njit

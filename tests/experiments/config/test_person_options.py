@@ -64,7 +64,9 @@ def test_doings_of_a_run_become_a_person_s_intents() -> None:
     user = run_config(person="median", user="exaggerate").user
     assert isinstance(intent_of(user), Exaggerate)
     assert isinstance(intent_of(replace(user, does="push", pushes=(hvf.Push(1.0, 1.0, 2.0),))), Press)
-    assert isinstance(intent_of(replace(user, grabs=(hvf.Grab(1.0, (0, 0, 0), place=(0, 0, 0)),))), Bend)
+    assert isinstance(
+        intent_of(replace(user, does="relaxed", grabs=(hvf.Grab(1.0, (0, 0, 0), place=(0, 0, 0)),))), Bend
+    )
 
 
 def test_an_intent_without_a_person_is_refused() -> None:

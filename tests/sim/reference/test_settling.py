@@ -128,8 +128,8 @@ def test_what_nobody_can_do_is_said_beforehand() -> None:
     assert flight_remarks(load_clips(("walk", "cheer"))[0]) == ()
     (remark,) = flight_remarks(load_clips(("jump", "run", "walk"))[0])
     assert "jump, run" in remark
-    assert "let down" in remark
-    assert "turns over" in flight_remarks(load_clips(("backflip",))[0])[-1]
+    assert "lowered to the floor" in remark
+    assert "upside down" in flight_remarks(load_clips(("backflip",))[0])[-1]
 
 
 @pytest.mark.slow

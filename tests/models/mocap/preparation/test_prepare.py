@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from rigs import Rig, write_rig
 
 from experiments.cli import main
 from experiments.preparation import prepared_clip
@@ -16,6 +15,7 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.stances import rested, stances
 from models.mocap.preparation.well_formed import outliers, stance_slides, well_formed
 from models.mocap.readers.own_bvh import write_bvh
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 
 @pytest.fixture(scope="module")
