@@ -21,9 +21,10 @@ from controllers.certificates.flight.flight_fit import (
     fit_flight,
     reachable_rates,
 )
-from controllers.certificates.flight.tolerance import GRAVITY, BallisticTolerance
+from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.certificates.report import Outcome, Verdict
 from controllers.errors import ParameterError
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 
 
