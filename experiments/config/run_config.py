@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from controllers.errors import ParameterError
-from experiments.config.maps import Cylindrical, Map
-from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
+from experiments.config.maps import Cylindrical, Led, Map
+from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Lead, Mode, StretchThenFollow
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
@@ -234,20 +234,25 @@ class RunConfig:
     seed: int = whole(0, default=1)
 
     def __post_init__(self) -> None:
-        if (self.mode.kind == "lead") != (self.map.kind == "led"):
+        if self.leads != isinstance(self.map, Led):
             raise ParameterError("a figure is led by the mode lead and its own map; expected both, or neither")
-        if (self.mode.kind == "lead") != (self.user.does == "lead"):
+        if self.leads != (self.user.does == "lead"):
             raise ParameterError(
                 f"the user {self.user.does!r} and the mode {self.mode.kind!r}: a hand leads in the mode lead only"
             )
         if isinstance(self.device, Replay):
-            if self.user != User(does="lead" if self.mode.kind == "lead" else "relaxed"):
+            if self.user != User(does="lead" if self.leads else "relaxed"):
                 raise ParameterError(SIMULATED_TOO)
-            if self.mode.kind == "stretch-then-follow":
+            if isinstance(self.mode, StretchThenFollow):
                 raise ParameterError(
                     "the mode stretch-then-follow performs when the simulated hand has bent the curve, and a replayed "
                     "hand does not tell when; expected another mode, such as stretch"
                 )
+
+    @property
+    def leads(self) -> bool:
+        """Whether the hand leads a walking figure."""
+        return isinstance(self.mode, Lead)
 
     @property
     def scene(self) -> SceneConfig:

@@ -292,7 +292,7 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     """
     kept, left = words_of(config), set[str]()
     mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
-    leads = (mode == "lead") != (config.mode.kind == "lead")
+    leads = (mode == "lead") != config.leads
     if mode != config.mode.kind:
         left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
@@ -316,8 +316,7 @@ def words_of(config: RunConfig) -> dict[str, object]:
         "mode": config.mode.kind,
         "figure": config.figure.kind,
     }
-    led = config.mode.kind == "lead"
-    if not led:
+    if not config.leads:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
         words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", "run", *ADDED, "around"}}

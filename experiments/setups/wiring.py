@@ -89,10 +89,10 @@ def wire(
     if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
         least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
-    if device is None and config.mode.kind == "lead" and config.figure.kind == "none":
-        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
     check_rates(config)
     world = World(config.scene, config.figure.kind)
+    if device is None and config.leads and not world.has_figure:
+        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
     if device is None:
         device = device_of(config, world, config.seconds)
     maps = maps_of(config, world.figure, clips)
@@ -129,10 +129,10 @@ def assemble(
     draft = parts_of(maps)
     ready(_units(draft, _servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
-    refined = maps.refine() if world.kind != "none" else maps
+    refined = maps.refine() if world.has_figure else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
-    if isinstance(parts.user, Participant) and world.kind != "none" and parts.walker is None:
+    if isinstance(parts.user, Participant) and world.has_figure and parts.walker is None:
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
@@ -215,7 +215,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin, orientation = _first(parts, servo)
     stylus = begin.velocity if moves else None
-    if world.kind == "none":
+    if not world.has_figure:
         world.reset(begin.point, rest_pose(), orientation, stylus)
     else:
         stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
