@@ -259,6 +259,6 @@ class Leading(Law):
         memory : Array
             Memory of the field's program, or of a program that contains this field.
         slot : int
-            Offset of this field in it: the third number of its instruction (`Program.ops`).
+            Offset of this field in it (`Program.places`).
         """
         return walker_at.py_func(memory, slot)
