@@ -112,8 +112,9 @@ def trace_summary(recording: Recording) -> TraceSummary:
 
 
 def _replay_summary(recording: Recording) -> ReplaySummary | None:
-    run = recording.texts.get("replayed")
-    return None if run is None else ReplaySummary(run, _deviation_mm(recording, 0.0))
+    if "replayed" not in recording.texts:
+        return None
+    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.texts["distance_from"])
 
 
 def _deviation_mm(recording: Recording, since: float) -> float:

@@ -83,10 +83,11 @@ class RunSummary:
 
     def _of_the_hand(self) -> list[str]:
         """Sentences on stylus and animation, by kind of run: LEADING, a bent curve, or any other."""
+        replayed = [self.trace.line()] if isinstance(self.trace, ReplaySummary) else []
         if self.lead is not None:
-            return self.lead.lines()
+            return [*replayed, *self.lead.lines()]
         if self.editing is not None:
-            return [*self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
+            return [*replayed, *self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
         path, animation = self.path, self.animation
         alone = path.deviation_rms_mm
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"

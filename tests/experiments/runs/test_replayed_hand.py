@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,14 @@ def test_in_another_field_it_moves_the_same_and_the_force_is_the_other_fields(re
     assert np.abs(again.ticks["force"] - recorded.ticks["force"]).max() > 0.5
     assert again.summary.path.deviation_rms_mm is None
     assert f"The hand was that of {recorded.folder} and moved as recorded" in str(again)
+
+
+def test_whose_hand_it_was_is_told_in_every_mode(recorded: hvf.Run) -> None:
+    summary = replayed(recorded, 100.0).run(SECONDS).summary
+    led = SimpleNamespace(lines=lambda: ["The figure was led."])
+    for told in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
+        assert [line for line in told.lines() if line.startswith("The hand was that of")]
+        assert "The figure was led." in told.lines()
 
 
 def test_a_run_begins_where_the_recorded_hand_was_whatever_the_seed(recorded: hvf.Run) -> None:
