@@ -27,7 +27,7 @@ from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import HandState, Wrench
 from experiments.certify.certify_simulation import certify
-from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.public import circle, clips, load, version
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Composite, Cylindrical, Simulation, Tick, User
@@ -64,6 +64,7 @@ __all__ = [
     "Person",
     "Phantom",
     "Push",
+    "Replay",
     "River",
     "RiverBundle",
     "Run",

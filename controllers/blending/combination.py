@@ -35,6 +35,12 @@ def figure_size(figure: Array) -> int:
 
 
 @njit
+def figure_limbs(figure: Array) -> int:
+    """Number of limbs of a `packed_figure` at the start of an array."""
+    return int(figure[_LIMBS])
+
+
+@njit
 def figure_channels(figure: Array) -> int:
     """Channels of a clip: root position, rotations, ends of limbs."""
     return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])

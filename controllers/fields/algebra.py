@@ -13,27 +13,27 @@ from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
-WEIGHT_SIZE = 6  # kind, flag for the complement 1 − s, four numbers
+_KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # row of a weight: kind, flag for 1 − s, four numbers
 
 
 @njit
 def weight_of(params: Array, at: int, hand: Array) -> float:
     """Weight s of the row at ``params[at:]`` for a hand (see `Weight`)."""
-    kind = params[at]
-    s = params[at + 2]
+    kind = params[at + _KIND]
+    s = params[at + _NUMBERS]
     if kind == _BALL:
         square = 0.0
         for i in range(3):
-            square += (hand[HAND_POSITION + i] - params[at + 2 + i]) ** 2
-        s = window(square * params[at + 5])
+            square += (hand[HAND_POSITION + i] - params[at + _NUMBERS + i]) ** 2
+        s = window(square * params[at + _NUMBERS + 3])
     elif kind == _SPEED:
         square = 0.0
         for i in range(3):
             square += hand[HAND_VELOCITY + i] ** 2
-        s = smooth_step((np.sqrt(square) - params[at + 2]) * params[at + 3])
+        s = smooth_step((np.sqrt(square) - params[at + _NUMBERS]) * params[at + _NUMBERS + 1])
     elif kind == _SWITCH:
         s = hand[HAND_SWITCH]
-    return 1.0 - s if params[at + 1] != 0.0 else s
+    return 1.0 - s if params[at + _COMPLEMENT] != 0.0 else s
 
 
 @njit
@@ -101,11 +101,11 @@ class Weight:
         return _weight(_SWITCH)
 
     def __invert__(self) -> "Weight":
-        return Weight((self.row[0], 1.0 - self.row[1], *self.row[2:]))
+        return Weight((self.row[_KIND], 1.0 - self.row[_COMPLEMENT], *self.row[_NUMBERS:]))
 
 
 def _weight(kind: int, *numbers: float) -> Weight:
     if not np.isfinite(numbers).all():
         raise ParameterError(f"numbers of a weight must be finite, got {numbers}")
-    padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - 2 - len(numbers))
+    padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - _NUMBERS - len(numbers))
     return Weight((float(kind), 0.0, *numbers, *padding))

@@ -28,6 +28,9 @@ def _square_to(params: Array, curve: int, phase: float, p: Array) -> float:
     return (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
 
 
+_NEAREST, _BUNNY, _WHEN, _MEMORY = range(4)  # t*, phase t_b of the bunny, time of the last tick [s]
+
+
 class BunnyGains(NamedTuple):
     """Parameters of `bunny_wrench`: k_r [N/m], b_d [N s/m], 1/δ² [1/m²], flags for attraction "along", pace "wait"."""
 
@@ -40,21 +43,21 @@ class BunnyGains(NamedTuple):
 
 @njit
 def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `Bunny`: parameters `BunnyGains`, memory [t*, phase t_b of the bunny, time of the last tick] [s]."""
+    """Kernel of `Bunny`: parameters `BunnyGains`, memory see `_NEAREST`."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     gains = BunnyGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4])
     time = hand[HAND_TIME]
-    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
-    memory[slot] = phase
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot + _NEAREST])
+    memory[slot + _NEAREST] = phase
     if gains.waits == 0.0:
         bunny = params[curve + START] + time
-    elif np.isnan(memory[slot + 1]):
+    elif np.isnan(memory[slot + _BUNNY]):
         bunny = phase
     else:
-        pace = gaussian(_square_to(params, curve, memory[slot + 1], p), gains.inverse_square)
-        bunny = memory[slot + 1] + pace * min(max(time - memory[slot + 2], 0.0), LONGEST_STEP)
+        pace = gaussian(_square_to(params, curve, memory[slot + _BUNNY], p), gains.inverse_square)
+        bunny = memory[slot + _BUNNY] + pace * min(max(time - memory[slot + _WHEN], 0.0), LONGEST_STEP)
     bunny = wrap_phase(params, curve, bunny)
-    memory[slot + 1], memory[slot + 2] = bunny, time
+    memory[slot + _BUNNY], memory[slot + _WHEN] = bunny, time
     pull = gaussian(_square_to(params, curve, bunny, p), gains.inverse_square)
     target = phase if gains.along > 0.0 else bunny
     p_curve, v_curve = curve_point(params, curve, target), curve_velocity(params, curve, target)
@@ -143,7 +146,7 @@ class Bunny(Law):
     def _program(self) -> Program:
         along, waits, felt = float(self.attraction == "along"), float(self.pace == "wait"), self.felt
         gains = BunnyGains(felt.k_r, felt.b_d, felt.delta**-2, along, waits)
-        return Program.of(self, bunny_wrench, gains, [np.nan] * 3, self.curve)
+        return Program.of(self, bunny_wrench, gains, [np.nan] * _MEMORY, self.curve)
 
     def program(self) -> Program:
         """Compiled form of the field."""

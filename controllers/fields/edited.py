@@ -21,6 +21,7 @@ from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
 from controllers.work_array import work_array
 
+_NEAREST, _PERFORMED, _WHEN, _MEMORY = range(4)  # t* of φ', s, time of the last tick [s]
 _SPACING = 0.01  # [s] between samples of a performance: short for the motion of a hand, long for encoder quantisation
 
 
@@ -47,7 +48,7 @@ _HEADER = len(RecordedGains._fields)
 
 @njit
 def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of a performance: parameters `RecordedGains` and φ', memory [t* of φ', s, time of the last tick]."""
+    """Kernel of a performance: parameters `RecordedGains` and φ', memory see `_NEAREST`."""
     gains = RecordedGains(
         params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
     )  # fmt: skip
@@ -56,13 +57,13 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     s, time = hand[HAND_TIME], hand[HAND_TIME]
     if gains.waits > 0.0:
         s = start
-        if not math.isnan(memory[slot + 1]):
-            s = memory[slot + 1]
-            step = min(max(time - memory[slot + 2], 0.0), LONGEST_STEP)
+        if not math.isnan(memory[slot + _PERFORMED]):
+            s = memory[slot + _PERFORMED]
+            step = min(max(time - memory[slot + _WHEN], 0.0), LONGEST_STEP)
             s += _nearness(params, performed, s, inverse_square, p) * step
         # After its end the performance returns to its start and waits there for the hand to come round.
         s = start if s > end else s
-    memory[slot + 1], memory[slot + 2] = s, time
+    memory[slot + _PERFORMED], memory[slot + _WHEN] = s, time
     wrench[:] = 0.0
     if not np.isfinite(time + p[0] + p[1] + p[2]):
         wrench[:] = np.nan
@@ -71,7 +72,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         there[0], there[1], there[2] = curve_point(params, performed, s)
         speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
         follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square)
-        memory[slot], _ = follow_at(follow, params, curve, memory[slot], there, speed, wrench)
+        memory[slot + _NEAREST], _ = follow_at(follow, params, curve, memory[slot + _NEAREST], there, speed, wrench)
         share = gains.weight * _nearness(params, performed, s, inverse_square, p)
         for i in range(3):
             wrench[i] *= -share
@@ -131,7 +132,7 @@ class Performance(Law):
             river.drag / river.tau, river.drag, river.epsilon**-2, self.weight, self.epsilon**-2, waits
         )  # fmt: skip
         numbers = np.concatenate([gains, self.performed.packed()])
-        return Program.of(self, recorded_wrench, numbers, [np.nan] * 3, river.curve)
+        return Program.of(self, recorded_wrench, numbers, [np.nan] * _MEMORY, river.curve)
 
     def program(self) -> Program:
         """Compiled form of α U as a force."""

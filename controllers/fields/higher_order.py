@@ -55,7 +55,7 @@ _HEADER, _BLOCK = len(Crossing._fields), len(RiverGains._fields)
 _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 
 # Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s]].
-_WHEN, _SEEN, _MEMORY = 2, 3, 6
+_ACTIVE, _HELD_PHASE, _WHEN, _SEEN, _MEMORY = 0, 1, 2, 3, 6
 
 _NEIGHBOUR = 0.1  # of a lap: a branch whose phase differs by more is a different branch
 
@@ -183,10 +183,10 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
     current, nearest = -1, math.inf
     best = -1
     for k in range(count):
-        if table[k, _RIVER] == memory[slot]:
+        if table[k, _RIVER] == memory[slot + _ACTIVE]:
             _, _, curve = _river(params, at, table[k, _RIVER])
             lap = params[curve + END] - params[curve + START]
-            away = abs(table[k, _PHASE] - memory[slot + 1])
+            away = abs(table[k, _PHASE] - memory[slot + _HELD_PHASE])
             if params[curve + PERIODIC] > 0.0:
                 away = min(away, lap - away)
             if away < min(nearest, _NEIGHBOUR * lap):
@@ -197,8 +197,8 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
     held = math.inf if current < 0 else math.sqrt(table[current, _SCORE])
     if held >= release or rival + (release - admission) < held:
         current = best if rival < admission else -1
-    memory[slot] = -1.0 if current < 0 else table[current, _RIVER]
-    memory[slot + 1] = 0.0 if current < 0 else table[current, _PHASE]
+    memory[slot + _ACTIVE] = -1.0 if current < 0 else table[current, _RIVER]
+    memory[slot + _HELD_PHASE] = 0.0 if current < 0 else table[current, _PHASE]
     return current
 
 
@@ -206,7 +206,7 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
 def higher_order_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
-    """Kernel of `HigherOrder`: parameters see `Crossing`, memory see above `_WHEN`; `curve` is not used."""
+    """Kernel of `HigherOrder`: parameters see `Crossing`, memory see above `_ACTIVE`; `curve` is not used."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     if not np.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2]):
         wrench[:] = np.nan

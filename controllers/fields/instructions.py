@@ -34,6 +34,8 @@ class Join(IntEnum):
         return 2 if self in (Join.ADD, Join.BLEND) else 1
 
 
+OP_CODE, OP_PARAMETERS, OP_MEMORY, OP_CURVE = range(4)
+"""Places in a row of instructions."""
 STACK = 16  # depth of the stack: most wrenches that may be pending at once
 
 TRACE_PHASE, TRACE_POINT, TRACE_DISTANCE, TRACE_ROW, TRACE_ATTRACTOR, TRACE_RIVER, TRACE_SIZE = 0, 1, 4, 5, 6, 7, 8

@@ -13,7 +13,17 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra import WEIGHT_SIZE, Weight
 from controllers.fields.description import parts_of
-from controllers.fields.instructions import LAW_ARGUMENTS, STACK, TRACE_SIZE, Join, Kernel, empty_trace
+from controllers.fields.instructions import (
+    LAW_ARGUMENTS,
+    OP_CODE,
+    OP_MEMORY,
+    OP_PARAMETERS,
+    STACK,
+    TRACE_SIZE,
+    Join,
+    Kernel,
+    empty_trace,
+)
 from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
@@ -106,6 +116,21 @@ class MapFeed(NamedTuple):
         return self._replace(slot=self.slot + memory, at=self.at + params)
 
 
+class LawPlace(NamedTuple):
+    """Where a law of a program has its numbers.
+
+    Attributes
+    ----------
+    law : Law
+    params, memory : int
+        Offsets in the program's parameters and in its memory.
+    """
+
+    law: Law
+    params: int
+    memory: int
+
+
 @dataclass(frozen=True, eq=False)
 class Program(Law):
     """Field of force in the form that the servo runs.
@@ -140,7 +165,7 @@ class Program(Law):
     map_feeds: tuple[MapFeed, ...] = ()
 
     def __post_init__(self) -> None:
-        codes: list[int] = self.ops[:, 0].tolist()
+        codes: list[int] = self.ops[:, OP_CODE].tolist()
         depth = np.cumsum([1 if code >= 0 else 1 - Join(code).takes for code in codes])
         if len(depth) == 0 or depth[-1] != 1 or depth.min() < 1 or depth.max() > STACK:
             raise ParameterError(
@@ -178,8 +203,8 @@ class Program(Law):
         kernels = (*self.kernels, *(kernel for kernel in other.kernels if kernel not in self.kernels))
         gap, kept = len(self.params), len(self.memory) - TRACE_SIZE
         moved = other.ops + np.array([0, gap, kept, gap])
-        laws = moved[:, 0] >= 0
-        moved[laws, 0] = [kernels.index(other.kernels[code]) for code in moved[laws, 0]]
+        laws = moved[:, OP_CODE] >= 0
+        moved[laws, OP_CODE] = [kernels.index(other.kernels[code]) for code in moved[laws, OP_CODE]]
         return Program(
             np.vstack([self.ops, moved, [[join, gap + len(other.params), 0, 0]]]),
             np.concatenate([self.params, other.params, params]),
@@ -227,6 +252,13 @@ class Program(Law):
             kept = memory[last : last + len(haptic_map.compiled().memory)]
             memory[slot:first] = haptic_map.pose(stylus, kept)
             memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
+
+    def places(self) -> tuple[LawPlace, ...]:
+        """Where the laws have their parameters and their memory, in the order of their instructions."""
+        rows = self.ops[self.ops[:, OP_CODE] >= 0].tolist()
+        return tuple(
+            LawPlace(law, row[OP_PARAMETERS], row[OP_MEMORY]) for law, row in zip(self.laws, rows, strict=True)
+        )
 
     def composition(self) -> Iterator[tuple[Law | Join, Array]]:
         """Laws and operations in postfix order, each with the operation's parameters (none for a law)."""

@@ -14,9 +14,10 @@ from controllers.checks import checked
 from controllers.errors import ParameterError
 from controllers.fields.instructions import TRACE_SIZE, leave_place
 from controllers.fields.law import Law, Program
+from controllers.gravity import GRAVITY
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 from controllers.walking.gait import Gait
-from controllers.walking.walked_path import GRAVITY, STEP, path_front, straight_path
+from controllers.walking.walked_path import STEP, path_front, straight_path
 from controllers.walking.walker import (
     MARGIN,
     Following,
@@ -258,6 +259,6 @@ class Leading(Law):
         memory : Array
             Memory of the field's program, or of a program that contains this field.
         slot : int
-            Offset of this field in it: the third number of its instruction (`Program.ops`).
+            Offset of this field in it (`Program.places`).
         """
         return walker_at.py_func(memory, slot)

@@ -11,7 +11,17 @@ from numba import njit
 
 from controllers.errors import ControllerError
 from controllers.fields.algebra import blend, gate, limit
-from controllers.fields.instructions import LAW_ARGUMENTS, STACK, TRACE_DISTANCE, TRACE_ROW, Join
+from controllers.fields.instructions import (
+    LAW_ARGUMENTS,
+    OP_CODE,
+    OP_CURVE,
+    OP_MEMORY,
+    OP_PARAMETERS,
+    STACK,
+    TRACE_DISTANCE,
+    TRACE_ROW,
+    Join,
+)
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
@@ -62,7 +72,7 @@ def evaluate(units: IntArray, ops: IntArray, params: Array, memory: Array, hand:
     top = 0
     memory[TRACE_DISTANCE] = np.inf
     for row in range(ops.shape[0]):
-        code, at, slot, curve = ops[row, 0], ops[row, 1], ops[row, 2], ops[row, 3]
+        code, at, slot, curve = ops[row, OP_CODE], ops[row, OP_PARAMETERS], ops[row, OP_MEMORY], ops[row, OP_CURVE]
         if code == Join.ADD:
             top -= 1
             for i in range(6):

@@ -2,12 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
-from controllers.blending.combination import combine, figure_channels, fresh_lap, packed_figure, weight_groups
+from controllers.blending.combination import (
+    combine,
+    figure_channels,
+    figure_limbs,
+    fresh_lap,
+    packed_figure,
+    weight_groups,
+)
 from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.curves.cylinder import cylinder
 from controllers.curves.splines import basis, basis_slope, control_points, round_lap
@@ -133,12 +141,13 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
         interpolate_frames(frames, near[i], angle, value[i], slope[i])
         for k in range(3):
             drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
-    _lags(params[int(params[_LAG_AT]) :], int(figure[1]), angle, channels, value, slope)
+    limbs = figure_limbs(figure)
+    _lags(params[int(params[_LAG_AT]) :], limbs, angle, channels, value, slope)
     pairs = params[int(params[_PAIRS_AT]) :]
     d = work_array((4, pair_channels(pairs)))
     if d.shape[1] > 0:
         pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
-    limbs, ground, at = int(figure[1]), 0.0, int(params[_SOLES_AT])
+    ground, at = 0.0, int(params[_SOLES_AT])
     for i in range(count):
         ground += w[0, i] * params[at + 1 + near[i]]
     soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else work_array((0, 0, 3))
@@ -146,6 +155,26 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
         figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory[:MEMORY],
         memory[MEMORY:], soles, ground, params[at], pose, jacobian,
     )  # fmt: skip
+
+
+class MapTransition(NamedTuple):
+    """Where a hand may change over between two clips of a lifted map: a row of `Lifted.transitions`.
+
+    Attributes
+    ----------
+    first, second : int
+        Numbers of the clips.
+    angle : float
+        θ [rad].
+    pose, velocity : float
+        Relative distances of the poses and of the velocities.
+    """
+
+    first: int
+    second: int
+    angle: float
+    pose: float
+    velocity: float
 
 
 class Lifted(ClipMap):
@@ -189,12 +218,13 @@ class Lifted(ClipMap):
         Names of the clips; by default their numbers.
     margin : float
         Margin of the clamping [m].
-    transitions : Array, shape (k, 5), optional
-        Where a hand may change between clips: numbers of two clips, θ [rad], relative distances of pose and velocity.
-        Stored with the map; h does not depend on them.
+    transitions : sequence of MapTransition, or Array of shape (k, 5)
+        Where a hand may change between clips, the best first. Stored with the map; h does not depend on them.
 
     Attributes
     ----------
+    transitions : tuple of MapTransition
+        As given.
     legs_of : int or None
         Clip that gives root, legs and trunk (see `with_legs_of`); None where all is blended.
     share : float
@@ -216,7 +246,7 @@ class Lifted(ClipMap):
         limbs: Sequence[Limb] = (),
         names: Sequence[str] = (),
         margin: float = 4e-3,
-        transitions: Array | None = None,
+        transitions: Sequence[MapTransition] | Array = (),
     ) -> None:
         m = len(clips)
         names = tuple(names) or tuple(str(i) for i in range(m))
@@ -313,7 +343,7 @@ class Lifted(ClipMap):
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` restores it from them bit for bit, with all joints blended."""
-        arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": self.transitions}
+        arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": _rows_of(self.transitions)}
         for name, clip in zip(self.names, self._placed, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
         return arrays | clip_arrays(self.clips, self.names, self.limbs)
@@ -428,10 +458,14 @@ def _checked_margin(margin: float) -> float:
     return float(margin)
 
 
-def _checked_transitions(transitions: Array | None, clips: int) -> Array:
-    array = np.array(np.zeros((0, 5)) if transitions is None else transitions, dtype=np.float64)
+def _rows_of(transitions: Sequence[MapTransition] | Array) -> Array:
+    return np.array(transitions, dtype=np.float64) if len(transitions) else np.zeros((0, len(MapTransition._fields)))
+
+
+def _checked_transitions(transitions: Sequence[MapTransition] | Array, clips: int) -> tuple[MapTransition, ...]:
+    array = _rows_of(transitions)
     if array.ndim != 2 or array.shape[1] != 5 or not np.isfinite(array).all():
         raise ParameterError(f"transitions must be finite and of shape (k, 5), got {array.shape}")
     if not np.isin(array[:, :2], np.arange(clips)).all():
         raise ParameterError(f"transitions are between clips 0 to {clips - 1}, got {array[:, :2].tolist()}")
-    return array
+    return tuple(MapTransition(int(first), int(second), *rest) for first, second, *rest in array.tolist())

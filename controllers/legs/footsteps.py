@@ -24,7 +24,7 @@ from controllers.easing import smooth_step
 from controllers.legs.footing import packed_soles
 from controllers.legs.limbs import CENTRE, FIRST, LIMB, OFFSETS, Limb
 from controllers.motion.inertialization import offset_left, stopping_way
-from controllers.motion.vectors import Vector
+from controllers.motion.vectors import Vector, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
@@ -56,7 +56,8 @@ def packed_steppers(limbs: Sequence[Limb]) -> Array:
 @njit
 def lever(limb: Array, at: int, segment: Array) -> Vector:
     """Vector ``limb[at:at + 3]`` of a segment with the pose `segment` (7 or more,), turned to the world frame [m]."""
-    return rotate(segment[3], segment[4], segment[5], segment[6], limb[at], limb[at + 1], limb[at + 2])
+    x, y, z = vector_at(limb, at)
+    return rotate(segment[3], segment[4], segment[5], segment[6], x, y, z)
 
 
 @njit

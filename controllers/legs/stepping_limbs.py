@@ -64,7 +64,8 @@ def _leg(limb: Array, pose: Pose, end: Array, line: Array) -> float:
     for i in range(3):
         line[i] = end[i] - sole[i] - pose[i] - hip[i]
     for segment in (THIGH, SHANK):
-        longest += np.sqrt(limb[segment] ** 2 + limb[segment + 1] ** 2 + limb[segment + 2] ** 2)
+        x, y, z = vector_at(limb, segment)
+        longest += np.sqrt(x**2 + y**2 + z**2)
     return longest
 
 

@@ -52,7 +52,8 @@ def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
         size += fast * fast
         dot += fast * memory[OSCILLATION_LAST + i]
     memory[OSCILLATION_COUNT] *= params[_LEAK]
-    last = memory[3] ** 2 + memory[4] ** 2 + memory[5] ** 2
+    x, y, z = memory[OSCILLATION_LAST], memory[OSCILLATION_LAST + 1], memory[OSCILLATION_LAST + 2]
+    last = x**2 + y**2 + z**2
     if size > params[_THRESHOLD] ** 2:
         if dot < 0.0:
             memory[OSCILLATION_COUNT] += 1.0

@@ -15,10 +15,10 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.splines import basis
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 
 STEP = 0.03  # Δ [m]
-GRAVITY = 9.81  # g [m/s²]
 ROWS = 2048
 PATH_X, PATH_Y, PATH_HEADING, PATH_LEAN, PATH_BEND, PATH_SIDEWARDS, ROW = range(7)
 PACKED_PATH = 1 + ROW * ROWS

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
+from controllers.gravity import GRAVITY
 from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
 

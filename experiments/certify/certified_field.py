@@ -17,7 +17,7 @@ from controllers.curves.trajectory import Trajectory
 from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverClips
 from experiments.config.modes import Lead, Rivers
 from experiments.config.part import to_dict
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import RunConfig, phantom_of
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
 from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, left_out
@@ -90,7 +90,7 @@ MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
 
 def certified_sampling(config: RunConfig, delay: float) -> Sampling:
     """Sampling of a run: servo period, delay of the torques [s] and cut-off of the velocity filter."""
-    return Sampling(config.clock.servo_period, delay, config.device.cutoff)
+    return Sampling(config.clock.servo_period, delay, phantom_of(config.device).cutoff)
 
 
 def certified_options(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:

@@ -23,6 +23,7 @@ from controllers.fields.law import Law
 from controllers.fields.orientation import Orientation
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.executed_field import seen
+from experiments.config.run_config import phantom_of
 from experiments.files.device_files import linkage_of
 from experiments.runs.simulation import Simulation
 
@@ -69,7 +70,13 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
         Intervals of the hand's impedance.
     delay : float
         Delay of the torques [s].
+
+    Raises
+    ------
+    ParameterError
+        If its hand is a replayed one, which feels no force.
     """
+    phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
     try:
@@ -87,7 +94,7 @@ def _seen(sim: Simulation, delay: float, unknown: Verdict, hands: HandRange) -> 
     around, reach = (getattr(sim.haptic_map, name, None) for name in ("around", "reach"))
     if around is None or reach is None:
         return unknown
-    sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
+    sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
     place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), around, phantom_device(linkage_of(sim.device)), sampling)
     return seen(sim.field.program(), place, reach, unknown, hands)
 
@@ -104,7 +111,7 @@ def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]
         if law.attraction == "along":
             # Near a bunny that pulls along the curve, the field is that of FOLLOW to first order.
             base, width = FOLLOW_LAW, float("inf")
-    sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
+    sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
     device = phantom_device(linkage_of(sim.device))
     made = River(with_added(base, parts.added, k_r), k_r, b_d, width, curve, device, sampling)
     return made, parts.drag, assumed

@@ -47,7 +47,7 @@ class Stability:
 def kept_stability(config: RunConfig) -> Stability:
     """Certify the stability of a run, or return the cached verdict for the same inputs and code."""
     config, hands = resolved(config), HandRange()
-    if config.mode.kind == "lead":
+    if config.leads:
         return Stability("unknown", None, _LEAD)
     try:
         inputs = certificate_inputs(config, 0.0, hands, 1.0)

@@ -1,11 +1,14 @@
 """The configuration of a run: pure data, that goes to and from one JSON file and lies beside the results."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
+from pydantic import BeforeValidator, Field
+
 from controllers.errors import ParameterError
-from experiments.config.maps import Cylindrical, Map
-from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
+from experiments.config.maps import Cylindrical, Led, Map
+from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Lead, Mode, StretchThenFollow
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
@@ -145,6 +148,45 @@ class Phantom:
 
 
 @part
+class Replay:
+    """The hand of a recording in place of a device: it moves as it was recorded, whatever the force.
+
+    The run begins where that hand was; the seed has no effect.
+
+    Parameters
+    ----------
+    run : str
+        Folder of the run whose hand is replayed.
+    """
+
+    kind: Literal["replay"] = "replay"
+    run: str = Field(kw_only=False)
+
+
+def _with_kind(value: object) -> object:
+    """A device in a file is a Phantom if it does not say what it is."""
+    return {"kind": "phantom", **cast(Mapping[str, object], value)} if isinstance(value, Mapping) else value
+
+
+Device = Annotated[Phantom | Replay, Field(discriminator="kind"), BeforeValidator(_with_kind)]
+
+
+def phantom_of(device: Phantom | Replay) -> Phantom:
+    """The same device, which has to be a Phantom.
+
+    Raises
+    ------
+    ParameterError
+        If it is a replayed hand.
+    """
+    if isinstance(device, Replay):
+        raise ParameterError(
+            f"the hand of {device.run} is replayed and feels no force; expected a Phantom: leave out --replay"
+        )
+    return device
+
+
+@part
 class Clock:
     """The rates of a run.
 
@@ -160,6 +202,7 @@ class Clock:
     physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 
+SIMULATED_TOO = "a replayed hand has no simulated user; leave out the user and what it does, or the replay"
 NOBODY_LED = "the mode lead with the figure none: nobody to lead; expected another figure"
 
 
@@ -185,18 +228,31 @@ class RunConfig:
     map: Map = Cylindrical()
     user: User = User()
     figure: Figure = Figure()
-    device: Phantom = Phantom()
+    device: Device = Phantom()
     clock: Clock = Clock()
     seconds: float = above(0.0, default=20.0, unit="s")
     seed: int = whole(0, default=1)
 
     def __post_init__(self) -> None:
-        if (self.mode.kind == "lead") != (self.map.kind == "led"):
+        if self.leads != isinstance(self.map, Led):
             raise ParameterError("a figure is led by the mode lead and its own map; expected both, or neither")
-        if (self.mode.kind == "lead") != (self.user.does == "lead"):
+        if self.leads != (self.user.does == "lead"):
             raise ParameterError(
                 f"the user {self.user.does!r} and the mode {self.mode.kind!r}: a hand leads in the mode lead only"
             )
+        if isinstance(self.device, Replay):
+            if self.user != User(does="lead" if self.leads else "relaxed"):
+                raise ParameterError(SIMULATED_TOO)
+            if isinstance(self.mode, StretchThenFollow):
+                raise ParameterError(
+                    "the mode stretch-then-follow performs when the simulated hand has bent the curve, and a replayed "
+                    "hand does not tell when; expected another mode, such as stretch"
+                )
+
+    @property
+    def leads(self) -> bool:
+        """Whether the hand leads a walking figure."""
+        return isinstance(self.mode, Lead)
 
     @property
     def scene(self) -> SceneConfig:

@@ -23,6 +23,7 @@ from experiments.config.run_config import (
     Clock,
     Figure,
     Phantom,
+    Replay,
     RunConfig,
     User,
     load_config,
@@ -35,6 +36,7 @@ ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": J
 _SWITCHES = ("governor", "walls")
 _USERS = ("relaxed", "trace", "push", "turn", *PERSONAL)
 _NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
+_HAND = {"user", "person", "pushes", "turns", "grabs"}
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ VOCABULARY = _vocabulary()
 
 
 def run_config(
-    mode: str = "follow", map: str = "", user: str = "", figure: str = "physical", **words: object
+    mode: str = "follow", map: str = "", user: str = "", figure: str = "physical", replay: str = "", **words: object
 ) -> RunConfig:
     """A run in words, as the command line takes them.
 
@@ -113,6 +115,8 @@ def run_config(
         What the hand does; by default it is relaxed.
     figure : str
         Kind of the figure: physical, kinematic or none.
+    replay : str
+        Folder of a run whose hand is replayed in place of the Phantom.
     **words
         Fields of the parts by name, and `seconds`, `seed`, `pushes`, `turns`, `grabs`.
 
@@ -142,7 +146,8 @@ def run_config(
         raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
     if not given.get("clips", True):
         del given["clips"]
-    taken = _Words(given, f"--mode {mode}" + (f" --map {map}" if map else ""))
+    chosen = {"mode": mode, "map": map, "replay": replay}
+    taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
     mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
     around = {"around": Circle(**taken.of(Circle))} if "around" in _names(map_cls) else {}
     config = RunConfig(
@@ -150,7 +155,7 @@ def run_config(
         map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
         user=User(does=user or "relaxed", **_with_person(taken.of(User))),  # pyright: ignore[reportArgumentType]
         figure=Figure(kind=figure, **taken.of(Figure)),  # pyright: ignore[reportArgumentType]
-        device=Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
+        device=Replay(replay) if replay else Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
         **taken.of(RunConfig, ("seconds", "seed")),
     )  # fmt: skip
     taken.check_empty()
@@ -226,6 +231,8 @@ def _kind(cls: type) -> str:
     what = "--map" if cls in MAPS else "--mode"
     if cls is MapFile:
         return "--map FILE.npz"
+    if cls is Phantom:
+        return "the Phantom, without --replay"
     if cls is Circle:
         return "maps about a circle"
     return f"{what} {kind.default}" if kind is not None and cls is not Led else "--mode lead"
@@ -245,6 +252,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
+    yield option("replay", str, "Folder of a run whose hand is replayed: it moves as recorded, whatever the force.", "")
     yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)
     yield option("seed", int | None, top["seed"] + " Default: 1.", None)
     for name in _SWITCHES:
@@ -284,13 +292,15 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     """
     kept, left = words_of(config), set[str]()
     mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
-    leads = (mode == "lead") != (config.mode.kind == "lead")
+    leads = (mode == "lead") != config.leads
     if mode != config.mode.kind:
         left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
         left |= _names(type(config.map)) | _names(Circle) | {"map"}
     if leads:
         left |= {"user", "pushes", "turns", "grabs"}
+    if words.get("replay"):
+        left |= _HAND | _names(Phantom)
     figure = words.get("figure", config.figure.kind)
     if figure != config.figure.kind:
         left |= set(MEANINGLESS.get(cast(FigureKind, figure), ()))
@@ -306,17 +316,18 @@ def words_of(config: RunConfig) -> dict[str, object]:
         "mode": config.mode.kind,
         "figure": config.figure.kind,
     }
-    led = config.mode.kind == "lead"
-    if not led:
+    if not config.leads:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
-        words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", *ADDED, "around"}}
+        words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", "run", *ADDED, "around"}}
     for name, cls in ADDED.items():
         part = getattr(config.mode, name, None)
         if part is not None:
             words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
     if isinstance(config.map, MapFile):
         words["map"] = config.map.file
+    if isinstance(config.device, Replay):
+        words["replay"] = config.device.run
     around = getattr(config.map, "around", None)
     if around is not None:
         words |= {"lap": around.lap, "radius": around.radius, "wave": around.wave}

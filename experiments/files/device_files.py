@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from experiments.config.run_config import Phantom
+from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -156,23 +156,26 @@ def calibration_from(content: Mapping[str, Any]) -> Calibration | None:
     return Calibration(str(told["name"]), str(told["serial"]), int(told["power_up"])) if told else None
 
 
-def content_of(device: Phantom) -> dict[str, Any]:
+def content_of(device: Phantom | Replay) -> dict[str, Any]:
     """Content of a run's device file; empty if the run has none.
 
     Raises
     ------
+    ParameterError
+        If the device is a replayed hand.
     SimError
         As `read_device_file`.
     """
-    return read_device_file(Path(device.device_file)) if device.device_file else {}
+    file = phantom_of(device).device_file
+    return read_device_file(Path(file)) if file else {}
 
 
-def linkage_of(device: Phantom) -> Linkage:
+def linkage_of(device: Phantom | Replay) -> Linkage:
     """Linkage of a run's device: that of its device file, or the published one.
 
     Raises
     ------
-    SimError
-        As `read_device_file`.
+    ParameterError, SimError
+        As `content_of`.
     """
     return linkage_from(content_of(device))

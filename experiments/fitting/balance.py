@@ -18,8 +18,8 @@ import numpy as np
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
-from models.mocap.authoring.balance import GRAVITY
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 

@@ -16,8 +16,9 @@ from controllers.certificates.flight.ballistic import (
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
 from controllers.certificates.flight.flight_fit import FlightFit, best_fall
 from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
-from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
+from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 from experiments.files.certificate_files import clip_inputs
 from models.humanoid.skeleton import N_POSE

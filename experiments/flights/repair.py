@@ -8,7 +8,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
-from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
+from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved import with_constant_momentum

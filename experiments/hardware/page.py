@@ -31,7 +31,7 @@ _PAUSE = 1.0 / 60.0  # [s] between two polls: half the time between two pictures
 
 def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Session:
     """Session that the page shows: with the kinematic figure, or the device alone if the figure is led; see `wire`."""
-    if config.map.kind == "led":
+    if config.leads:
         return session_of(served(config), ready)
     return wire(replace(config, figure=replace(config.figure, kind="kinematic")), ready=ready)
 
@@ -43,7 +43,7 @@ def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -
     figure that is led is not shown, as its walker is in the servo's process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    led, session = config.map.kind == "led", page_session(config)
+    led, session = config.leads, page_session(config)
     world = session.world
     static = session.static()
     page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH, world.kind)

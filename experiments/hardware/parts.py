@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.safety.gate import Gate
 from controllers.state import Array
-from experiments.config.run_config import Clock, RunConfig
+from experiments.config.run_config import Clock, RunConfig, phantom_of
 from experiments.files.device_files import Calibration
 from experiments.hardware.permit import check_device
 from experiments.setups.session import Session
@@ -45,9 +45,10 @@ def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: flo
     ModelError, ControllerError, SimError
         As `experiments.setups.wiring.wire`.
     """
+    cutoff = phantom_of(config.device).cutoff
 
     def device(world: World) -> DeviceState:
-        return exchange(world, config.device.cutoff, silent=silent)
+        return exchange(world, cutoff, silent=silent)
 
     return wire(config, ready=ready, device=device)
 

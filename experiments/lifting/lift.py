@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifted import Lifted, MapTransition
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from controllers.haptic_map.lifting.lift import Lifting, closes, lift
 from controllers.haptic_map.lifting.motion_features import Motion
@@ -252,7 +252,7 @@ def lift_clips(
     labels = _labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
-    transitions = np.array([transition[:5] for transition in lifting.transitions]).reshape(-1, 5)
+    transitions = [MapTransition(at.first, at.second, at.angle, at.pose, at.velocity) for at in lifting.transitions]
     haptic_map = Lifted(
         [(clip.poses, clip.fps) for clip in clips], [motion.closed for motion in motions], lifting.angles,
         lifting.sites, figure_legs(figure_model()), labels, transitions=transitions,

@@ -5,6 +5,7 @@ from typing import Any
 
 import viser
 
+from experiments.config.modes import StretchThenFollow
 from experiments.live.desk import REMEMBERED, Desk
 
 Acts = Callable[[Callable[[Any], None]], Callable[[Any], None]]
@@ -87,7 +88,7 @@ class ClockPanel:
         self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
         built = desk.built
         self._press.visible = built is not None and built.bends
-        self._perform.visible = built is not None and built.config.mode.kind == "stretch-then-follow"
+        self._perform.visible = built is not None and isinstance(built.config.mode, StretchThenFollow)
         self._perform.label = "Bend it again" if self._performs else "Perform the bent curve"
 
     @property

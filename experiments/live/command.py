@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from controllers.errors import ParameterError
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import RunConfig, phantom_of
 from experiments.live.gate import HERE, Gate
 from experiments.live.page import Page
 from experiments.live.run_panel import FOR_EVER
@@ -31,10 +31,12 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     Raises
     ------
     ParameterError
-        If the token is too easily guessed, the run has no figure to show, or it has a simulated user of its own.
+        If the token is too easily guessed, the run has no figure to show, or a simulated user or a replayed hand of its
+        own.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
+    phantom_of(config.device)
     if config.figure.kind == "none":
         raise ParameterError("the live page shows a figure; expected --figure physical or kinematic")
     if config.user.does not in ("relaxed", "lead") or config.user.pushes or config.user.grabs:

@@ -215,11 +215,10 @@ class Engine:
         """Index of the parameter with the time at which stretching ends; also stores the field's initial memory."""
         program: Program = self.session.parts.program
         self._initial = program.memory.copy()
-        laws = program.ops[program.ops[:, 0] >= 0]
-        for row, law in zip(laws.tolist(), program.laws, strict=True):
-            if self.tubes is not None and law is self.tubes:
-                self._record = self.tubes.record_at(row[2])
-                return row[1] + StretchyGains._fields.index("until")
+        for place in program.places():
+            if self.tubes is not None and place.law is self.tubes:
+                self._record = self.tubes.record_at(place.memory)
+                return place.params + StretchyGains._fields.index("until")
         return 0
 
 

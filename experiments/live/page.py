@@ -14,6 +14,7 @@ import viser
 
 from controllers.errors import ControllerError
 from controllers.state import Array
+from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import cap_there
 from experiments.live.clock_panel import ClockPanel
@@ -196,7 +197,7 @@ class Page:
         self.stage = LiveStage(
             self.server.scene, world.full_model(), courses(built.drawn), float(np.asarray(built.drawn["tube_radius"])),
             P_WH, "animation h(p)" if kinematic else "physical figure",
-            "animation h(p)" if built.config.map.kind == "rivers" else "default animation",
+            "animation h(p)" if isinstance(built.config.map, RiverClips) else "default animation",
         )  # fmt: skip
         self._ball = HandBall(self.server.scene)
         self._ball.on_drag(self._dragged)

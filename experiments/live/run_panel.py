@@ -5,7 +5,7 @@ from typing import Any
 import viser
 
 from controllers.errors import ParameterError
-from experiments.config.maps import MAPS, Led
+from experiments.config.maps import MAPS, Led, MapFile
 from experiments.config.modes import MODES
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
@@ -39,7 +39,7 @@ class RunPanel:
         self._gui, self._desk, self._acts = gui, desk, acts
         modes = tuple(mode.__pydantic_fields__["kind"].default for mode in MODES)  # pyright: ignore
         maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS)  # pyright: ignore
-        self._file = config.map.file if config.map.kind == "file" else ""
+        self._file = config.map.file if isinstance(config.map, MapFile) else ""
         with gui.add_folder("Run"):
             self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)
             self._map = gui.add_dropdown(
@@ -81,7 +81,7 @@ class RunPanel:
         config = built.config
         self._chosen = tuple(_name(clip) for clip in config.map.clips)
         self._mode.value, self._figure.value = config.mode.kind, config.figure.kind
-        if config.map.kind != "led":
+        if not config.leads:
             self._map.value = _map_kind(config)
         self._lay_slots()
 
@@ -123,7 +123,7 @@ class RunPanel:
 
 
 def _map_kind(config: RunConfig) -> str:
-    return "cylindrical" if config.map.kind == "led" else config.map.kind
+    return "cylindrical" if config.leads else config.map.kind
 
 
 def _default_clips(kind: str) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from experiments.results.summary_parts import (
     FigureSummary,
     PathSummary,
     PushSummary,
+    ReplaySummary,
     SpeedSummary,
     TankSummary,
     TraceSummary,
@@ -64,7 +65,7 @@ def summarise(
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
         path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
-        oscillation=oscillation_summary(recording),
+        oscillation=oscillation_summary(recording), trace=_replay_summary(recording),
     )  # fmt: skip
 
 
@@ -104,12 +105,25 @@ def measured(
 
 def trace_summary(recording: Recording) -> TraceSummary:
     """Measure a hand that traces the curve."""
-    ticks, distance, force = recording.groups["ticks"], MeanSquare(), 0.0
+    ticks, force = recording.groups["ticks"], 0.0
+    for first in range(0, len(ticks["t"]), BLOCK_ROWS):
+        force = max(force, float(np.linalg.norm(ticks["user"][first : first + BLOCK_ROWS], axis=1).max()))
+    return TraceSummary(_deviation_mm(recording, SETTLING), force)
+
+
+def _replay_summary(recording: Recording) -> ReplaySummary | None:
+    if "replayed" not in recording.texts:
+        return None
+    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.texts["distance_from"])
+
+
+def _deviation_mm(recording: Recording, since: float) -> float:
+    """Distance of the stylus from the curve from the time `since` [s] on, RMS [mm]."""
+    ticks, distance = recording.groups["ticks"], MeanSquare()
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         rows = slice(first, first + BLOCK_ROWS)
-        distance.add(ticks["distance"][rows][ticks["t"][rows] >= SETTLING])
-        force = max(force, float(np.linalg.norm(ticks["user"][rows], axis=1).max()))
-    return TraceSummary(1e3 * distance.root, force)
+        distance.add(ticks["distance"][rows][ticks["t"][rows] >= since])
+    return 1e3 * distance.root
 
 
 class PathMeasure:
@@ -125,6 +139,7 @@ class PathMeasure:
         self._turned, self._first, self._time = 0.0, 0.0, 0.0
         self._anchor, self._moved = np.full(3, np.inf), 0.0
         self._released = -math.inf
+        self._replayed = "replayed" in recording.texts
         self._pushes: list[PushSummary] = []
         self._pushing = False
 
@@ -133,7 +148,7 @@ class PathMeasure:
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
         at_work = size > HAND_AT_WORK
         last = np.maximum.accumulate(np.where(at_work, t, self._released))
-        pushed = t - last <= SETTLING
+        pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
         self._released = float(last[-1])
         self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
         self._add_phase(t, ticks["phase"])

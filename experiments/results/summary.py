@@ -11,6 +11,7 @@ from experiments.results.summary_parts import (
     AnimationSummary,
     FigureSummary,
     PathSummary,
+    ReplaySummary,
     SpeedSummary,
     TankSummary,
     TraceSummary,
@@ -37,8 +38,8 @@ class RunSummary:
         How the figure was led, in LEADING.
     editing, performance : EditingSummary, PerformanceSummary or None
         In the modes that bend a curve, the part of the run in which it was bent, and that in which it was performed.
-    trace : TraceSummary or None
-        How the hand traced the curve by itself, if it did.
+    trace : TraceSummary, ReplaySummary or None
+        How the hand traced the curve by itself, or moved as it was recorded, if it did.
     oscillation : OscillationSummary or None
         Measured stability of the loop.
     """
@@ -55,7 +56,7 @@ class RunSummary:
     lead: LeadSummary | None = None
     editing: EditingSummary | None = None
     performance: PerformanceSummary | None = None
-    trace: TraceSummary | None = None
+    trace: TraceSummary | ReplaySummary | None = None
     oscillation: OscillationSummary | None = None
 
     def lines(self) -> list[str]:
@@ -82,10 +83,11 @@ class RunSummary:
 
     def _of_the_hand(self) -> list[str]:
         """Sentences on stylus and animation, by kind of run: LEADING, a bent curve, or any other."""
+        replayed = [self.trace.line()] if isinstance(self.trace, ReplaySummary) else []
         if self.lead is not None:
-            return self.lead.lines()
+            return [*replayed, *self.lead.lines()]
         if self.editing is not None:
-            return [*self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
+            return [*replayed, *self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
         path, animation = self.path, self.animation
         alone = path.deviation_rms_mm
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"

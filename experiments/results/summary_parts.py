@@ -128,6 +128,32 @@ class TraceSummary:
 
 
 @dataclass(frozen=True)
+class ReplaySummary:
+    """A replayed hand, which moved as it was recorded.
+
+    Attributes
+    ----------
+    run : str
+        Folder of the run whose hand it was.
+    deviation_rms_mm : float
+        Distance of the stylus from what the field leads along.
+    distance_from : str
+        What that is, such as the curve.
+    """
+
+    run: str
+    deviation_rms_mm: float
+    distance_from: str
+
+    def line(self) -> str:
+        """Summary in a sentence."""
+        return (
+            f"The hand was that of {self.run} and moved as recorded, whatever the force: "
+            f"{self.deviation_rms_mm:.2f} mm RMS from {self.distance_from}."
+        )
+
+
+@dataclass(frozen=True)
 class TankSummary:
     """How much of its energy budget the field needed.
 

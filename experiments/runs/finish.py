@@ -8,7 +8,7 @@ from experiments.console.compiling import compile_once
 from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
 from experiments.results.report_of import lines_of, write_report_of
 from experiments.results.summary_parts import SpeedSummary
-from experiments.runs.reproduce import check_map
+from experiments.runs.reproduce import check_files
 from experiments.runs.run import measured, write_animations, write_summary
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
@@ -41,7 +41,7 @@ def _complete(folder: Path) -> None:
     """Write summary and animations; state that is not in the recording is found by simulating the run again."""
     with Recording(folder / RECORDING) as recording:
         config = config_of(recording)
-        check_map(config, recording)
+        check_files(config, recording)
         session = wire(config, clips_of(recording), lambda units: compile_once(Console(stderr=True), units))
         seconds = len(recording.channel("ticks", "t")) * session.servo.plant.period
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)

@@ -14,6 +14,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
 from experiments.results.arm import arm_channels
 from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm
+from experiments.setups.devices import check_hand
 from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from sim.errors import SimError
@@ -51,8 +52,17 @@ class _Comparison:
         self._rows[group] += n
 
 
-def check_map(config: RunConfig, recording: Recording) -> None:
-    """Refuse a map whose file has changed since the recording was made."""
+def check_files(config: RunConfig, recording: Recording) -> None:
+    """Refuse a map whose file, or a replayed hand whose recording, has changed since the recording was made.
+
+    Raises
+    ------
+    SimError
+        If one has changed or the hand's recording cannot be read.
+    OSError
+        If the map's file cannot be read.
+    """
+    check_hand(config, recording)
     recorded = recording.texts.get("map_sha256")
     if recorded is None:
         return
@@ -98,8 +108,8 @@ def reproduce(folder: Path) -> Reproduced:
     Raises
     ------
     SimError
-        If the folder holds no recording, the file of its map has changed, a person drove the run live, or it is of a
-        `Simulation` put together in Python.
+        If the folder holds no recording, the file of its map or the hand that it replays has changed, a person drove
+        the run live, or it is of a `Simulation` put together in Python.
     OSError
         If a file cannot be read.
     """
@@ -117,7 +127,7 @@ def reproduce(folder: Path) -> Reproduced:
 def _again(recording: Recording) -> tuple[Servo, World, Channels]:
     """A recorded run of a figure in its start state, and the channels that it recorded."""
     config = config_of(recording)
-    check_map(config, recording)
+    check_files(config, recording)
     session = wire(config, clips_of(recording))
     servo, shown = session.servo, groups(session.servo)["frames"].channels
 

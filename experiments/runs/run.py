@@ -142,7 +142,7 @@ def _simulate(
     servo = session.servo
     record = record_into(recorder, servo, session.world)
     page = _live_page(session) if view else NullPage()
-    clock, simulated = RealTime(), session.world.kind == "physical"
+    clock, simulated = RealTime(), session.world.simulates_figure
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         record(ticks, frames, n)

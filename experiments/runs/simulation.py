@@ -1,5 +1,6 @@
 """Simulations from Python: put parts together, run them in memory or into a folder, step them tick by tick."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,11 +17,13 @@ from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
-from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.config.part import to_dict
+from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.runs.run_result import Run
 from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.devices import device_of
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
 from experiments.setups.hands import intent_of, participant
 from experiments.setups.parts import ClipMapParts, Notes, Parts
@@ -28,6 +31,7 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
+from sim.devices.device import ticks_of
 from sim.loop.loop import Loop
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.hand.arm import Arm
@@ -35,6 +39,8 @@ from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
 from sim.world.world import World
+
+_MINUTE = 60.0  # [s]
 
 
 class FigureMap(Protocol):
@@ -122,6 +128,12 @@ class User:
     person: Person | None = None
     intent: PersonIntent | None = None
 
+    @property
+    def acts(self) -> bool:
+        """Whether the hand does anything of itself, or is a person's."""
+        does = (self.pushes, self.turns, self.grabs, self.traces, self.person, self.intent)
+        return any(part is not None and part != () and part != [] for part in does)
+
     def hand(self, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
         """The hand for a run of `seconds` [s] about a curve, with a seed.
 
@@ -180,8 +192,8 @@ class Simulation:
         Map from the stylus to the figure; a user-defined `HapticMap` is taken to lie along the curve of the field.
     user : User
         The simulated hand.
-    device : Phantom
-        The device.
+    device : Phantom or Replay
+        The device, or the recorded hand that takes its place, without a user.
     figure : Figure
         The figure that plays the animation.
     clock : Clock
@@ -194,13 +206,13 @@ class Simulation:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If the rates are not multiples of each other.
+        If the rates are not multiples of each other, or a replayed hand has a user.
     """
 
     field: Law
     haptic_map: FigureMap | HapticMap
     user: User = User()
-    device: Phantom = Phantom()  # noqa: RUF009 - frozen
+    device: Phantom | Replay = Phantom()  # noqa: RUF009 - frozen
     figure: Figure = Figure()  # noqa: RUF009
     clock: Clock = Clock()  # noqa: RUF009
     seed: int = 1
@@ -208,6 +220,8 @@ class Simulation:
 
     def __post_init__(self) -> None:
         check_rates(self)
+        if isinstance(self.device, Replay) and self.user.acts:
+            raise ParameterError(SIMULATED_TOO)
 
     @property
     def scene(self) -> SceneConfig:
@@ -215,8 +229,10 @@ class Simulation:
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
-    def session(self, seconds: float = 60.0) -> Session:
+    def session(self, seconds: float | None = None) -> Session:
         """The simulation put together for at most `seconds` [s]; compiles what it needs.
+
+        By default that is a minute, or as long as a replayed hand moves.
 
         Raises
         ------
@@ -224,9 +240,12 @@ class Simulation:
             If its parts do not fit together.
         """
         world, console = World(self.scene, self.figure.kind), Console(stderr=True)
+        device, span = device_of(self, world, seconds), seconds or _MINUTE
         given = self.haptic_map
         maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
-        return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
+        return assemble(
+            world, maps, lambda m: self._parts(m, span), lambda units: compile_once(console, units), device
+        )  # fmt: skip
 
     def _curve(self) -> Trajectory:
         """Curve of the first law of the field that has one: a user-defined map lies along it."""
@@ -272,10 +291,11 @@ class Simulation:
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 
     def __iter__(self) -> Iterator[Tick]:
-        """Step tick by tick, without end: ``for tick in sim``."""
+        """Step tick by tick, without end, or until a replayed hand's: ``for tick in sim``."""
         session = self.session()
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
-        while True:
+        left = ticks_of(session.servo.device)
+        for _ in itertools.count() if left is None else range(left):
             ticks, frames = loop.step()
             session.haptic_map.check()
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
@@ -292,5 +312,6 @@ class Simulation:
             "field": self.field.description(),
             "map": {"kind": type(self.haptic_map).__name__, "clips": [clip.name for clip in clips]},
             "clock": {"servo_period": self.clock.servo_period, "physics_step": self.clock.physics_step},
+            "device": to_dict(self.device),
             "seed": self.seed,
         }

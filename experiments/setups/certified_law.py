@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from controllers.fields.bunny import felt_bunny
+from experiments.config.maps import Led, MapFile
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved, river_gains, tube_gains
@@ -57,7 +58,7 @@ def governor_drag(config: RunConfig) -> float:
 
 def of_clips(config: RunConfig) -> bool:
     """Whether the certificate depends on clips too: a led figure, a map from a file, a governor, gates or walls."""
-    return config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
+    return isinstance(config.map, Led | MapFile) or governor_drag(config) > 0.0 or bool(left_out(config))
 
 
 def left_out(config: RunConfig) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ Imports only configurations, since certificates import it too.
 
 from dataclasses import replace
 
+from experiments.config.maps import MapFile
 from experiments.config.modes import Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 
@@ -18,19 +19,19 @@ SEARCH = {"default": (150.0, 14.0), "file": (50.0, 20.0)}
 # file the seeking spring is as soft as the rivers there: the figure follows every movement of the hand, and
 # neighbouring curves hold different motions.
 _SEARCHED = ("seek", "tube_damping")
-_OPEN = {
-    "rivers": (("stiffness", "damping"), RIVER_GAINS),
-    "stretch": (_SEARCHED, SEARCH),
-    "stretch-then-follow": (_SEARCHED, SEARCH),
+_OPEN: dict[type, tuple[tuple[str, str], dict[str, tuple[float, float]]]] = {
+    Rivers: (("stiffness", "damping"), RIVER_GAINS),
+    Stretch: (_SEARCHED, SEARCH),
+    StretchThenFollow: (_SEARCHED, SEARCH),
 }
 
 
 def resolved(config: RunConfig) -> RunConfig:
     """A configuration with the gains that it leaves open filled in."""
     left: dict[str, float] = {}
-    if config.mode.kind in _OPEN:
-        names, values = _OPEN[config.mode.kind]
-        numbers = values["file" if config.map.kind == "file" else "default"]
+    if type(config.mode) in _OPEN:
+        names, values = _OPEN[type(config.mode)]
+        numbers = values["file" if isinstance(config.map, MapFile) else "default"]
         left = {name: n for name, n in zip(names, numbers, strict=True) if getattr(config.mode, name) is None}
     return replace(config, mode=replace(config.mode, **left))
 

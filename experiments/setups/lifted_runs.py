@@ -99,19 +99,20 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
         If the curve has no transition.
     """
     first, damping = curve_number(haptic_map, curve), river_gains(mode)[1]
-    rows = [row for row in haptic_map.transitions if first in (row[0], row[1])]
-    if not rows:
-        pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]
+    own = [at for at in haptic_map.transitions if first in (at.first, at.second)]
+    if not own:
+        pairs = [f"{haptic_map.names[at.first]} – {haptic_map.names[at.second]}" for at in haptic_map.transitions]
         raise ParameterError(
             f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
             f"{', '.join(pairs) or 'none'}; leave out --user push, or begin on another --curve"
         )
-    second = int(rows[0][1] if int(rows[0][0]) == first else rows[0][0])
+    best = own[0]
+    second = best.second if best.first == first else best.first
     laps = [haptic_map.curve(i).duration for i in (first, second)]
     begin = laps[0]
     return (
-        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, damping),
-        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], damping),
+        pushed_over(haptic_map, first, second, best.angle, begin, damping),
+        pushed_over(haptic_map, second, first, best.angle, begin + _STAY * laps[1], damping),
     )
 
 

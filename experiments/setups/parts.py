@@ -15,7 +15,7 @@ from controllers.safety.energy_tank import EnergyTank
 from controllers.state import Array
 from controllers.walking.walker import Walker
 from experiments.config.modes import Rivers
-from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.results.summary import RunSummary
 from experiments.setups.expression import expressive_figure
 from models.mocap.motion.clip import Clip
@@ -40,7 +40,7 @@ class Settings(Protocol):
         ...
 
     @property
-    def device(self) -> Phantom:
+    def device(self) -> Phantom | Replay:
         """The device."""
         ...
 

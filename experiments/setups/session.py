@@ -12,6 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
+from experiments.setups.devices import recorded_as
 from experiments.setups.parts import Parts, Settings
 from models.humanoid.skeleton import N_POSE, standing_com
 from models.mocap.motion.clip import Clip
@@ -101,6 +102,7 @@ class Session:
             "clip_fps": np.array([clip.fps for clip in self.clips]),
             **self.parts.maps.static,
             **notes.static,
+            **recorded_as(self.config, self.servo.device),
         }
 
     @property

@@ -5,7 +5,7 @@ from typing import Any
 
 import mujoco
 
-from experiments.config.maps import Map
+from experiments.config.maps import Led, Map
 from experiments.config.run_config import RunConfig
 from experiments.setups.bunny import bunny_parts
 from experiments.setups.clips import load_clips
@@ -36,7 +36,7 @@ def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     ModelError
         If there is no such clip, or a file cannot be read.
     """
-    return led_clips(part) if part.kind == "led" else load_clips(part.clips, part.raw)
+    return led_clips(part) if isinstance(part, Led) else load_clips(part.clips, part.raw)
 
 
 def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:

@@ -14,7 +14,7 @@ from controllers.safety.energy_tank import river_power, spring_store
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.modes import Stretch, StretchThenFollow
-from experiments.config.run_config import RunConfig, User
+from experiments.config.run_config import Replay, RunConfig, User
 from experiments.results.stretch_measures import editing_summary, performance_summary
 from experiments.results.stretch_summary import stretch_summary
 from experiments.results.summary import RunSummary
@@ -74,6 +74,8 @@ class _Performance(NamedTuple):
 
 
 def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
+    if isinstance(config.device, Replay):
+        return config.user
     by_default = stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
     if config.user.person is not None:  # a person makes no clicks without a place
         by_default = tuple(grab for grab in by_default if grab.place is not None)

@@ -6,15 +6,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from controllers.curves.stylus import UPRIGHT, stylus_path
+from controllers.curves.stylus import UPRIGHT
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE, Array
-from experiments.config.run_config import NOBODY_LED, RunConfig
-from experiments.files.device_files import linkage_of
+from controllers.state import STYLUS_POSE, Array, HandState
+from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.defaults import resolved
+from experiments.setups.devices import DeviceOf, device_of
 from experiments.setups.eyes import POSES, with_eyes
 from experiments.setups.hands import Beginning, beginning
 from experiments.setups.parts import MapParts, Parts, Settings
@@ -22,12 +22,13 @@ from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
+from models.phantom.kinematics import Quat
 from models.world.scene import FIGURE
 from sim.body.drive import BodyState
 from sim.body.figure import Figure
 from sim.body.unsimulated import kinematic_figure, no_figure
 from sim.compilation.units import Unit
-from sim.devices.device import DeviceState
+from sim.devices.replayed import ReplayedHand
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
@@ -56,9 +57,6 @@ Ready = Callable[[tuple[Unit, ...]], None]
 MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]
 """Maps configuration, figure and clips to the map's parts."""
 
-DeviceOf = Callable[[World], DeviceState]
-"""Makes the device of a world; without it a simulated Phantom held by the run's user is made."""
-
 
 def wire(
     config: RunConfig,
@@ -78,7 +76,7 @@ def wire(
     ready : callable
         See `Ready`.
     device : callable, optional
-        See `DeviceOf`.
+        See `DeviceOf`; by default that of the configuration.
     maps_of : callable
         Makes the map's parts, as `map_parts` does; many runs on one map may share them.
 
@@ -91,12 +89,12 @@ def wire(
     if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
         least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
-    if device is None and config.mode.kind == "lead" and config.figure.kind == "none":
-        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
     check_rates(config)
     world = World(config.scene, config.figure.kind)
-    if config.device.device_file:
-        linkage_of(config.device).into(world)
+    if device is None and config.leads and not world.has_figure:
+        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
+    if device is None:
+        device = device_of(config, world, config.seconds)
     maps = maps_of(config, world.figure, clips)
     return assemble(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
@@ -131,10 +129,10 @@ def assemble(
     draft = parts_of(maps)
     ready(_units(draft, _servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
-    refined = maps.refine() if world.kind != "none" else maps
+    refined = maps.refine() if world.has_figure else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
-    if isinstance(parts.user, Participant) and world.kind != "none" and parts.walker is None:
+    if isinstance(parts.user, Participant) and world.has_figure and parts.walker is None:
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
@@ -172,7 +170,9 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
         user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
-        device = simulated_phantom(phantom_port(world.model, world.data, period, config.device.cutoff), user)
+        device = simulated_phantom(
+            phantom_port(world.model, world.data, period, phantom_of(config.device).cutoff), user
+        )
     else:
         device = device_of(world)
     body, reference = _BODIES[world.kind](parts, world, compiled)
@@ -213,14 +213,13 @@ _BODIES = {"physical": _physical, "kinematic": _kinematic, "none": _none}
 def _begin(parts: Parts, servo: Servo, world: World) -> None:
     """Set stylus and figure to the start state of the run."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
-    begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), moves)
-    # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
-    orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
+    begin, orientation = _first(parts, servo)
     stylus = begin.velocity if moves else None
-    if world.kind == "none":
+    if not world.has_figure:
         world.reset(begin.point, rest_pose(), orientation, stylus)
     else:
-        argument = stylus_path(begin.point[None]) if parts.walker is None else servo.argument[None]
+        stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
+        argument = (stylus_pose if parts.walker is None else servo.argument)[None]
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
@@ -231,6 +230,17 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
             begin_in_motion(reference, np.array(begin))
     if moves and isinstance(servo.device, SimulatedPhantom):
         sense_in_motion(servo.device.port)
+
+
+def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
+    """How the stylus begins, and its orientation; without one the gimbal's joints are at zero."""
+    if isinstance(parts.config.device, Replay) and isinstance(servo.device, ReplayedHand):
+        hand = HandState.of(servo.device.rows[0])
+        w, x, y, z = (float(number) for number in hand.q)
+        return Beginning(hand.p, hand.v, np.zeros(3)), (w, x, y, z)
+    begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), parts.begins_in_motion)
+    # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
+    return begin, UPRIGHT if parts.maps.expressive or parts.user.turns else None
 
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:

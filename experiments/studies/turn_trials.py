@@ -16,7 +16,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.certificates.flight.ballistic import BodyMotion
-from controllers.certificates.flight.tolerance import GRAVITY, JUDGING
+from controllers.certificates.flight.tolerance import JUDGING
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips

@@ -10,8 +10,9 @@ wrong sign.
 import numpy as np
 from numba import njit
 
+from models.gravity import GRAVITY
 from models.phantom.kinematics import Matrix3, Scalars3, Vec3
-from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from models.phantom.parameters import PREMIUM_1_5
 
 _P = PREMIUM_1_5
 L1 = _P.l1

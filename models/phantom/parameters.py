@@ -13,8 +13,6 @@ import numpy as np
 Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
-GRAVITY = 9.81  # along −y of the device frame [m/s²]
-
 
 def _deg(low: float, high: float) -> Pair:
     return float(np.deg2rad(low)), float(np.deg2rad(high))

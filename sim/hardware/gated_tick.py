@@ -16,7 +16,7 @@ from models.phantom.dynamics import gravity_torques
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compilation.compiled import entry_point
 from sim.devices.exchange import COMMAND_FAULT, COMMAND_FORCE, COMMAND_TORQUE, Exchange
-from sim.world.encoders import PEAK_TORQUE, motor_torques
+from sim.world.encoders import ANGLES, PEAK_TORQUE, motor_torques
 
 CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
 THERMAL_TIME = 10.0
@@ -94,7 +94,7 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     memory, held_back = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
     motor_torques(faults, memory, device.hand[HAND_TIME], force, torque)
     # J(θ)ᵀF is already ramped in with F, the gravity torques are not yet.
-    weight = gravity_torques((memory[0], memory[1], memory[2]))
+    weight = gravity_torques((memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
     gated.told[TOLD_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)

@@ -45,6 +45,7 @@ TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "ha
 """Tip position predicted for the tick, in H [m], its distance from the measured one [m], and the hand's force in H
 [N]."""
 
+_INTEGRAL, _STARTED = 3, 6  # places in the memory of `momentum_residual`, which begins with r
 _VISCOUS, _COULOMB = PREMIUM_1_5.viscous_friction, PREMIUM_1_5.coulomb_friction
 
 
@@ -69,15 +70,15 @@ def momentum_residual(
     m, c, n = mass_matrix(theta), coriolis_matrix(theta, rate), gravity_torques(theta)
     for i in range(3):
         momentum = m[i][0] * rate[0] + m[i][1] * rate[1] + m[i][2] * rate[2]
-        if memory[6] == 0.0:
-            memory[3 + i] = momentum
+        if memory[_STARTED] == 0.0:
+            memory[_INTEGRAL + i] = momentum
             continue
         turned = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
         friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / SLOW)
-        memory[3 + i] += period * (torque[i] + turned - n[i] - friction)
-        memory[i] = gain * (momentum - memory[3 + i]) / (1.0 + gain * period)
-        memory[3 + i] += period * memory[i]
-    memory[6] = 1.0
+        memory[_INTEGRAL + i] += period * (torque[i] + turned - n[i] - friction)
+        memory[i] = gain * (momentum - memory[_INTEGRAL + i]) / (1.0 + gain * period)
+        memory[_INTEGRAL + i] += period * memory[i]
+    memory[_STARTED] = 1.0
 
 
 class TwinMemory(NamedTuple):

@@ -93,7 +93,7 @@ class World:
             If the Phantom cannot reach the point.
         """
         place_stylus(self.model, self.data, p_H, q_HS, v_H)
-        if self.kind == "physical":
+        if self.simulates_figure:
             velocity_at = int(self.model.joint(FIGURE + "root").dofadr[0])
             self.data.qpos[self.pose_at : self.pose_at + N_POSE] = pose
             if velocity is not None:
@@ -101,9 +101,19 @@ class World:
         mujoco.mj_forward(self.model, self.data)
 
     @property
+    def has_figure(self) -> bool:
+        """Whether there is a figure, in the physics or only shown."""
+        return self.kind != "none"
+
+    @property
+    def simulates_figure(self) -> bool:
+        """Whether the figure is in the physics."""
+        return self.kind == "physical"
+
+    @property
     def pose_at(self) -> int:
         """Index of the figure's pose in a recorded configuration; if not in the physics, it is appended to qpos."""
-        if self.kind != "physical":
+        if not self.simulates_figure:
             return int(self.model.nq)
         return int(self.model.joint(FIGURE + "root").qposadr[0])
 
@@ -117,7 +127,7 @@ class World:
 
         Zero if no figure is in the physics.
         """
-        if self.kind != "physical":
+        if not self.simulates_figure:
             return np.zeros(3)
         root = int(self.model.joint(FIGURE + "root").dofadr[0])
         return self.data.qfrc_constraint[root : root + 3]

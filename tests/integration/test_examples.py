@@ -16,6 +16,7 @@ PRINTS = {
     "step_by_step": "half way after",
     "edited_motion": "edited.bvh: 3.0 s",
     "own_hand": "she felt",
+    "replayed_hand": "the same hand would feel",
     "own_map": "a push bows the trunk",
 }
 

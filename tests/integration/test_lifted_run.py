@@ -27,7 +27,7 @@ def map_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
     haptic_map, clips = load_figure_map(map_file)
     assert tuple(clip.name for clip in clips) == CLIPS
-    pairs = {(int(row[0]), int(row[1])) for row in haptic_map.transitions}  # pyright: ignore
+    pairs = {(at.first, at.second) for at in haptic_map.transitions}  # pyright: ignore
     assert (0, 1) in pairs
     assert main(["lift", *CLIPS, "--out", str(map_file)]) == 2
 
@@ -83,7 +83,7 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     (change,) = summary.changes
     assert (change.before, change.after) == (first, second)
     haptic_map, _ = load_figure_map(map_file)
-    angle = next(row[2] for row in haptic_map.transitions if tuple(row[:2]) == (0.0, 1.0))  # pyright: ignore
+    angle = next(at.angle for at in haptic_map.transitions if (at.first, at.second) == (0, 1))  # pyright: ignore
     with Recording(tmp_path / "pushed" / "run.h5") as recording:
         t, p = recording.channel("ticks", "t")[:], recording.channel("ticks", "p")[:]
         distance = recording.channel("ticks", "distance")[:]

@@ -21,9 +21,10 @@ from controllers.certificates.flight.flight_fit import (
     fit_flight,
     reachable_rates,
 )
-from controllers.certificates.flight.tolerance import GRAVITY, BallisticTolerance
+from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.certificates.report import Outcome, Verdict
 from controllers.errors import ParameterError
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 
 
@@ -172,9 +173,9 @@ def ballistic_verdict(
     if refuted:
         fit = refuted[0].fit
         com = motion.com[fit.start : fit.end + 1]
-        distance, state = best_fall(com, motion.fps, 1.0)
+        distance, (position, velocity) = best_fall(com, motion.fps, 1.0)
         counterexample = {
-            "start": fit.start, "end": fit.end, "position": state[0], "velocity": state[1],
+            "start": fit.start, "end": fit.end, "position": position, "velocity": velocity,
             "momentum": fit.momentum, "distance": distance,
         }  # fmt: skip
         reason = "; ".join(flight.reason for flight in refuted)

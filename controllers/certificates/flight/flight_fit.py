@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 
 NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body

@@ -21,9 +21,9 @@ import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement
-from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
+from controllers.gravity import GRAVITY
 from controllers.state import Array
 
 _ANY_RATE = 100.0  # a larger admissible rate is no practical bound

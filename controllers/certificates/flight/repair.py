@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.errors import ControllerError, ParameterError
+from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 
 _PACE = 0.5  # s_h, scale of changes of the rate (natural logarithm)

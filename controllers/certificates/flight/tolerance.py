@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.errors import ParameterError
-
-GRAVITY = 9.81  # [m/s²]
+from controllers.gravity import GRAVITY
 
 
 @dataclass(frozen=True)

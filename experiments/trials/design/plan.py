@@ -12,7 +12,7 @@ import numpy as np
 from controllers.errors import ParameterError
 from experiments.config.maps import MapFile
 from experiments.config.part import to_json
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import RunConfig, phantom_of
 from experiments.config.words import run_config
 from experiments.setups.defaults import resolved
 from experiments.trials.design.code_hash import code_hash
@@ -84,7 +84,7 @@ def key_of(config: RunConfig) -> str:
 def files_of(config: RunConfig) -> tuple[str, ...]:
     """Files that a configuration names: clips that are not embedded, the map's, and the device's."""
     clips = tuple(name for name in config.map.clips if name not in embedded_names())
-    others = (config.map.file if isinstance(config.map, MapFile) else "", config.device.device_file)
+    others = (config.map.file if isinstance(config.map, MapFile) else "", phantom_of(config.device).device_file)
     return clips + tuple(name for name in others if name)
 
 

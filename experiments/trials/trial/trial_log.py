@@ -23,7 +23,7 @@ class TrialLog:
 
     def __init__(self, servo: Servo, world: World):
         self._every, self._pose_at = servo.figure_ticks, world.pose_at
-        self._physical, self._shown = isinstance(servo.figure, FigureState), world.kind != "none"
+        self._physical, self._shown = isinstance(servo.figure, FigureState), world.has_figure
         self._ticks: dict[str, list[Array]] = {name: [] for name in _TICKS}
         self._frames: dict[str, list[Array]] = {}
 

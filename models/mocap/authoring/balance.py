@@ -15,11 +15,11 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from models.arrays import Array
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.motion.clip import Clip
 
-GRAVITY = 9.81  # [m/s²]
 _SUPPORT_HEIGHT = 0.006  # height below which a contact sphere counts as support [m]
 
 

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import contact_points
 
-GRAVITY = 9.81  # [m/s²]
 _HIGH = 0.03  # least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand
 _CLEAR = 0.08  # height that all of them exceed once in a flight [m]: dancers' feet hover higher than walkers'
 _SHORT = 0.09  # least duration of a flight from which acceleration is estimated [s]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array, Mask
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
@@ -35,7 +36,6 @@ _RISE = 0.08  # time before and after stance in which this height is reached [s]
 _RESTS = 0.1  # time at both ends of an open clip in which both feet stand [s]
 _KEPT = 0.05  # time before and after a stance over which a sphere keeps its place ever less [s]: one knot of `Change`
 _UPRIGHT = 0.55  # least height of the root there [m]: a crawling or lying body is supported otherwise
-_GRAVITY = 9.81
 
 
 class Stances(NamedTuple):
@@ -248,7 +248,7 @@ def _load(poses: Array, fps: float) -> Array:
         return np.ones(len(poses))
     height = momentum(Clip(poses, fps, "load")).com[:, 2]
     rising = np.gradient(np.gradient(height)) * fps**2
-    return gaussian_filter1d(rising / _GRAVITY + 1.0, _SMOOTHING * fps)
+    return gaussian_filter1d(rising / GRAVITY + 1.0, _SMOOTHING * fps)
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:

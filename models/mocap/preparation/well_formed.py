@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import Array, Mask
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
@@ -32,7 +33,6 @@ _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not 
 _UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
 _ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
 _SHORT_FLIGHT = 0.08  # least duration of a flight [s]
-_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -210,5 +210,5 @@ def _flights(clip: Clip) -> tuple[int, float]:
             continue
         # A parabola's leading coefficient is half the acceleration, without the noise of second differences.
         acceleration = 2.0 * np.polyfit(times, com[start:end], 2)[0]
-        squares.append(float(np.sum((acceleration + np.array([0.0, 0.0, _GRAVITY])) ** 2)))
+        squares.append(float(np.sum((acceleration + np.array([0.0, 0.0, GRAVITY])) ** 2)))
     return len(spans), float(np.sqrt(np.mean(squares))) if squares else 0.0

@@ -99,7 +99,7 @@ def test_after_its_end_and_far_from_it_a_recording_is_not_felt():
 def test_a_recording_that_waits_goes_on_when_the_hand_comes_by_and_begins_again():
     performed = performance(TIMES, _pushed(np.random.default_rng(5), 2.0)[0])
     program = Edited(RIVER, (performed,), (1.0,), pace="wait").program()
-    slot = int(program.ops[1, 2])  # the recording comes second
+    slot = program.places()[1].memory  # the recording comes second
     clock = np.arange(9000) * 1e-3
     held = np.array([HandState.at([0.0, 0.0, 0.06], t=t).vector() for t in clock[:100]])
     along = np.array([HandState.at(performed.point(t % 4.0), t=0.1 + t).vector() for t in clock])

@@ -219,7 +219,7 @@ def test_two_tubes_share_a_space_and_each_bends_its_own_curve() -> None:
     upper = StretchyTubes(Trajectory.circle(0.05, 4.0, (0.0, 0.0, 0.05)), 50.0, 200.0, 0.0)
     program = TUBES.program() + upper.program()
     session = Session(TUBES, program)
-    slots = program.ops[:2, 2].tolist()  # the two fields, before their sum
+    slots = [place.memory for place in program.places()]
     session.at([0.05, 0.0, 0.05])
     session.drag([0.05, 0.0, 0.05], [0.065, 0.0, 0.05])
     assert [len(field.edits(session.memory, slot)) for field, slot in zip((TUBES, upper), slots, strict=True)] == [0, 1]

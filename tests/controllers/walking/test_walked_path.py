@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from controllers.gravity import GRAVITY
 from controllers.walking.walked_path import (
-    GRAVITY,
     PACKED_PATH,
     PATH_HEADING,
     PATH_LEAN,

@@ -23,7 +23,7 @@ from experiments.config.modes import (
     StretchThenFollow,
 )
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole
-from experiments.config.run_config import ArmConfig, Clock, Figure, Phantom, RunConfig, User, load_config
+from experiments.config.run_config import ArmConfig, Clock, Figure, Phantom, Replay, RunConfig, User, load_config
 from experiments.config.words import ADDED, VOCABULARY, RunOptions, changed, config_of_options, run_config, words_of
 from experiments.hardware.parts import served, session_of
 from experiments.setups.wiring import wire
@@ -32,8 +32,8 @@ from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
 from sim.users.person.population import persona
 
-PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Clock, RunConfig, ArmConfig)
-NEEDED: dict[type, dict[str, object]] = {MapFile: {"file": "map.npz"}}
+PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Replay, Clock, RunConfig, ArmConfig)
+NEEDED: dict[type, dict[str, object]] = {MapFile: {"file": "map.npz"}, Replay: {"run": "runs/mine"}}
 PUSHES = (Push(0.5, 0.3, -2.0), Push(1.0, 0.2, 1.0, (0.0, 0.0, 1.0), (0.05, 0.0, 0.0)))
 TURNS, GRABS = (Turn(0.0, 1.0, 0.5, (0.0, 0.0, 1.0)),), (Grab(1.0, (0.0, 0.01, 0.0), place=(0.05, 0.0, 0.0)),)
 
@@ -248,7 +248,7 @@ def test_every_mode_and_map_is_among_those() -> None:
         ("300.0", '"much"', "stiffness is 'much'; input should be a valid number"),
         ("300.0", "-3", "--stiffness is -3; expected 0 N/m or more, and finite"),
         ("0.0477", "NaN", "--radius is nan; expected more than 0 m, and finite"),
-        ('"phantom"', '"gloves"', "--kind is 'gloves'; expected 'phantom'"),
+        ('"phantom"', '"gloves"', "device is of kind 'gloves'; expected 'phantom', 'replay'"),
         ("{", "", "is not JSON"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 import hvf
 from controllers.certificates.loop.hand import NO_HANDS
 from experiments.cli import main
+from experiments.files.device_files import save_device
 from experiments.runs.sweep import with_values
 
 CURVE = hvf.circle(lap=2.0)
@@ -49,6 +50,14 @@ def test_a_number_of_one_law_of_a_composed_field_is_set_and_the_composition_stay
     by_hand = (hvf.Follow(CURVE, k_r=100, b_d=8) + level).limited(8.0)
     np.testing.assert_array_equal(other.field.wrench(hand).force, by_hand.wrench(hand).force)
     assert sim.field.program().laws[0].k_r == 300  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_simulation_has_the_parameters_of_its_device_file(tmp_path: Path) -> None:
+    save_device({"format": "hvf-device-1", "coulomb": {"value": [0.011, 0.012, 0.013]}}, tmp_path / "device.json")
+    device = hvf.Phantom(device_file=str(tmp_path / "device.json"))
+    world = simulation(level, device=device, figure=hvf.Figure(kind="none")).session().world
+    losses = [world.model.joint(f"phantom/theta{i}").frictionloss[0] for i in (1, 2, 3)]
+    assert losses == [0.011, 0.012, 0.013]
 
 
 @pytest.mark.parametrize("path", ["field.k", "field.level.k"])

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from models.gravity import GRAVITY
 from models.phantom.kinematics import within_limits
-from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from models.phantom.parameters import PREMIUM_1_5
 from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, phantom_spec
 
 

@@ -13,7 +13,8 @@ from scipy.special import ndtri
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.safety.arming import ARM
-from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from models.gravity import GRAVITY
+from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
 from sim.hardware.gated_servo import Ticker
 from sim.hardware.identification import NAMES, WINDOW, Identified, Motion, identify_linkage, motions_of

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights, fit_flight, reachable_rates
-from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.gravity import GRAVITY
 
 FPS = 120.0
 

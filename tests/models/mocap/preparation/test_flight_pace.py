@@ -2,10 +2,11 @@
 
 import pytest
 
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, HAND_CONTACTS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.pace import GRAVITY, falling, paced
+from models.mocap.preparation.pace import falling, paced
 from models.mocap.preparation.poses import contact_points
 
 

@@ -1,0 +1,148 @@
+"""A recorded hand in place of a device: it moves as it was recorded, and what it cannot do is refused by name."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hvf
+from experiments.cli import main
+from experiments.config.part import from_dict, to_dict
+from experiments.config.run_config import RunConfig, User
+from experiments.config.words import changed, run_config, words_of
+from experiments.runs.reproduce import reproduce
+from experiments.setups.wiring import wire
+from sim.errors import SimError
+from sim.recording.recording import Recording
+from tests.experiments.runs.test_public_face import CURVE, simulation
+
+SECONDS = 1.0
+HAND = ("t", "p", "quaternion", "v", "omega", "switch")
+DEVICE_ALONE = hvf.Figure(kind="none")
+
+
+def follow(k_r: float) -> hvf.Law:
+    return hvf.Follow(CURVE, k_r=k_r, b_d=8)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> hvf.Run:
+    pushed = hvf.User(pushes=[hvf.Push(at=0.3, seconds=0.4, force=2.5)])
+    sim = simulation(follow(300.0), user=pushed, figure=DEVICE_ALONE)
+    return sim.run(SECONDS, record=tmp_path_factory.mktemp("hand") / "mine")
+
+
+def replayed(recorded: hvf.Run, k_r: float, **parts: Any) -> hvf.Simulation:
+    return simulation(follow(k_r), device=hvf.Replay(str(recorded.folder)), **({"figure": DEVICE_ALONE} | parts))
+
+
+def test_in_its_own_field_a_replayed_hand_moves_as_recorded_and_feels_the_same_force(recorded: hvf.Run) -> None:
+    again = replayed(recorded, 300.0, seed=5).run(SECONDS)
+    for name in (*HAND, "force", "distance"):
+        np.testing.assert_array_equal(again.ticks[name], recorded.ticks[name], err_msg=name)
+    assert not again.ticks["user"].any()
+
+
+def test_in_another_field_it_moves_the_same_and_the_force_is_the_other_fields(recorded: hvf.Run) -> None:
+    again = replayed(recorded, 100.0).run(SECONDS)
+    np.testing.assert_array_equal(again.ticks["p"], recorded.ticks["p"])
+    assert np.abs(again.ticks["force"] - recorded.ticks["force"]).max() > 0.5
+    assert again.summary.path.deviation_rms_mm is None
+    assert f"The hand was that of {recorded.folder} and moved as recorded" in str(again)
+
+
+def test_whose_hand_it_was_is_told_in_every_mode(recorded: hvf.Run) -> None:
+    summary = replayed(recorded, 100.0).run(SECONDS).summary
+    led = SimpleNamespace(lines=lambda: ["The figure was led."])
+    for told in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
+        assert [line for line in told.lines() if line.startswith("The hand was that of")]
+        assert "The figure was led." in told.lines()
+
+
+def test_a_run_begins_where_the_recorded_hand_was_whatever_the_seed(recorded: hvf.Run) -> None:
+    session = replayed(recorded, 300.0, seed=5).session(SECONDS)
+    tip = session.world.data.site("phantom/tip").xpos
+    np.testing.assert_allclose(tip - session.static()["p_WH"], recorded.ticks["p"][0], atol=1e-9)
+
+
+def test_a_stepped_simulation_ends_with_the_recorded_hand(recorded: hvf.Run) -> None:
+    assert len(list(replayed(recorded, 300.0))) == len(recorded.ticks["t"])
+
+
+def device(folder: str | Path) -> dict[str, Any]:
+    return {"device": hvf.Replay(str(folder)), "figure": DEVICE_ALONE}
+
+
+def wired(folder: Path, **parts: Any) -> None:
+    wire(RunConfig(**(device(folder) | {"seconds": SECONDS} | parts)))
+
+
+@pytest.mark.parametrize(
+    ("ask", "says"),
+    [
+        (lambda run: wired(run / "nothing"), r"nothing/run.h5: cannot be opened \(there is no such file\)"),
+        (lambda run: wired(run, clock=hvf.Clock(servo_period=2e-3)), "recorded every 0.001 s, and the servo runs every "
+         "0.002 s; expected --servo-period 0.001"),
+        (lambda run: wired(run, seconds=1.1), "moves for 1 s, and the run lasts 1.1 s; expected --seconds 1 or less"),
+        (lambda run: wired(run, user=User(does="push")), "a replayed hand has no simulated user"),
+        (lambda run: wired(run, user=User(person=hvf.persona("median"))), "a replayed hand has no simulated user"),
+        (lambda run: simulation(follow(300.0), user=hvf.User(traces=CURVE), **device(run)), "has no simulated user"),
+        (lambda run: run_config(mode="stretch-then-follow", replay=str(run)), "does not tell when; expected another"),
+        (lambda run: run_config(replay=str(run), cutoff=100.0), "--cutoff has no meaning with .* it belongs to the "
+         "Phantom, without --replay"),
+        (lambda run: hvf.certify(simulation(follow(300.0), **device(run))), "replayed and feels no force; expected a "
+         "Phantom"),
+    ],
+    ids=["no recording", "other period", "too short", "user", "person", "hand of a simulation", "performs", "filter",
+         "certified"],
+)  # fmt: skip
+def test_what_a_replayed_hand_cannot_do_is_refused(recorded: hvf.Run, ask: Callable[[Path], None], says: str) -> None:
+    with pytest.raises((hvf.ParameterError, SimError), match=says):
+        ask(recorded.folder)
+
+
+def test_a_refused_run_leaves_its_folder_as_it_was(recorded: hvf.Run, tmp_path: Path) -> None:
+    arguments = ["run", "--figure", "none", "--replay", str(recorded.folder), "--out", str(tmp_path / "run")]
+    assert main(arguments) == 2
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_configured_replay_is_reproduced_while_the_recorded_hand_is_found_as_it_was(
+    recorded: hvf.Run, tmp_path: Path
+) -> None:
+    hand, out = tmp_path / "hand", tmp_path / "out"
+    hand.mkdir()
+    (hand / "run.h5").write_bytes((recorded.folder / "run.h5").read_bytes())
+    command = ["run", "--figure", "none", "--replay", str(hand), "--seconds", str(SECONDS), "--out", str(out)]
+    assert main(command) == 0
+    assert json.loads((out / "config.json").read_text())["device"] == {"kind": "replay", "run": str(hand)}
+    with Recording(out / "run.h5") as recording:
+        assert recording.texts["replayed"] == str(hand)
+    assert reproduce(out).same
+    other = simulation(follow(50.0), figure=DEVICE_ALONE).run(SECONDS)
+    (hand / "run.h5").write_bytes((other.folder / "run.h5").read_bytes())
+    with pytest.raises(SimError, match=rf"{hand}: the recorded hand has changed since the run was recorded"):
+        reproduce(out)
+    (hand / "run.h5").unlink()
+    with pytest.raises(SimError, match=rf"{hand}/run.h5: cannot be opened"):
+        reproduce(out)
+
+
+def test_a_replay_in_words_takes_the_place_of_the_user_that_a_configuration_has() -> None:
+    config = run_config(user="push", seconds=2.0, cutoff=100.0)
+    assert changed(config, {"replay": "runs/mine"}) == run_config(replay="runs/mine", seconds=2.0)
+
+
+def test_a_replay_goes_to_words_and_to_plain_data_and_back() -> None:
+    config = run_config(mode="bunny", replay="runs/mine")
+    assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
+    assert from_dict(RunConfig, to_dict(config), "here") == config
+
+
+def test_a_device_that_does_not_say_what_it_is_is_a_phantom() -> None:
+    assert from_dict(RunConfig, {"device": {"cutoff": 90.0}}, "here").device == hvf.Phantom(cutoff=90.0)
