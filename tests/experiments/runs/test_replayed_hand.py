@@ -88,7 +88,7 @@ def wired(folder: Path, **parts: Any) -> None:
         (lambda run: wired(run / "nothing"), r"nothing/run.h5: cannot be opened \(there is no such file\)"),
         (lambda run: wired(run, clock=hvf.Clock(servo_period=2e-3)), "recorded every 0.001 s, and the servo runs every "
          "0.002 s; expected --servo-period 0.001"),
-        (lambda run: wired(run, seconds=1.6), "moves for 1.5 s, and the run lasts 1.6 s; expected --seconds 1.5 or less"),
+        (lambda run: wired(run, seconds=1.6), "for 1.5 s, and the run lasts 1.6 s; expected --seconds 1.5 or less"),
         (lambda run: wired(run, user=User(does="push")), "a replayed hand has no simulated user"),
         (lambda run: wired(run, user=User(person=hvf.persona("median"))), "a replayed hand has no simulated user"),
         (lambda run: simulation(follow(300.0), user=hvf.User(traces=CURVE), **device(run)), "has no simulated user"),
