@@ -21,7 +21,7 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from tests.experiments.runs.test_public_face import CURVE, simulation
 
-SECONDS = 1.0
+SECONDS = 1.5  # longer than a hand that is let go of takes to settle
 HAND = ("t", "p", "quaternion", "v", "omega", "switch")
 DEVICE_ALONE = hvf.Figure(kind="none")
 
@@ -88,7 +88,7 @@ def wired(folder: Path, **parts: Any) -> None:
         (lambda run: wired(run / "nothing"), r"nothing/run.h5: cannot be opened \(there is no such file\)"),
         (lambda run: wired(run, clock=hvf.Clock(servo_period=2e-3)), "recorded every 0.001 s, and the servo runs every "
          "0.002 s; expected --servo-period 0.001"),
-        (lambda run: wired(run, seconds=1.1), "moves for 1 s, and the run lasts 1.1 s; expected --seconds 1 or less"),
+        (lambda run: wired(run, seconds=1.6), "for 1.5 s, and the run lasts 1.6 s; expected --seconds 1.5 or less"),
         (lambda run: wired(run, user=User(does="push")), "a replayed hand has no simulated user"),
         (lambda run: wired(run, user=User(person=hvf.persona("median"))), "a replayed hand has no simulated user"),
         (lambda run: simulation(follow(300.0), user=hvf.User(traces=CURVE), **device(run)), "has no simulated user"),
