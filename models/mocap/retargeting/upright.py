@@ -24,7 +24,7 @@ from models.mocap.retargeting.body_lines import BodyLines, unit
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 _CUSTOM = 0.1  # β
 _CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared/mocap have 0.72 and more
-# Least score of the best axis where bodies rest on the ground, and where they hardly do or have no ankles. In files of
+# Least score of the best axis where bodies rest on the ground, and where they hardly do. In files of
 # ../shared/mocap it is 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a
 # second have 0.1 and less, and 0.37 and less.
 _STANDS, _HARDLY = 0.15, 0.45
@@ -65,7 +65,9 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     lost = motion.at_rest(range(len(motion.joints)))[-len(positions) :]
     calm, rests = _calm(positions / lines.leg, motion.fps, lost)
     frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLES).round().astype(int))]
-    least = _STANDS if rests and not np.isnan(lines.ankles).any() else _HARDLY
+    least = _STANDS if rests else _HARDLY
+    if np.isnan(lines.ankles).any():
+        least = np.inf  # knees of a squat are no support
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
