@@ -15,6 +15,7 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles
 
 SIDES = ("left", "right")
+_TOES = np.sin(np.deg2rad(30.0))  # least median sine of toes to the shank: 50 to 90° off it in captures
 
 
 class BodyLines(NamedTuple):
@@ -94,9 +95,14 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
         return np.stack([positions[:, table[name]] if name in table else nowhere for name in names], axis=1)
 
     def either(part: str, child: str) -> Array:
-        """Positions at which a segment ends: its end joint, or else the joint of the next segment."""
+        """Positions at which a segment ends: its end joint, or else the joint of the next segment, or its own tip."""
         end = paired(part, end=True)
-        return np.where(np.isnan(end), paired(child), end)
+        end = np.where(np.isnan(end), paired(child), end)
+        for k, side in enumerate(SIDES):
+            joint = roles.segments.get(f"{side}_{part}")
+            if joint is not None and np.isnan(end[:, k]).any() and np.any(motion.tips[joint]):
+                end[:, k] = positions[:, joint] + quaternions.rotated(rotations[:, joint], motion.tips[joint])
+        return end
 
     shoulders = paired("upper_arm")
     has_arms = not np.isnan(shoulders).any()
@@ -109,12 +115,11 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     else:
         # Legs alone: the trunk is taken to continue the thighs.
         top = hips.mean(axis=1) + (hips - knees).mean(axis=1)
-    toes = paired("foot", end=True)
-    for k, side in enumerate(SIDES):
-        joint = roles.ends.get(f"{side}_foot", roles.segments.get(f"{side}_foot"))
-        # A foot without a toe joint may still have a tip; toes beyond the ball of the foot are not used.
-        if np.isnan(toes[:, k]).any() and joint is not None and np.any(motion.tips[joint]):
-            toes[:, k] = positions[:, joint] + quaternions.rotated(rotations[:, joint], motion.tips[joint])
+    toes = either("foot", "toe")
+    for k in range(len(SIDES)):
+        # What just continues the shank, as programs make up tips, points nowhere.
+        if not np.median(_sine(toes[:, k] - ankles[:, k], ankles[:, k] - knees[:, k])) > _TOES:
+            toes[:, k] = np.nan
     parts = [np.linalg.norm(knees - hips, axis=2)]
     if not np.isnan(ankles).any():
         parts.append(np.linalg.norm(ankles - knees, axis=2))

@@ -39,6 +39,7 @@ _TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/
 _PATIENCE = (1.0, 2.0, 4.0)  # factors on both, tried in turn: runs and 16 frames a second show no foot at rest
 _LOW = 0.05  # height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]
 _ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
+_SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals
 _UPRIGHT = np.cos(np.deg2rad(50.0))  # inclination of the chest up to which a head can be level
 _ROUNDS = 5  # iterations for the trunk line: each leaves a third of the error, as the pelvis is a third of the line
 _ANKLE = np.deg2rad(20.0)  # standard deviation of a sole's likely inclination about that of the mean ankle
@@ -298,7 +299,11 @@ def _foot(
         normal = neutral
         told = np.zeros(0, dtype=bool)
     else:
+        # Mean shift to the mode: whether a frame more or less of a foot that rolls counts as stance changes it little.
         normal = unit(vertical[told].mean(axis=0))
+        for _ in range(_SHIFTS):
+            near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
+            normal = unit(near @ vertical)
     x = normal
     if not np.isnan(toes).any():
         ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)

@@ -9,9 +9,9 @@ import unicodedata
 from collections import Counter
 from typing import NamedTuple
 
-_SIDES = {"left": "left", "l": "left", "lt": "left", "lf": "left",
-          "right": "right", "r": "right", "rt": "right", "rf": "right"}  # fmt: skip
-_CENTRE = frozenset(("c", "m", "x", "mid", "middle", "center", "centre"))
+_SIDES = {"left": "left", "l": "left", "lt": "left", "lf": "left", "lft": "left",
+          "right": "right", "r": "right", "rt": "right", "rf": "right", "rgt": "right"}  # fmt: skip
+_CENTRE = frozenset(("c", "cn", "m", "x", "mid", "middle", "center", "centre"))
 _NOISE = frozenset((
     "jnt", "joint", "jt", "j", "bind", "def", "deform", "org", "bn", "bone", "b", "skin", "bend", "stretch", "bip",
     "biped", "mixamorig", "character", "cc", "armature", "rig",
@@ -27,6 +27,7 @@ _JAPANESE = {
     "手首": "wrist", "つま先": "toe", "ひざ": "knee", "ひじ": "elbow", "足": "leg", "腕": "arm", "肩": "shoulder",
     "首": "neck", "頭": "head",
 }  # fmt: skip
+_GLOSS = re.compile(r"[\[(].*?[\])]")  # Skyrim's NPC L Thigh [LThg]
 _PIECES = re.compile(r"[\W_]+")
 # Numbers stay with a single letter (the vertebrae L3 and T8 of Xsens): no side is written L3.
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|[^\W\da-zA-Z_]+")
@@ -78,6 +79,7 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
 def _words(name: str) -> list[str]:
     """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
     name = unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
+    name = _GLOSS.sub("", name) or name
     for text, word in _JAPANESE.items():
         name = name.replace(text, f" {word} ")
     words: list[str] = []

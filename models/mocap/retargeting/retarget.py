@@ -22,17 +22,20 @@ from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.abdomen import with_abdomen
 from models.mocap.retargeting.arm_twist import with_twist_shared
-from models.mocap.retargeting.body_lines import body_lines
+from models.mocap.retargeting.body_lines import SIDES, BodyLines, body_lines
 from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.calibration import calibrate
 from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.leading_pose import leading_frames
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
+from models.mocap.retargeting.straight_bones import check_bones
 from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
+_STANDS = 8  # least number of frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
 _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
 _UNITS = (
     ("metres", 1.0),
@@ -168,6 +171,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
+    check_bones(motion, roles, positions)
+    roles = with_abdomen(roles, lines, positions)
     frame = None if rest is None else rest - first
     unclear = MotionFileError(
         motion.path, 0, "its joints do not tell how the body stands", "a trunk, thighs and shanks that have a length"
@@ -181,7 +186,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         raise unclear
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
     segments = quaternions.product(axes, with_twist_shared(calibrated.segments[skipped:]))
-    own_leg = _own_leg("left_foot" in roles.segments or "left_shank" in roles.ends)
+    own_leg = _own_leg(not np.isnan(lines.ankles).any())
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
     root, segments, slope = levelled(root, segments, motion.fps)
@@ -194,6 +199,10 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):
         remarks.append(beyond)
+    if endless := _named_endless(lines, roles):
+        remarks.append(endless)
+    if rest is None and (guessed := _named_soles(calibrated.stances, roles, motion.n_frames - dropped)):
+        remarks.append(guessed)
     if calibrated.bend > _BENT and rest is None:
         remarks.append("the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it")
     report = RetargetReport(
@@ -247,6 +256,25 @@ def _named_beyond_ranges(poses: Array) -> str:
         if most[k] > _RANGE
     ]
     return f"beyond the figure's range: {', '.join(told)}; see whether the file has it so" if told else ""
+
+
+def _named_soles(stances: Sequence[int], roles: Roles, n: int) -> str:
+    """Remark on soles whose orientation a few frames tell; empty if there is none."""
+    few = [
+        f"the {side} one in {count or 'no'} frame{'s' * (count != 1)}"
+        for side, count in zip(SIDES, stances, strict=True)
+        if count < min(_STANDS, n) and f"{side}_foot" in roles.segments
+    ]
+    told = "how the soles lie is a guess, since they hardly stand level"
+    return f"{told} ({', '.join(few)}); --rest-frame would say it" if few else ""
+
+
+def _named_endless(lines: BodyLines, roles: Roles) -> str:
+    """Remark on limbs of which neither a joint nor a tip says where they end; empty if there is none."""
+    ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles}
+    named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
+    without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
+    return f"nothing tells where {', '.join(without)} end: how they point is a guess" if without else ""
 
 
 def _named_gaps(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:

@@ -5,6 +5,7 @@ known is refused. Pelvis, chest and abdomen have many names, so they are found i
 meet, the chest where the arms meet, the abdomen halfway between. The tests have the names of some forty programs.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from models.humanoid.skeleton import BODIES, SEGMENTS
@@ -13,22 +14,25 @@ from models.mocap.retargeting.joint_names import JointName, joint_names
 # Words for each part, with their rank: a word that also means a neighbour (a leg is a shank below an upper leg, and a
 # thigh above a knee) gives way to one that does not.
 _LEG = {
-    "thigh": {"femur": 0, "thigh": 0, "upleg": 0, "upperleg": 0, "uleg": 0, "hip": 1, "leg": 2},
-    "shank": {"tibia": 0, "shank": 0, "shin": 0, "calf": 0, "lowerleg": 0, "lowleg": 0, "loleg": 0, "knee": 0,
-              "leg": 1},
-    "foot": {"foot": 0, "ankle": 0, "talus": 0, "calcn": 1},
-    "toe": {"toebase": 0, "toe": 0, "toes": 0, "forefoot": 0, "ball": 0, "foot": 1},
+    "thigh": {"femur": 0, "thigh": 0, "upleg": 0, "upperleg": 0, "uleg": 0, "legupper": 0, "hip": 1,
+              "leg": 2},
+    "shank": {"tibia": 0, "shank": 0, "shin": 0, "calf": 0, "lowerleg": 0, "lowleg": 0, "loleg": 0, "leglower": 0,
+              "knee": 0, "leg": 1},
+    "foot": {"foot": 0, "ankle": 0, "footankle": 0, "talus": 0, "calcn": 1},
+    "toe": {"toebase": 0, "toe": 0, "toes": 0, "bigtoe": 0, "forefoot": 0, "ball": 0, "football": 0, "foot": 1},
 }  # fmt: skip
 _ARM = {
-    "clavicle": {"clavicle": 0, "collar": 0, "collarbone": 0, "scapula": 0, "shoulder": 1},
-    "upper_arm": {"upperarm": 0, "uparm": 0, "uarm": 0, "humerus": 0, "shldr": 0, "arm": 0, "shoulder": 1},
-    "forearm": {"forearm": 0, "lowerarm": 0, "lowarm": 0, "loarm": 0, "farm": 0, "elbow": 0, "ulna": 0, "radius": 0},
-    "wrist": {"wrist": 0, "carpus": 0, "hand": 1},
-}
+    "clavicle": {"clavicle": 0, "clavicula": 0, "clav": 0, "collar": 0, "collarbone": 0, "scapula": 0, "shoulder": 1},
+    "upper_arm": {"upperarm": 0, "uparm": 0, "uarm": 0, "armupper": 0, "humerus": 0, "shldr": 0, "bicep": 0,
+                  "arm": 0, "shoulder": 1},
+    "forearm": {"forearm": 0, "lowerarm": 0, "lowarm": 0, "loarm": 0, "armlower": 0, "farm": 0, "elbow": 0, "ulna": 0,
+                "radius": 0},
+    "wrist": {"wrist": 0, "carpus": 0, "handwrist": 0, "hand": 1},
+}  # fmt: skip
 LIMBS = (tuple(_LEG), (*_ARM, "hand"))  # parts from the trunk out
 _HAND = ("fingerbase", "hand")  # beyond the wrist
 _CHEST = frozenset(("chest", "upperchest", "thorax", "torso", "spine", "upperbody", "t8"))
-_NECK = frozenset(("neck", "lowerneck", "upperneck"))
+_NECK = frozenset(("neck", "lowerneck", "upperneck", "necklower", "neckupper", "necktwist"))
 _SIDED = frozenset(word for limb in (_LEG, _ARM) for words in limb.values() for word in words) | {*_HAND}
 _CENTRAL = _CHEST | _NECK | {"head"}
 _OPTIONAL = ("clavicle", "toe")  # a limb without one is whole
@@ -45,10 +49,13 @@ class Roles(NamedTuple):
         The joint that moves each segment; bodies without one are missing.
     ends : dict from figure body to joint index
         The joint at which the segments of arms and legs end.
+    spine : tuple of int
+        Joints from beyond the pelvis to the chest, of which the abdomen is one; empty where the abdomen is stated.
     """
 
     segments: dict[str, int]
     ends: dict[str, int]
+    spine: tuple[int, ...] = ()
 
 
 def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
@@ -105,11 +112,11 @@ def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tupl
         return "pelvis"
     segments = {"pelvis": pelvis} | {part: named[part] for part in BODIES if part in named}
     spine = _spine(pelvis, named, names, parents)
+    choice = () if "abdomen" in segments else tuple(spine)
     if spine:
         segments.setdefault("chest", spine[-1])
         if len(spine) > 1:
-            # The middle joint below the chest, rounded down: the figure's abdomen ends where the ribs begin.
-            segments.setdefault("abdomen", spine[(len(spine) - 1) // 2])
+            segments.setdefault("abdomen", middle_of(spine))
     if "head" not in segments and (head := _head(spine, named, names, parents)) is not None:
         segments["head"] = head
     ends: dict[str, int] = {}
@@ -121,7 +128,12 @@ def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tupl
         for part, end in chain:
             if end is not None and segments.get(f"{side}_{part}") in ancestry(end, parents)[1:]:
                 ends[f"{side}_{part}"] = end
-    return Roles({body: segments[body] for body in BODIES if body in segments}, ends)
+    return Roles({body: segments[body] for body in BODIES if body in segments}, ends, choice)
+
+
+def middle_of(spine: Sequence[int]) -> int:
+    """The middle joint below the chest, rounded down: the figure's abdomen ends where the ribs begin."""
+    return spine[(len(spine) - 1) // 2]
 
 
 def _limb(

@@ -20,7 +20,7 @@ def rig(tmp_path):
     """The same rig twice, with a vendor's names and with numbers; and the roles of the second, by its joints."""
     walk = embedded("walk")
     path, bare = tmp_path / "named.bvh", tmp_path / "bare.bvh"
-    write_rig(Rig(zero="random", twists=True, fingers=True), Clip(walk.poses[::3], walk.fps / 3, "walk"), path)
+    write_rig(Rig(zero="random", twists="{}Twist", fingers=True), Clip(walk.poses[::3], walk.fps / 3, "walk"), path)
     text = path.read_text()
     numbers = {name: f"Bone.{k:03d}" for k, (_, name) in enumerate(JOINT.findall(text))}
     bare.write_text(JOINT.sub(lambda found: f"{found[1]} {numbers[found[2]]}", text))

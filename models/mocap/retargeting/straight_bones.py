@@ -1,0 +1,41 @@
+"""A check that the joints between a limb's part and its end, such as twist joints, lie on the bone."""
+
+import numpy as np
+
+from models.arrays import Array
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.skeleton_roles import Roles, ancestry
+
+_OFF = 0.15  # largest distance from the bone, as a share of its length
+
+
+def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
+    """Refuse a limb that bends where no part begins: a joint was taken for a part that another one plays.
+
+    Parameters
+    ----------
+    motion : SourceMotion
+        The motion, for names and tree.
+    roles : Roles
+        Which joint plays which part.
+    positions : array of shape (n, joints, 3)
+        Of its joints.
+
+    Raises
+    ------
+    MotionFileError
+        If a joint between a part and its end is on average off the line between them.
+    """
+    for part, end in roles.ends.items():
+        start = roles.segments[part]
+        bone = positions[:, end] - positions[:, start]
+        length = np.linalg.norm(bone, axis=1)
+        for joint in ancestry(motion.parents[end], motion.parents):
+            if joint == start:
+                break
+            away = np.linalg.norm(np.cross(positions[:, joint] - positions[:, start], bone), axis=1)
+            if np.median(away) > _OFF * np.median(length) ** 2:
+                name, known = motion.joints[joint], f"{motion.joints[start]} and {motion.joints[end]}"
+                what = f"the {part.replace('_', ' ')} bends at {name}, between {known}"
+                raise MotionFileError(motion.path, 0, what, "names that are known, or --roles FILE that says them")
