@@ -14,9 +14,8 @@ count in which a joint is at rest, or, if those are few, the calmest ones. A som
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from models.arrays import Array, IntArray
+from models.arrays import Array, IntArray, Mask
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
@@ -78,7 +77,7 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     return Up(np.array(AXES[best], dtype=np.float64), lead)
 
 
-def _calm(positions: Array, fps: float, lost: npt.NDArray[np.bool_]) -> tuple[IntArray, bool]:
+def _calm(positions: Array, fps: float, lost: Mask) -> tuple[IntArray, bool]:
     """Frames in which a joint is at rest, or the `_CALM` share in which the slowest is slowest; whether it is rest."""
     if len(positions) == 1 or lost.all():
         return np.arange(len(positions)), True
