@@ -157,6 +157,7 @@ class Bare:
 
     def __init__(self, clip_seconds: float):
         self._arrays = {"curve_span": np.array([0.0, 4.0]), "curve_closed": 0.0, "clip_seconds": clip_seconds}
+        self.texts: dict[str, str] = {}
 
     def array(self, name: str) -> np.ndarray:
         return np.asarray(self._arrays[name])

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rig_families import FAMILIES, NECKS, SPINES
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
+from tests.models.mocap.retargeting.rig_families import FAMILIES, NECKS, SPINES
 
 ZERO_POSES = ("T", "A", "upright T", "upright A", "random", "along X", "legs up", "along bones Y")
 UPS = {"+Y": (0, 1, 0), "+Z": (0, 0, 1), "-Y": (0, -1, 0), "-Z": (0, 0, -1), "+X": (1, 0, 0), "-X": (-1, 0, 0)}

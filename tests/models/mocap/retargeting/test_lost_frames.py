@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs import Rig, write_rig
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES
@@ -16,6 +15,7 @@ from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.leading_pose import leading_frames
 from models.mocap.retargeting.retarget import Hints
 from models.mocap.retargeting.skeleton_roles import roles_of
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 LIVELY = ("spin", "jump", "run", "backflip", "squat_dance")
 RATES = (20.0, 25.0, 30.0)

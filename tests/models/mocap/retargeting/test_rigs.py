@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
 
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
@@ -23,6 +22,7 @@ from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.poses import sole_points
 from models.mocap.retargeting import abdomen, calibration, footing, retarget
 from models.mocap.retargeting.retarget import Hints
+from tests.models.mocap.retargeting.rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
 
 LARGEST = 2.0  # deg
 ROOT = 0.01  # largest distance of the root from its path in the source [m per m of leg]

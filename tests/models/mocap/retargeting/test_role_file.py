@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from rigs import Rig, write_rig
 
 from experiments.cli import main
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import Hints
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 JOINT = re.compile(r"(ROOT|JOINT) (\S+)")
 
