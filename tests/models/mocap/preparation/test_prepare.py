@@ -244,7 +244,7 @@ def test_a_pose_that_does_not_belong_stands_out(walks):
 @pytest.mark.slow
 def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
     outcome = prepare_file(mocap / "snu/walk.bvh", tmp_path / "walk.bvh", report=tmp_path)
-    made, after, follows = outcome
+    made, after, follows, _ = outcome
     before = well_formed(made.captured)
     assert after.closed
     assert after.residual < 0.05 < before.residual
