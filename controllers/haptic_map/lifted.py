@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -36,6 +35,7 @@ from controllers.haptic_map.lifting.frames import (
 )
 from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
 from controllers.haptic_map.lifting.sites import box, checked_sites
+from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
 from controllers.legs.floor import SOFTNESS
 from controllers.legs.footing import fresh_footing, packed_soles
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
@@ -157,26 +157,6 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
     )  # fmt: skip
 
 
-class MapTransition(NamedTuple):
-    """Where a hand may change over between two clips of a lifted map: a row of `Lifted.transitions`.
-
-    Attributes
-    ----------
-    first, second : int
-        Numbers of the clips.
-    angle : float
-        θ [rad].
-    pose, velocity : float
-        Relative distances of the poses and of the velocities.
-    """
-
-    first: int
-    second: int
-    angle: float
-    pose: float
-    velocity: float
-
-
 class Lifted(ClipMap):
     r"""Clips α_i lifted to curves α̃_i round the z axis of H, and one smooth map with h∘α̃_i = α_i at every frame.
 
@@ -261,7 +241,7 @@ class Lifted(ClipMap):
             raise ParameterError(f"all clips must have poses of one size, got {sizes}")
         self.margin = _checked_margin(margin)
         self.sites = checked_sites(sites, names, self.margin)
-        self.transitions = _checked_transitions(transitions, m)
+        self.transitions = checked_transitions(transitions, m)
         self.legs_of: int | None = None
         self.share = 1.0
         limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
@@ -343,7 +323,11 @@ class Lifted(ClipMap):
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` restores it from them bit for bit, with all joints blended."""
-        arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": _rows_of(self.transitions)}
+        arrays = {
+            "sites": self.sites,
+            "margin": np.array([self.margin]),
+            "transitions": transition_rows(self.transitions),
+        }
         for name, clip in zip(self.names, self._placed, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
         return arrays | clip_arrays(self.clips, self.names, self.limbs)
@@ -456,16 +440,3 @@ def _checked_margin(margin: float) -> float:
     if not (np.isfinite(margin) and margin >= 1e-4):
         raise ParameterError(f"the margin of a lifted map must be 1e-4 m or more and finite, got {margin}")
     return float(margin)
-
-
-def _rows_of(transitions: Sequence[MapTransition] | Array) -> Array:
-    return np.array(transitions, dtype=np.float64) if len(transitions) else np.zeros((0, len(MapTransition._fields)))
-
-
-def _checked_transitions(transitions: Sequence[MapTransition] | Array, clips: int) -> tuple[MapTransition, ...]:
-    array = _rows_of(transitions)
-    if array.ndim != 2 or array.shape[1] != 5 or not np.isfinite(array).all():
-        raise ParameterError(f"transitions must be finite and of shape (k, 5), got {array.shape}")
-    if not np.isin(array[:, :2], np.arange(clips)).all():
-        raise ParameterError(f"transitions are between clips 0 to {clips - 1}, got {array[:, :2].tolist()}")
-    return tuple(MapTransition(int(first), int(second), *rest) for first, second, *rest in array.tolist())

@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.haptic_map.lifted import Lifted, MapTransition
+from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from controllers.haptic_map.lifting.lift import Lifting, closes, lift
 from controllers.haptic_map.lifting.motion_features import Motion
 from controllers.haptic_map.lifting.room import Room
+from controllers.haptic_map.lifting.transitions import MapTransition
 from controllers.motion.loops import checked_clip, there_and_back
 from experiments.config.maps import MAP_SUFFIX
 from experiments.files.map_files import save_map

@@ -7,10 +7,12 @@ to change over: a walking figure can break into a run where its feet are in step
 agree for a moment by chance.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from controllers.errors import ParameterError
 from controllers.haptic_map.lifting.motion_features import Features
 from controllers.state import Array, IntArray, Mask
 
@@ -41,6 +43,26 @@ class Transition(NamedTuple):
     velocity: float
     support: float
     speeds: tuple[float, float]
+
+
+class MapTransition(NamedTuple):
+    """What a lifted map keeps of a `Transition`.
+
+    Attributes
+    ----------
+    first, second : int
+        Numbers of the clips.
+    angle : float
+        θ [rad].
+    pose, velocity : float
+        Relative distances of the poses and of the velocities.
+    """
+
+    first: int
+    second: int
+    angle: float
+    pose: float
+    velocity: float
 
 
 class Comparison(NamedTuple):
@@ -152,3 +174,24 @@ def find_transitions(compared: Comparison, most: float) -> list[Transition]:
 
 def _between(a: float, b: float) -> float:
     return abs((a - b + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def transition_rows(transitions: Sequence[MapTransition] | Array) -> Array:
+    """Transitions as rows (k, 5)."""
+    return np.array(transitions, dtype=np.float64) if len(transitions) else np.zeros((0, len(MapTransition._fields)))
+
+
+def checked_transitions(transitions: Sequence[MapTransition] | Array, clips: int) -> tuple[MapTransition, ...]:
+    """Transitions between clips 0 to `clips` − 1, or their rows (k, 5), checked.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite, or there is no such clip.
+    """
+    array = transition_rows(transitions)
+    if array.ndim != 2 or array.shape[1] != 5 or not np.isfinite(array).all():
+        raise ParameterError(f"transitions must be finite and of shape (k, 5), got {array.shape}")
+    if not np.isin(array[:, :2], np.arange(clips)).all():
+        raise ParameterError(f"transitions are between clips 0 to {clips - 1}, got {array[:, :2].tolist()}")
+    return tuple(MapTransition(int(first), int(second), *rest) for first, second, *rest in array.tolist())
