@@ -299,11 +299,11 @@ def _foot(
         normal = neutral
         told = np.zeros(0, dtype=bool)
     else:
-        # Mean shift to the mode: whether a frame more or less of a foot that rolls counts as stance changes it little.
+        # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
         normal = unit(vertical[told].mean(axis=0))
         for _ in range(_SHIFTS):
             near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
-            normal = unit(near @ vertical)
+            normal = unit((near * likely) @ vertical)
     x = normal
     if not np.isnan(toes).any():
         ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
