@@ -174,7 +174,7 @@ def _words(chance: random.Random, command: str, n: int) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("seed", "lines"), [(0, 20), *(pytest.param(seed, 60, marks=pytest.mark.slow) for seed in (1, 2, 3))]
+    ("seed", "lines"), [(0, 40), *(pytest.param(seed, 60, marks=pytest.mark.slow) for seed in (1, 2, 3))]
 )
 def test_no_command_line_ends_in_a_traceback(
     seed: int, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -206,7 +206,7 @@ def test_no_command_line_ends_in_a_traceback(
             assert [said for said in captured.err.splitlines() if said.startswith("hvf: ")], line
         ran += code == 0
         shutil.rmtree(tmp_path / "runs", ignore_errors=True)
-    assert ran >= 0.1 * lines
+    assert ran > 0.1 * lines
 
 
 # ---- runs that are damaged, stopped, or two at a time
