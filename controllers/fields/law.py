@@ -25,9 +25,11 @@ from controllers.fields.instructions import (
     empty_trace,
 )
 from controllers.fields.program import Compiled, evaluate
+from controllers.fields.walker_feed import WalkerFeed, Walkers, feed_walkers, fresh_walkers
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
 from controllers.state import HAND_POSITION, Array, HandState, IntArray, Wrench
+from controllers.walking.walking import follow_hand
 
 
 class Law(ABC):
@@ -147,7 +149,7 @@ class Program(Law):
         Compiled laws, each once; the code of a law's instruction is its kernel's index here.
     laws : tuple of Law
         Laws in the order of their instructions.
-    python_feeds, map_feeds
+    python_feeds, map_feeds, walker_feeds
         Inputs that are written into the memory before each evaluation, besides the hand.
 
     Raises
@@ -163,6 +165,7 @@ class Program(Law):
     laws: tuple[Law, ...] = ()
     python_feeds: tuple[PythonFeed, ...] = ()
     map_feeds: tuple[MapFeed, ...] = ()
+    walker_feeds: tuple[WalkerFeed, ...] = ()
 
     def __post_init__(self) -> None:
         codes: list[int] = self.ops[:, OP_CODE].tolist()
@@ -185,7 +188,7 @@ class Program(Law):
         params: Sequence[float] | Array,
         memory: Sequence[float] | Array,
         curve: Trajectory | None = None,
-        feeds: tuple["PythonFeed | MapFeed", ...] = (),
+        feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
     ) -> "Program":
         """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
 
@@ -196,7 +199,8 @@ class Program(Law):
         numbers = np.concatenate([np.asarray(params, dtype=np.float64), blob])
         python = tuple(feed for feed in feeds if isinstance(feed, PythonFeed))
         maps = tuple(feed for feed in feeds if isinstance(feed, MapFeed))
-        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps)
+        walkers = tuple(feed for feed in feeds if isinstance(feed, WalkerFeed))
+        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps, walkers)
 
     def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
         """Both programs one after the other, then an operation that combines their two wrenches into one."""
@@ -213,6 +217,7 @@ class Program(Law):
             self.laws + other.laws,
             self.python_feeds + tuple(feed.moved(gap, kept) for feed in other.python_feeds),
             self.map_feeds + tuple(feed.moved(gap, kept) for feed in other.map_feeds),
+            self.walker_feeds + tuple(feed.moved(gap, kept) for feed in other.walker_feeds),
         )
 
     def followed(self, join: Join, params: Sequence[float]) -> "Program":
@@ -242,8 +247,15 @@ class Program(Law):
         """Memory for a new run."""
         return self.memory.copy()
 
+    def fresh_walkers(self) -> Walkers:
+        """Walkers for a new run; their kernel is compiled in this process, unless it is."""
+        walkers = fresh_walkers(self.walker_feeds)
+        return walkers.linked(address_of(follow_hand, LAW_ARGUMENTS)) if self.walker_feeds else walkers
+
     def feed(self, memory: Array, hand: HandState) -> None:
-        """Write the inputs of the feeds into the memory, from Python (`wrench`; a run uses compiled code for maps)."""
+        """Write the inputs of the feeds into the memory, from Python, as at the first tick of a run."""
+        if self.walker_feeds:
+            feed_walkers(self.fresh_walkers(), self.params, memory, hand.vector())
         for slot, function in self.python_feeds:
             memory[slot : slot + 6] = function(hand)
         stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]

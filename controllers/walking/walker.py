@@ -1,9 +1,9 @@
 r"""State and dynamics of a walker (a led figure): its arc length and speed on its path, and the laying of the path.
 
 The figure walks on its own path A(s) (`controllers.walking.walked_path`) at the arc length s, and its pose is a
-function of s (and u). So walking backwards is a decrease of s, and the same poses return. The law of force
-(`controllers.fields.leading`) advances the walker, the haptic map (`controllers.haptic_map.led`) displays it; both use
-a `Walker`.
+function of s (and u). So walking backwards is a decrease of s, and the same poses return. The servo advances the walker
+before the field (`controllers.walking.walking`); the law of force (`controllers.fields.leading`) and the haptic map
+(`controllers.haptic_map.led`) read it.
 """
 
 from typing import NamedTuple
@@ -98,11 +98,11 @@ class Following(NamedTuple):
     ----------
     rate, pull, forward, backward, turn, lateral, curvature, take_off, landing, haste : float
         ω [1/s], largest |s̈| [m/s²], largest speeds [m/s], Ω [rad/s], a [m/s²], κ_max [1/m], speeds of take-off and
-        landing [m/s], largest |s̈| with flight phases [m/s²] (see `controllers.fields.leading.Leading`).
+        landing [m/s], largest |s̈| with flight phases [m/s²] (see `controllers.walking.walking.Walking`).
     ahead, decay, stride : float
         D [m], decay factor of the lean per row of the path, and length of a lap [m].
     shares, stances : Array
-        `Leading.shares` and `Gait.stances`, flattened.
+        `Walking.shares` and `Gait.stances`, flattened.
     """
 
     rate: float

@@ -52,9 +52,9 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
     - ``_aside``: beyond the path's front, and the spring across acts: the stylus is beside what the figure can reach.
     - ``_beyond``: likewise, and both act: the stylus is too far ahead as well, as far as the limiter lets a hand pull.
     """
-    lead = 2.0 * field.gait.speed / field.rate
-    drawn = field.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
-    near, far = field.curvature * lead, field.curvature * (lead + drawn)
+    lead, curvature = field.walking.lead[0], field.walking.curvature
+    drawn = field.walking.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
+    near, far = curvature * lead, curvature * (lead + drawn)
     sides = [(sign, heading) for sign in (1.0, -1.0) for heading in QUARTERS[::2].tolist()]
     return {
         "": [Regime(False, True, heading=heading) for heading in QUARTERS.tolist()],
@@ -66,7 +66,7 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
 
 def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling) -> River:
     """LEADING in one regime, in the form that certificates take."""
-    law_there = regime.law(field.scale, field.k_z / max(field.k_l, 1e-3))
+    law_there = regime.law(field.walking.scale, field.k_z / max(field.k_l, 1e-3))
     return River(law_there, field.k_l, field.b, float("inf"), curve, device, sampling)
 
 
@@ -135,14 +135,11 @@ def _walker_radius(
 ) -> float:
     """Largest spectral radius, over phases and hands, with the walker as part of the state."""
     river = leading_river(field, regime, curve, device, sampling)
-    radii = [
-        np.abs(
-            np.linalg.eigvals(
-                walking(SampledLoop(river.still(hand), sampling), regime, field.scale, field.rate, field.k_l, field.b)
-            )
-        ).max()
-        for hand in hands.hands()
-    ]
+    how, radii = field.walking, list[float]()
+    for hand in hands.hands():
+        loop = SampledLoop(river.still(hand), sampling)
+        matrices = walking(loop, regime, how.scale, how.rate, field.k_l, field.b)
+        radii.append(np.abs(np.linalg.eigvals(matrices)).max())
     return float(max(radii))
 
 

@@ -7,6 +7,7 @@ friction, another integrator.
 
 from dataclasses import dataclass
 from types import FunctionType
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -21,6 +22,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
+from controllers.fields.walker_feed import Walkers, feed_walkers
 from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
@@ -47,13 +49,20 @@ _sense_exactly = njit(
 )
 
 
+class Executed(NamedTuple):
+    """A field in execution: its program, its memory, and the walkers that its laws read."""
+
+    program: Compiled
+    memory: Array
+    walkers: Walkers
+
+
 @entry_point
 def run_late(
     plant: Plant,
     port: PhantomPort,
     hand: Hand,
-    field: Compiled,
-    memory: Array,
+    field: Executed,
     late: Array,
     rounded: bool,
     path: Array,
@@ -62,8 +71,10 @@ def run_late(
 
     Parameters
     ----------
-    plant, port, hand, field, memory
+    plant, port, hand
         As in the servo.
+    field : Executed
+        The field and its state.
     late : Array
         Delayed torques, the next to act first, shape (m, 3) [N m]; m is the delay in periods.
     rounded : bool
@@ -79,7 +90,8 @@ def run_late(
             sense(port, t, 0.0)
         else:
             _sense_exactly(port, t, 0.0)
-        evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
+        feed_walkers(field.walkers, field.program.params, field.memory, port.hand)
+        evaluate(field.program.units, field.program.ops, field.program.params, field.memory, port.hand, wrench)
         actuate(port, wrench[:3])
         for i in range(3):
             if late.shape[0] > 0:
@@ -275,5 +287,6 @@ def hand_path(
     )  # fmt: skip
     hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
-    run_late(plant, port, hand, program.compiled(), program.fresh_memory(), late, conditions.rounded, path)
+    field = Executed(program.compiled(), program.fresh_memory(), program.fresh_walkers())
+    run_late(plant, port, hand, field, late, conditions.rounded, path)
     return path[np.isfinite(path[:, 0])]

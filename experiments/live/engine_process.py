@@ -190,7 +190,6 @@ class _Runner:
         session = wire(order.config, ready=self._compile)
         self._engine = Engine(session)
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
-        self._scratch = self._engine.memory.copy()
         self._changed = True
         self._slice(self._engine)  # so that its code is compiled or loaded now, not during the run
         self._told.put(_built(session, self._engine))
@@ -254,7 +253,7 @@ class _Runner:
         forces = np.zeros_like(points)
         if not engine.session.parts.maps.plays_rivers:
             hand[VELOCITY] = 0.0
-        field_slice(engine.field, hand, points, self._scratch, forces)
+        field_slice(engine.field, hand, points, forces)
         return np.hstack([points, forces])
 
 

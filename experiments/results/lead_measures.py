@@ -1,13 +1,14 @@
-"""Measures of a run in LEADING, from its recording and the walked path in the field's memory."""
+"""Measures of a run in LEADING, from its recording and the walked path."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.fields.leading import Leading
 from controllers.state import Array, IntArray
+from controllers.walking.gait import Gait
 from controllers.walking.walked_path import PATH_HEADING, path_value
+from controllers.walking.walker import walker_at
 from experiments.results.soles import Soles
 from models.humanoid.skeleton import N_POSE
 from models.world.scene import SceneConfig
@@ -71,9 +72,9 @@ class LeadSummary:
 
 
 def lead_summary(
-    recording: Recording, field: Leading, memory: Array, scene: SceneConfig, fell_at: float | None
+    recording: Recording, gait: Gait, walkers: Array, scene: SceneConfig, fell_at: float | None
 ) -> LeadSummary:
-    """Measure a run in constant memory, given its field and the field's memory at the end of the run."""
+    """Measure a run in constant memory, given the figure's gait and the state of its walker at the end of the run."""
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
@@ -84,7 +85,7 @@ def lead_summary(
         t, reference, poses = frames["t"][rows], frames["reference"][rows], frames["qpos"][rows][:, root:]
         s = ticks["phase"][first * every : (first + len(t)) * every : every]
         if len(t) > 1:
-            turns = np.maximum(turns, turn_rates(field, memory, s, np.gradient(s, t)))
+            turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
         force = max(force, _largest(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
         soles.add(reference)
         standing = t < (math.inf if fell_at is None else fell_at)
@@ -103,18 +104,17 @@ def _largest(vectors: Array) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
-def support_at(field: Leading, s: Array) -> IntArray:
+def support_at(gait: Gait, s: Array) -> IntArray:
     """Number of feet in support at arc lengths s [m], shape (n,)."""
-    lap = s / field.gait.stride
-    counts = field.gait.support
+    lap, counts = s / gait.stride, gait.support
     return counts[(len(counts) * (lap - np.floor(lap))).astype(int) % len(counts)]
 
 
-def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
+def turn_rates(gait: Gait, walkers: Array, s: Array, speed: Array) -> Array:
     """Largest turn rates [rad/s] of the path at arc lengths s [m] passed at speeds [m/s]: on no foot, one, two."""
-    path = field.walker(memory).path
+    path = walker_at.py_func(walkers, 0).path
     rates = np.abs(speed * [path_value(path, float(place), PATH_HEADING)[1] for place in s])
-    feet = support_at(field, s)
+    feet = support_at(gait, s)
     return np.array([rates[feet == count].max(initial=0.0) for count in range(3)])
 
 

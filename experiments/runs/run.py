@@ -190,7 +190,10 @@ def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
 
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
-        of = Measuring(recording, lambda: default_poses(session), parts.handled, session.servo.field.memory, keep_curve)
+        field = session.servo.field
+        of = Measuring(
+            recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state, keep_curve
+        )
         return parts.summarise(summary, of)
 
 

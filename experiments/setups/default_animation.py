@@ -7,6 +7,7 @@ import numpy as np
 from controllers.curves.stylus import stylus_path
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.state import Array
+from controllers.walking.walker import walker_at
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.session import Session
 from sim.reference.reference import make_reference, poses_along, reference_along
@@ -20,8 +21,8 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
     if session.parts.maps.plays_rivers:
         return _clips_of_rivers(session, stride)
     kind, params, memory = session.haptic_map.compiled()
-    if session.parts.walker is not None:
-        memory = session.parts.walker(session.servo.field.memory).path.copy()
+    if session.parts.walking is not None:
+        memory = walker_at.py_func(session.servo.field.walkers.state, 0).path.copy()
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         poses = np.empty((len(nearest), session.haptic_map.nq))

@@ -8,13 +8,15 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import cubic_steps
 from controllers.errors import ParameterError
-from controllers.fields.leading import Gait, Leading
+from controllers.fields.leading import Leading
 from controllers.haptic_map.led import Led
 from controllers.legs.grounded import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, Mask
+from controllers.walking.gait import Gait
+from controllers.walking.walking import Walking
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
@@ -216,22 +218,22 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
 def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     """Parts of a run in the mode "lead"."""
     field, course = leading(mode, maps.gait), s_curve()
-    config = replace(config, mode=replace(mode, floor_scale=field.scale))
+    config = replace(config, mode=replace(mode, floor_scale=field.walking.scale))
     limiter = ForceLimiter(config.clock.servo_period)
     tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
-    gait = field.gait
-    static = {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
+    gait = field.walking.gait
+    static = {"lead_scale": field.walking.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
         lead = lead_summary(
-            of.recording, field, of.memory, config.scene, None if summary.figure is None else summary.figure.fell_at
+            of.recording, gait, of.walkers, config.scene, None if summary.figure is None else summary.figure.fell_at
         )
         return replace(summary, lead=lead)
 
     return Parts(
         config=config, maps=maps, field=field, program=field.program(), course=course, user=_hand(config, field),
-        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=field.walker,
+        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walking=field.walking,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
 
@@ -249,13 +251,14 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     scale = FORTH * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
     flying = {"lateral": _FLYING_LATERAL} if gait.flies else {}
     running = {"forward": _RUNNING_FORWARD} if gait.flies or gait.grounded else {}
-    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=mode.leash, b=mode.damping, **flying, **running)
+    walking = Walking(gait, (float(x), float(y)), -_BEND, scale, **flying, **running)
+    return Leading(walking, k_l=mode.leash, b=mode.damping)
 
 
 def leading_hand(field: Leading, period: float = 0.01) -> Arm:
     """The default hand: a pause, along the S at the gait's own pace, a pause, straight back more slowly."""
     curve = s_curve()
-    seconds = field.scale * curve.length / field.gait.speed
+    seconds = field.walking.scale * curve.length / field.walking.gait.speed
     start, end = curve.point(curve.start), curve.point(curve.end)
     away = float(np.linalg.norm(end - start)) / curve.length
     forth, back = _eased(seconds, period), _eased(seconds * away / BACK_PACE, period)

@@ -13,7 +13,7 @@ from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import Array
-from controllers.walking.walker import Walker
+from controllers.walking.walking import Walking
 from experiments.config.modes import Rivers
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.results.summary import RunSummary
@@ -207,8 +207,8 @@ class Measuring(NamedTuple):
         Makes a function for the animation of the unedited curve (`default_animation.default_poses`).
     handled : tuple of (float, float)
         Intervals of time [s] in which the hand does something other than push.
-    memory : Array
-        The field's memory at the end of the run.
+    memory, walkers : Array
+        The field's memory and the state of its walkers at the end of the run.
     save_curve : callable
         Saves a curve beside the recording.
     """
@@ -217,6 +217,7 @@ class Measuring(NamedTuple):
     default_poses: Callable[[], Callable[[Array, Array, Array], Array]]
     handled: tuple[tuple[float, float], ...]
     memory: Array
+    walkers: Array
     save_curve: Callable[[Trajectory], None]
 
 
@@ -248,8 +249,8 @@ class Parts:
         Whether the hand bends the curve; the figure then begins at rest.
     held_seconds : float
         Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0.
-    walker : callable, optional
-        Maps the field's memory to the walker whose state is the map's argument; without it that is the stylus pose.
+    walking : Walking, optional
+        How a figure is led: its walker is the map's argument; without it that is the stylus pose.
     argument_at : callable
         Maps nearest points (n, 3) and phases (n,) to the map's arguments (n, 7) for the default animation.
     handled : tuple of (float, float)
@@ -272,7 +273,7 @@ class Parts:
     argument_at: Callable[[Array, Array], Array]
     bends: bool = False
     held_seconds: float = 0.0
-    walker: Callable[[Array], Walker] | None = None
+    walking: Walking | None = None
     handled: tuple[tuple[float, float], ...] = ()
     remarks: tuple[str, ...] = ()
     summarise: Callable[[RunSummary, Measuring], RunSummary] = lambda summary, of: summary

@@ -11,6 +11,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, Array, HandState
+from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.defaults import resolved
@@ -132,7 +133,7 @@ def assemble(
     refined = maps.refine() if world.has_figure else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
-    if isinstance(parts.user, Participant) and world.has_figure and parts.walker is None:
+    if isinstance(parts.user, Participant) and world.has_figure and parts.walking is None:
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
@@ -164,9 +165,9 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     compiled, walker = parts.maps.whole_map.compiled(), None
     period = config.clock.servo_period
     field = unlinked_field(program, ForceLimiter(period), parts.tank)
-    if parts.walker is not None:
-        # The field moves the walker; the map poses the figure on the walker's path.
-        walker = parts.walker(field.memory)
+    if parts.walking is not None:
+        # The field and the map both read the walker: the map poses the figure on its path.
+        walker = walker_at.py_func(field.walkers.state, 0)
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
         user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
@@ -219,7 +220,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         world.reset(begin.point, rest_pose(), orientation, stylus)
     else:
         stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
-        argument = (stylus_pose if parts.walker is None else servo.argument)[None]
+        argument = (stylus_pose if parts.walking is None else servo.argument)[None]
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:

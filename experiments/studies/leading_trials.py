@@ -19,9 +19,11 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.law import Program
-from controllers.fields.leading import Gait, Leading
+from controllers.fields.leading import Leading
 from controllers.state import HandState
+from controllers.walking.gait import Gait
 from controllers.walking.walked_path import STEP
+from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP, Conditions, Trial
 from experiments.setups.lead import s_curve
@@ -66,8 +68,8 @@ class LeadingTrial(Trial):
     def field(self, k_l: float) -> Leading:
         """The executed law, with the figure placed such that the trial's position lies in the regime."""
         c, s = (float(x) for x in self.regime.tangent(self.curve.velocity(self.phase)))
-        plain = Leading(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=RATE)
-        lead = 2.0 * _GAIT.speed / plain.rate
+        plain = Walking(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=RATE)
+        lead = plain.lead[0]
         laid = (plain.path()[0] - 1.0) * STEP - plain.ahead
         edge = SCALE * EXCESS
         if not self.regime.beyond:
@@ -80,10 +82,10 @@ class LeadingTrial(Trial):
             side = np.sign(self.regime.turn) if self.regime.turn else 1.0
             across = side * (0.5 * bend * beyond**2 + edge) if self.regime.aside else 0.0
         x, y = SCALE * self.curve.point(self.phase)[:2] - (along * c - across * s, along * s + across * c)
-        return Leading(
-            _GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d, rate=RATE,
-            pull=1e-3, curvature=bend,
+        walking = Walking(
+            _GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, rate=RATE, pull=1e-3, curvature=bend
         )  # fmt: skip
+        return Leading(walking, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d)
 
 
 def leading_trial(

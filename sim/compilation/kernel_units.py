@@ -11,9 +11,11 @@ import numpy as np
 
 from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.law import Program
+from controllers.fields.walker_feed import Walkers, fresh_walkers
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
 from controllers.state import Array, IntArray
+from controllers.walking.walking import follow_hand
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
 
@@ -45,6 +47,12 @@ def law_units(program: Program) -> IntArray:
     return np.array(addresses, dtype=np.int64)
 
 
+def linked_walkers(program: Program) -> Walkers:
+    """Walkers of a field for a new run, linked; compiles their kernel if it is not in the cache."""
+    walkers = fresh_walkers(program.walker_feeds)
+    return walkers.linked(_law_unit(follow_hand).address()) if program.walker_feeds else walkers
+
+
 def is_kept(kernel: Callable[..., None]) -> bool:
     """Whether a law's kernel is cached on disk as a unit: not if it is a closure over a user-defined function."""
     return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
@@ -56,8 +64,9 @@ def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
 
 
 def units_of_laws(program: Program) -> tuple[Unit, ...]:
-    """Compilation units of the laws of a field, except those of user-defined functions."""
-    return tuple(_law_unit(kernel) for kernel in program.kernels if is_kept(kernel))
+    """Compilation units of the laws of a field and of its walkers, except those of user-defined functions."""
+    walker = (follow_hand,) if program.walker_feeds else ()
+    return tuple(_law_unit(kernel) for kernel in (*program.kernels, *walker) if is_kept(kernel))
 
 
 def _map_unit(kind: int) -> Unit:

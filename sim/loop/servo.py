@@ -3,7 +3,8 @@
 Each tick of period T:
 
 1. `sense`: device → hand vector in H; an implausible reading is latched as a fault.
-2. `evaluate`: the field's program → wrench, and the hand's phase on the curve.
+2. `feed_walkers`: a figure that is led follows the hand. `evaluate`: the field's program → wrench, and the hand's
+   phase on the curve.
 3. `command_force`: the wrench's force, limited by force ceiling, energy tank and slew rate; zero after a fault.
 4. `actuate`: motor torques of the device, τ = Jᵀ F + N.
 5. Every `figure_ticks` ticks, `follow`: h and its derivatives along the hand's motion, and the control of the body
@@ -25,6 +26,7 @@ from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import evaluate
+from controllers.fields.walker_feed import Walkers, feed_walkers, fresh_walkers
 from controllers.lent import lend
 from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
@@ -33,7 +35,7 @@ from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array, IntArray
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import law_units, map_units
+from sim.compilation.kernel_units import law_units, linked_walkers, map_units
 from sim.devices.device import DeviceState, actuate, advance, link_device, sense
 from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
@@ -45,7 +47,8 @@ class Field(NamedTuple):
 
     `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
     `slots` are the places in `memory` where laws in Python put their wrenches. `maps` says which laws are given values
-    of the haptic map (see `controllers.fields.map_feed`).
+    of the haptic map (see `controllers.fields.map_feed`), `walkers` are the state of figures that are
+    led, which laws and the map read.
     """
 
     units: IntArray
@@ -54,6 +57,7 @@ class Field(NamedTuple):
     memory: Array
     slots: IntArray
     maps: IntArray
+    walkers: Walkers
     limits: Array
     limiter: Array
     budget: Array
@@ -63,7 +67,12 @@ class Field(NamedTuple):
 
     def of(self, program: Program) -> "Field":
         """The same limiter and energy tank with another program and fresh memory; compiles its laws if needed."""
-        return Field(*_program_parts(program), *self[6:])._replace(units=law_units(program))
+        return Field(*_program_parts(program), *self[7:]).linked(program)
+
+    def linked(self, program: Program) -> "Field":
+        """The same field with the addresses of its kernels; compiles those that are not in the cache."""
+        walkers = self.walkers._replace(feeds=linked_walkers(program).feeds)
+        return self._replace(units=law_units(program), walkers=walkers)
 
 
 def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:
@@ -74,18 +83,19 @@ def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) ->
     )  # fmt: skip
 
 
-def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray]:
-    """The first six attributes of a `Field`, those that depend on the program."""
+def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray, Walkers]:
+    """The first seven attributes of a `Field`, those that depend on the program."""
     slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
     memory, maps = program.fresh_memory(), feed_rows(program.map_feeds)
-    return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps
+    walkers = fresh_walkers(program.walker_feeds)
+    return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps, walkers
 
 
 class Servo(NamedTuple):
     """The whole state of the loop; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
     `argument` (7,) is the pose (position in H, quaternion wxyz) at which the haptic map is evaluated: a view of the
-    device's hand vector, or of the pose of a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are
+    device's hand vector, or of the `argument` of a walker of the field (`controllers.walking.walker`). `units` (2,) are
     the addresses of the kernels that update the reference and drive the body; they are called by address, so that a
     change in one of them does not recompile the loop.
     """
@@ -106,7 +116,7 @@ class Servo(NamedTuple):
         if reference.kind != NO_MAP:
             reference = reference._replace(units=map_units([(reference.kind, reference.params)]))
         return self._replace(
-            units=follow_addresses(self.figure, reference), field=self.field._replace(units=law_units(program)),
+            units=follow_addresses(self.figure, reference), field=self.field.linked(program),
             reference=reference,
         )  # fmt: skip
 
@@ -179,6 +189,7 @@ def field_force(servo: Servo) -> None:
     """Evaluate the field at the measured hand, and command its force within the safety limits."""
     field, device = servo.field, servo.device
     feed_maps(servo.reference.units, field.maps, field.params, field.memory, device.hand)
+    feed_walkers(field.walkers, field.params, field.memory, device.hand)
     evaluate(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
     command_force(
         field.limits, field.limiter, field.budget, field.tank, device.faults, device.hand, field.wrench, field.force

@@ -13,7 +13,7 @@ from sim.world.world import World
 
 Array = npt.NDArray[Any]
 
-_NOT_STATE = {"params", "ops", "units", "maps", "slots", "limits", "budget"}
+_NOT_STATE = {"params", "ops", "units", "maps", "feeds", "slots", "limits", "budget"}
 """Fields of a servo's parts that are constant during a run."""
 
 

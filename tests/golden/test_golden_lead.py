@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.fields.leading import Gait
 from controllers.fields.program import evaluate
+from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
+from controllers.walking.gait import Gait
+from controllers.walking.walker import walker_at
 from experiments.config.modes import Lead
 from experiments.setups.lead import leading, leading_hand
 from sim.users.hand.arm import hand_force
@@ -24,14 +26,17 @@ def _run() -> dict[str, list]:
     field = leading(Lead(), GAIT)
     program, arm = field.program(), leading_hand(field).compiled()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
-    p, v, ways = np.array([*field.start, 0.001]), np.zeros(3), []
+    walkers = program.fresh_walkers()
+    walker = walker_at.py_func(walkers.state, 0)
+    p, v, ways = np.array([*field.walking.start, 0.001]), np.zeros(3), []
     for k in range(round(SECONDS / PERIOD)):
         hand[0] = k * PERIOD
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
+        feed_walkers(walkers, program.params, memory, hand)
         evaluate(*program.compiled(), memory, hand, wrench)
         hand_force(arm, k * PERIOD, p, v, user)
         if k % EVERY == 0:
-            ways.append([*p.tolist(), float(field.walker(memory).argument[0])])
+            ways.append([*p.tolist(), float(walker.argument[0])])
         v = v + PERIOD / MASS * (wrench[:3] + user)
         p = p + PERIOD * v
     return {"ways": ways}

@@ -162,7 +162,7 @@ def test_looking_at_the_field_changes_nothing():
         points = slice_points(0.0)
         forces, hand = np.full_like(points, np.nan), it.session.servo.device.hand.copy()
         hand[8:11] = 0.0
-        field_slice(it.field, hand, points, it.memory.copy(), forces)
+        field_slice(it.field, hand, points, forces)
         assert np.all(np.isfinite(forces))
     np.testing.assert_array_equal(it.memory, same.memory)
     # A hand at rest is drawn to the curve; on the circle's axis, all ways are as far.

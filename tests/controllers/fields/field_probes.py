@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from controllers.fields.program import evaluate
+from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HandState
 
 
@@ -27,8 +28,9 @@ def glide(units, ops, params, memory, mass, period, push, path, velocity):
 
 def force_of(program, hand):
     """Force at the first tick of a run."""
-    wrenches = np.empty((1, 6))
-    run_over(*program.compiled(), program.fresh_memory(), hand.vector()[None], wrenches)
+    memory, wrenches = program.fresh_memory(), np.empty((1, 6))
+    feed_walkers(program.fresh_walkers(), program.params, memory, hand.vector())
+    run_over(*program.compiled(), memory, hand.vector()[None], wrenches)
     return wrenches[0, :3]
 
 

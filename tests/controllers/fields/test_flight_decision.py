@@ -5,11 +5,13 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.fields.leading import Leading
-from controllers.fields.program import evaluate
+from controllers.fields.walker_feed import feed_walkers
 from controllers.walking.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
+from controllers.walking.walker import walker_at
+from controllers.walking.walking import Walking
 
 RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)
-FIELD = Leading(RUN, (-0.06, 0.0), scale=160.0, forward=1.05)
+WALKING = Walking(RUN, (-0.06, 0.0), scale=160.0, forward=1.05)
 RATE = 1e-3
 
 
@@ -71,15 +73,15 @@ def test_going_back_in_a_stance_takes_back_what_was_done_in_it():
 
 def led(seconds):
     """A hand that leads straight on at the gait's own pace for three seconds and then stops."""
-    program = FIELD.program()
-    memory, hand, wrench = program.fresh_memory(), np.zeros(15), np.zeros(6)
+    program = Leading(WALKING).program()
+    memory, walkers, hand = program.fresh_memory(), program.fresh_walkers(), np.zeros(15)
     hand[4] = 1.0
-    walker = FIELD.walker(memory)
+    walker = walker_at.py_func(walkers.state, 0)
     trail = np.empty((round(seconds / RATE), 3))
     for k in range(len(trail)):
         hand[0] = k * RATE
-        hand[1] = FIELD.start[0] + min(hand[0], 3.0) * RUN.speed / FIELD.scale
-        evaluate(*program.compiled(), memory, hand, wrench)
+        hand[1] = WALKING.start[0] + min(hand[0], 3.0) * RUN.speed / WALKING.scale
+        feed_walkers(walkers, program.params, memory, hand)
         trail[k] = walker.argument[0], walker.argument[1], walker.speed[0]
     return trail
 
@@ -99,8 +101,8 @@ def test_led_from_rest_to_rest_it_flies_only_at_the_pace_for_it():
     assert speed[flown].max() <= 1.05 * RUN.speed
     # And flying it hardly hastens.
     haste = np.abs(np.diff(speed)) / RATE
-    assert haste[held[1:] < 0.5].max() < 1.001 * FIELD.haste
-    assert haste.max() == pytest.approx(FIELD.pull, rel=1e-3)
+    assert haste[held[1:] < 0.5].max() < 1.001 * WALKING.haste
+    assert haste.max() == pytest.approx(WALKING.pull, rel=1e-3)
     # The form changes smoothly with the place.
     assert np.abs(np.diff(held)).max() < 0.012
 
@@ -115,4 +117,4 @@ def test_led_from_rest_to_rest_it_flies_only_at_the_pace_for_it():
 )
 def test_bad_numbers_of_flights_are_refused(numbers, says):
     with pytest.raises(ParameterError, match=says):
-        Leading(RUN, **numbers)
+        Walking(RUN, **numbers)

@@ -83,9 +83,9 @@ def test_a_knee_that_straightens_in_a_bend_is_not_stopped(figure):
 def test_the_pelvis_turns_only_while_a_foot_bears(figure):
     clip = embedded("run")
     led, gait = led_map(clip, figure_legs(figure))
-    from controllers.fields.leading import Leading
+    from controllers.walking.walking import Walking
 
-    shares = Leading(gait).shares
+    shares = Walking(gait).shares
     path = straight_path(0.0, 0.0, 0.0, gait.reach)
     while path_front(path) < 8.0:
         lap = (path[0] + 0.5) * STEP / gait.stride

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.fields.leading import Gait
 from controllers.haptic_map.led import Led
+from controllers.walking.gait import Gait
 from experiments.cli import main
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
@@ -126,19 +126,18 @@ def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
     path = leading_hand(field).path
     for place in path[::50]:
         phantom_angles(place)
-    np.testing.assert_allclose(path[[0, -1], :2], [field.start] * 2, atol=1e-9)
+    np.testing.assert_allclose(path[[0, -1], :2], [field.walking.start] * 2, atol=1e-9)
     np.testing.assert_allclose(path[len(path) // 2, 2], 0.0, atol=1e-12)
     curve = s_curve()
     assert np.hypot(*np.ptp(path[:, :2], axis=0)) == pytest.approx(0.14, rel=0.1)
-    assert field.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
+    assert field.walking.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
 
 
 @pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
 def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
     led, gait = led_map(embedded(name), figure_legs(figure_model()))
     assert gait.support[0] == most
-    field = leading(Lead(), gait)
-    assert support_at(field, np.array([0.0]))[0] == most
+    assert support_at(gait, np.array([0.0]))[0] == most
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
 
@@ -224,7 +223,7 @@ def test_the_scale_that_is_used_is_in_the_resolved_configuration() -> None:
     maps = led_parts(config, config.map, (embedded("walk"),), figure_model())
     resolved = lead_parts(config, Lead(), maps).config
     assert isinstance(resolved, RunConfig)
-    assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).scale)
+    assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).walking.scale)
 
 
 def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:

@@ -12,8 +12,12 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import Gait, Leading, leading_wrench
+from controllers.fields.leading import Leading, leading_wrench
+from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HandState
+from controllers.walking.gait import Gait
+from controllers.walking.walker import walker_at
+from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
 from experiments.certify.trial_simulation import Conditions, simulate
@@ -83,24 +87,25 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
     linear = linearise(DEVICE, regime.law(scale, UPRIGHT), trial.curve, np.array([trial.phase]), hand)
     loop = SampledLoop(linear, sampling)
     c, s = regime.tangent(linear.velocity[0])
-    field = Leading(
-        Gait(1.4, 0.01, np.array([2, 2]), 0.45), (0.0, 0.0), float(np.arctan2(s, c)), scale, 120.0, 180.0, b,
-        forward=1e3, backward=1e3, pull=1e3,
-    )  # fmt: skip
+    gait = Gait(1.4, 0.01, np.array([2, 2]), 0.45)
+    how = Walking(gait, (0.0, 0.0), float(np.arctan2(s, c)), scale, forward=1e3, backward=1e3, pull=1e3)
+    field, rate = Leading(how, 120.0, 180.0, b), how.rate
     program, free, jacobian = field.program(), loop.matrices(0.0, 0.0)[0], linear.jacobian[0]
     # Backwards the edge is far behind, so a figure that stands is drawn there by a hand that is.
-    lag = 2.0 * 0.01 / field.rate * (1.0 if regime.beyond else -1e3)
+    lag = 2.0 * 0.01 / rate * (1.0 if regime.beyond else -1e3)
     start = (lag + (0.2 if regime.beyond else -0.2)) / scale
     place = np.array([c * start, s * start, 0.0])
     held = field.wrench(HandState.at(place)).force  # answered by a hand that holds on
 
     def course(x, ticks):
         memory, out = program.fresh_memory(), []
-        walker = field.walker(memory)
+        walkers = program.fresh_walkers()
+        walker = walker_at.py_func(walkers.state, 0)
         for k in range(ticks):
             out.append(np.append(x, [walker.argument[0], walker.speed[0]]))
             state = HandState.at(place + jacobian @ x[:3], loop.measured_velocity[0] @ x, k * sampling.period)
             wrench = np.zeros(6)
+            feed_walkers(walkers, program.params, memory, state.vector())
             leading_wrench(program.params, 0, 0, memory, TRACE_SIZE, state.vector(), wrench)
             x = free @ x + loop.fresh[0] @ (jacobian.T @ (wrench[:3] - held))
         return np.array(out)
@@ -110,7 +115,7 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
     ticks = 60
     still = course(np.zeros(loop.size), ticks)
     difference = course(kick, ticks) - still
-    whole = walking(loop, regime, scale, field.rate, field.k_l, b)[0]
+    whole = walking(loop, regime, scale, rate, field.k_l, b)[0]
     assert whole.shape == (loop.size + 2, loop.size + 2)
     expected = difference[1].copy()
     for k in range(1, ticks):
