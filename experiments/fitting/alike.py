@@ -21,7 +21,6 @@ from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] above the clips' median: from there on clips count as different
-_ON_FLOOR = 0.015  # [m]: a higher contact point does not skate, as in `well_formed`
 _FPS = 60.0
 _TRUNK = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
@@ -57,12 +56,12 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     from models.mocap.preparation.feasible import contact_residual
     from models.mocap.preparation.poses import smoothed, sole_points
     from models.mocap.preparation.stances import stances
-    from models.mocap.preparation.well_formed import stance_slides
+    from models.mocap.preparation.well_formed import ON_FLOOR, stance_slides
 
     clip, points = Clip(poses, fps, "blend"), sole_points(poses)
     schedule = stances(clip, smoothed(clip, 8.0))
     heights = points[:, :, 2] - CONTACT_RADIUS
-    slides = stance_slides(points, schedule.standing & (heights < _ON_FLOOR))
+    slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR))
     residual = contact_residual(clip, schedule) if dynamics else 0.0
     return Motion(residual, float(heights.min()), float(np.quantile(slides, 0.95)), float(slides.max()))
 

@@ -9,8 +9,8 @@ from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import sole_points
+from sim.body.figure_state import FigureGains
 
-FLIES = 0.02  # [m] over the floor: if both soles are higher, the figure is in flight
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
 UPRIGHT = -0.5  # least vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
 FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same of clips with flights: these need 0.8 to 1.2 of gravity
@@ -18,8 +18,8 @@ SLOWEST, FASTEST = 0.75, 1.33  # played pace over own: inertial forces go with i
 
 
 def longest_flight(clip: Clip) -> float:
-    """Longest time without a sole near the floor [s]."""
-    flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FLIES
+    """Longest time for which the figure would fly [s]: no point of a sole is below `FigureGains.flight_height`."""
+    flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FigureGains().flight_height
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flies.astype(int), [0]))))
     return float((edges[1::2] - edges[::2]).max(initial=0)) / clip.fps
 

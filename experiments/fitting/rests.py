@@ -13,7 +13,7 @@ from sim.reference.reference import poses_along
 
 _ROWS = 96  # samples of a lap
 _SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
-_FLIES = 1.0  # [m] distance assigned to phases in flight: larger than any other
+_UNSUPPORTED = 1.0  # [m] distance assigned to phases in flight: larger than any other
 
 
 def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
@@ -46,7 +46,7 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         contacts[..., 2] -= CONTACT_RADIUS
         touch = contacts[..., 2] < CONTACT_HEIGHT
         missing = np.linalg.norm(nearest_supported(centre, contacts, _SHARE) - centre, axis=1)
-        missing[~touch.any(axis=1)] = _FLIES
+        missing[~touch.any(axis=1)] = _UNSUPPORTED
         # FOOT_CONTACTS begins with the four points of the left foot.
         good = (missing == 0.0) & touch[:, :4].any(axis=1) & touch[:, 4:].any(axis=1)
         rests.append(phases[good] if good.any() else phases[[missing.argmin()]])

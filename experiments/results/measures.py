@@ -31,7 +31,7 @@ Span = tuple[float, float]
 
 SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
 HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
-STANDS = 1e-3  # [m] of motion within which the stylus counts as standing still
+STILL = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
 BLOCK_FRAMES = 2000  # frames of the figure that are read at a time
 BLOCK_ROWS = 16_000  # ticks that are read at a time
@@ -158,10 +158,10 @@ class PathMeasure:
         return pushed
 
     def _add_place(self, t: Array, p: Array) -> None:
-        """Update the time at which the stylus last moved by more than `STANDS`."""
+        """Update the time at which the stylus last moved by more than `STILL`."""
         k = 0
         while k < len(t):
-            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDS
+            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STILL
             if not far.any():
                 return
             k += int(np.argmax(far))

@@ -31,7 +31,7 @@ _STANDS_OUT = 8.0  # over the median acceleration of the half second around: ste
 _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
 _UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
-_ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
+ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
 _SHORT_FLIGHT = 0.08  # least duration of a flight [s]
 
 
@@ -139,7 +139,7 @@ def well_formed(clip: Clip) -> WellFormed:
     given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     # A sphere that bears nothing and moves is in swing, however low.
     swings = (given.loads < _UNLOADED) & (speeds > _AT_REST)
-    slides = stance_slides(points, schedule.standing & (heights < _ON_FLOOR) & ~swings)
+    slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR) & ~swings)
     flights, falling = _flights(clip)
     return WellFormed(
         clip.duration, float(low), float(high), _tilt(clip, standing), float(np.quantile(slides, 0.95)),

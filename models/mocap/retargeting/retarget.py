@@ -35,7 +35,7 @@ from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
-_STANDS = 8  # least number of frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
+_STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
 _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
 _UNITS = (
     ("metres", 1.0),
@@ -263,7 +263,7 @@ def _named_soles(stances: Sequence[int], roles: Roles, n: int) -> str:
     few = [
         f"the {side} one in {count or 'no'} frame{'s' * (count != 1)}"
         for side, count in zip(SIDES, stances, strict=True)
-        if count < min(_STANDS, n) and f"{side}_foot" in roles.segments
+        if count < min(_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     told = "how the soles lie is a guess, since they hardly stand level"
     return f"{told} ({', '.join(few)}); --rest-frame would say it" if few else ""

@@ -26,7 +26,7 @@ _CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared
 # Least score of the best axis where bodies rest on the ground, and where they hardly do. In files of
 # ../shared/mocap it is 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a
 # second have 0.1 and less, and 0.37 and less.
-_STANDS, _HARDLY = 0.15, 0.45
+_LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
 _REST = 0.3  # speed up to which a joint is at rest [leg lengths/s], as `calibration` takes soles for
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
@@ -64,7 +64,7 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     lost = motion.at_rest(range(len(motion.joints)))[-len(positions) :]
     calm, rests = _calm(positions / lines.leg, motion.fps, lost)
     frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLES).round().astype(int))]
-    least = _STANDS if rests else _HARDLY
+    least = _LEAST_RESTING if rests else _LEAST_MOVING
     if np.isnan(lines.ankles).any():
         least = np.inf  # knees of a squat are no support
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
