@@ -36,6 +36,7 @@ from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
 _STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
+_NAMED = 12  # unused joints that are named: rigs with faces and fingers have hundreds
 _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
 _UNITS = (
     ("metres", 1.0),
@@ -120,11 +121,12 @@ class RetargetReport(NamedTuple):
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
         how = "the format or you said so" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
+        named = ", ".join(self.unused[:_NAMED])
         lines = (
             f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",
             f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs",
             "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
-            "unused: " + (", ".join(self.unused) or "none"),
+            "unused: " + (named or "none") + (f", … ({len(self.unused)} joints)" if len(self.unused) > _NAMED else ""),
             *([] if self.missing else ["missing: none"]),
         )
         return (*(printable(line, 4000) for line in lines), *self.notes())
