@@ -2,7 +2,6 @@
 
 import numpy as np
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
 
@@ -25,6 +24,8 @@ def basis_slope(u: float) -> tuple[float, float, float, float]:
 
 def round_lap(samples: Array, angles: Array) -> Array:
     """Values at angles (...) [rad] of the periodic C² splines through samples (n, ...) at equal steps of the lap."""
+    from scipy.interpolate import CubicSpline  # here: a field is evaluated, and a certificate verified, without it
+
     around = np.concatenate([samples, samples[:1]])
     spline = CubicSpline(np.linspace(0.0, 2.0 * np.pi, len(around)), around, bc_type="periodic")
     return spline(np.mod(angles, 2.0 * np.pi))

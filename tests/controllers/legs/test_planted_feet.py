@@ -126,7 +126,7 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
     led, gait = led_map(clip, figure_legs(figure))
     assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
     # Its limbs swing as fast already as they do in the run.
-    assert leading(Lead(), gait).forward == 1.0
+    assert leading(Lead(), gait).walking.forward == 1.0
     # Of its six steps the lap that repeats itself best has two.
     assert led.stride == pytest.approx(2 * Capture.step)
     assert 0.4 < led.pace < 0.8
