@@ -69,9 +69,7 @@ def followed_at(numbers: Array, at: int) -> Followed:
 
 
 @njit
-def follow_hand(
-    params: Array, at: int, slot: int, walkers: Array, place: int, hand: Array, memory: Array
-) -> None:  # fmt: skip
+def follow_hand(params: Array, at: int, slot: int, walkers: Array, place: int, hand: Array, memory: Array) -> None:
     """Kernel of a walker: advance it to the hand's time, and write what a law reads of it.
 
     A hand that is not finite leaves the walker, and what was written, as they are.

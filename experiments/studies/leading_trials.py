@@ -82,9 +82,7 @@ class LeadingTrial(Trial):
             side = np.sign(self.regime.turn) if self.regime.turn else 1.0
             across = side * (0.5 * bend * beyond**2 + edge) if self.regime.aside else 0.0
         x, y = SCALE * self.curve.point(self.phase)[:2] - (along * c - across * s, along * s + across * c)
-        walking = Walking(
-            _GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, rate=RATE, pull=1e-3, curvature=bend
-        )  # fmt: skip
+        walking = Walking(_GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, rate=RATE, pull=1e-3, curvature=bend)
         return Leading(walking, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.law import Program
-from controllers.fields.walker_feed import Walkers, fresh_walkers
+from controllers.fields.walker_feed import Walkers
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
 from controllers.state import Array, IntArray
@@ -47,10 +47,9 @@ def law_units(program: Program) -> IntArray:
     return np.array(addresses, dtype=np.int64)
 
 
-def linked_walkers(program: Program) -> Walkers:
-    """Walkers of a field for a new run, linked; compiles their kernel if it is not in the cache."""
-    walkers = fresh_walkers(program.walker_feeds)
-    return walkers.linked(_law_unit(follow_hand).address()) if program.walker_feeds else walkers
+def linked_walkers(walkers: Walkers) -> Walkers:
+    """The walkers of a field with the address of their kernel; compiles it if it is not in the cache."""
+    return walkers.linked(_law_unit(follow_hand).address()) if len(walkers.feeds) else walkers
 
 
 def is_kept(kernel: Callable[..., None]) -> bool:

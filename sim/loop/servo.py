@@ -71,8 +71,7 @@ class Field(NamedTuple):
 
     def linked(self, program: Program) -> "Field":
         """The same field with the addresses of its kernels; compiles those that are not in the cache."""
-        walkers = self.walkers._replace(feeds=linked_walkers(program).feeds)
-        return self._replace(units=law_units(program), walkers=walkers)
+        return self._replace(units=law_units(program), walkers=linked_walkers(self.walkers))
 
 
 def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:

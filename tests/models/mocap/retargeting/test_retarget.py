@@ -182,6 +182,17 @@ def test_junk_is_listed_and_does_not_take_a_part(mocap):
     assert report.missing == ()
 
 
+def test_a_dozen_of_the_joints_that_are_not_used_are_named_and_all_are_counted(mocap):
+    _, report, _ = load(mocap / "snu/kick.bvh")
+    (line,) = (
+        line for line in report._replace(unused=tuple(f"face{k}" for k in range(145))).lines() if "unused" in line
+    )
+    assert line.startswith("unused: face0, face1, ")
+    assert line.endswith(", face11, … (145 joints)")
+    (line,) = (line for line in report._replace(unused=()).lines() if "unused" in line)
+    assert line == "unused: none"
+
+
 def test_missing_joints_are_listed_and_follow_their_neighbours(mocap):
     clip, report, _ = load(mocap / "deepmimic/humanoid3d_walk.txt")
     assert [line.split()[0] for line in report.missing] == ["abdomen", "left_clavicle", "right_clavicle"]
