@@ -15,7 +15,9 @@ _BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
 _STEEPEST = 0.25  # and changes the pace by at most a quarter
 _STANCE = 2.0  # weight of stance relative to rotations
 _LOW, _SLOW = 0.02, 0.5  # [m], [m per lap] height, or speed, at which an end counts half as in stance
-_WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it would distort flights and steps for little gain
+# A warp that leaves more of the mismatch is not made: a warp of every pair gains a few percent, and bends flights
+# (accelerations up to 2.8 times the clip's own).
+_WORTH = 0.9
 
 
 def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:

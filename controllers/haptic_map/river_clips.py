@@ -48,7 +48,7 @@ RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(ME
 # Parameters: header, offsets of the packed curves, of the rest phases and of the changes, then these, then the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _RACES = 2.0  # times the river's pace: a faster hand that no river holds plays no clip
-_SOON = 0.03  # [s] horizon of the prediction in `lets_go`
+_SOON = 0.03  # [s] horizon of the prediction in `lets_go`: followed until it races the clip, a root leaps by 3.7 m/s
 _CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand decays to zero
 _PAST = 0.25  # of a lap: a phase that lies before a moment by less than this counts as before it, otherwise as after it
 LONGEST = 0.7  # of a lap: longest duration of a change

@@ -12,7 +12,7 @@ from controllers.rotations import rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-SOFTNESS = 2e-3  # [m] of the minimum of a sole's heights
+SOFTNESS = 2e-3  # [m] of the minimum of a sole's heights: four level points count 3 mm (ln 4 of it) lower
 _ROUND = 4e-3  # s [m]
 
 

@@ -26,7 +26,7 @@ from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
 _STANCE_HEIGHT, _SWING_HEIGHT = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
-_MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0
+_MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0: of two clips, weights 0.72 and 0.985
 _FADE, _FADE_ALONE = 5.0, 1.0  # κ [1/rad], and the additional rate where a clip is alone
 _MOST, _MOST_TURN = 0.15, 0.8  # [m], [rad] largest offset
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points

@@ -30,7 +30,7 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 _LIFT = 0.2  # λ: height of a step over its length
-_TURN_ARM = 0.1  # [m] lever that converts the turn of a foot to a length of its step
+_TURN_ARM = 0.1  # [m] lever that converts the turn of a foot to a length of its step: half the length of its sole
 _ROUND = 3e-3  # [m] length of a step below which it is hardly lifted
 _LEVEL = 0.01  # [m] feet that differ by less in height count as equally high
 _FIRST = 1e3  # urgency of a stance foot's step; that of any other foot is below it

@@ -15,7 +15,7 @@ from controllers.legs.limbs import END, Limb
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SOFTNESS = 0.003  # [m] softness of the minimum of heights
+_SOFTNESS = 0.003  # [m] softness of the minimum of heights: four level points count 4 mm (ln 4 of it) lower
 _HARD = 5e-4  # [m] the same, for the height of the ground
 _RARE = 0.02  # share of frames in which a clip may be below the ground that is estimated from it
 

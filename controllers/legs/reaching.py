@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from controllers.legs.limbs import END, Limb
 from controllers.state import Array
 
-_STRETCHED = 0.99  # largest extension of a limb over its length: nearer to straight, its middle joint turns too fast
+_STRETCHED = 0.99  # largest extension of a limb over its length: nearer to straight a led knee stops with 2500 rad/s²
 _LEAST_BEND = 0.03  # [rad] least flexion of the middle joint
 
 

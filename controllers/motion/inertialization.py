@@ -9,7 +9,7 @@ blend time T:
 
 the quintic with o, ȯ, ö at s = 0 and value, velocity and acceleration zero at s = T. So pose, velocity and acceleration
 are continuous at both ends. Every component keeps its own rate, also where it points away from the new motion, which
-Bollo clips: a joint then overshoots by up to 0.16 T ȯ, as by its inertia. That could throw a fast leg beyond its joint
+Bollo clips: a joint then overshoots by up to 0.2 T ȯ, as by its inertia. That could throw a fast leg beyond its joint
 limits; so where the overshoot would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their
 own, for which it equals that swing.
 
@@ -23,7 +23,9 @@ from numba import njit
 from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose, Tangent
 
-_SWING = 0.16  # largest overshoot of an offset due to its rate, as a share of T ȯ
+# Overshoot due to the rate as a share of T ȯ, by which it is limited; its term x (1 + 3x) (1 − x)³ reaches 0.198,
+# which is 16/81.
+_SWING = 0.16
 
 
 @njit

@@ -25,7 +25,7 @@ from controllers.state import Array, IntArray
 _HELD, _BEFORE, _AIM, _ENTRY, DECISION = range(5)
 
 # Share of a stance in which u changes. With less, the floor would have to pull at a landing figure; with more, at one
-# that pushes off.
+# that pushes off: downward accelerations reach 8 m/s² with 0.8, as in the run itself, and 14 with 0.6.
 WITHIN = 0.8
 
 

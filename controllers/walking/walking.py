@@ -24,7 +24,7 @@ from controllers.walking.walker import (
     walker_at,
 )
 
-_HEIGHT = 1.0  # [m] of the linear inverted pendulum that models the figure's sway
+_HEIGHT = 1.0  # [m] of the linear inverted pendulum that models the figure's sway: its centre of mass stands at 1.02
 _FORESIGHT = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
 
 

@@ -28,7 +28,9 @@ from sim.reference.reference import poses_along
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
 WELL = 0.06  # [body weights] RMS residual, half of `verdict.BEARABLE`: up to this the first clip is taken at once
-SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # largest floor penetration [m], foot skate [m], excess angle [rad]
+# Largest floor penetration [m], foot skate [m] and excess angle [rad]; the first two are the bounds of
+# docs/validation/blended-motions.md.
+SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)
 _SECONDS, _FPS = 20.0, 120.0
 _PUSHED = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, in 50 mm
 _EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand

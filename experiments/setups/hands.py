@@ -27,7 +27,9 @@ from sim.users.participant import Participant
 from sim.users.person.person import Person
 
 PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' continuous limit
-RIVER_PUSH = 1.0  # [N] of a push into another river: midway between too weak to get there and thrown out of it
+# [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
+# all of them out (docs/validation/crossing-rivers.md).
+RIVER_PUSH = 1.0
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river

@@ -43,7 +43,7 @@ STIFFNESS = 150.0  # of the arm [N/m]: compliant enough to be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
-_UNLIKE = np.deg2rad(15.0)  # pose gap above which the ends of a lap do not belong to one cyclic motion
+_UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
 _BLINK, _SWING = 0.05, 0.15  # [s] shortest flight between steps, and shortest swing phase or hop
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
 _FLYING_LATERAL = 1.2

@@ -20,7 +20,7 @@ from sim.world.world import phantom_angles
 
 _SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
 _SECONDS = 0.6  # [s] duration of a push from one curve to another
-_LEAD = 0.36  # [s] before the transition at which the push begins
+_LEAD = 0.36  # [s] before the transition at which the push begins: with 0.34 to 0.55 the figure stands (nine pushes)
 _CROSSING = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
 _NEAR = 3e-3  # [m] from its place within which a push begins
 _STAY = 3  # laps on the other curve

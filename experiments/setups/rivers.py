@@ -20,7 +20,7 @@ from experiments.setups.pace import paced
 from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
 
 # In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
-# a hand that crosses at a right angle is not: the difference is √2.
+# a hand that crosses at a right angle is not: the difference is √2. Without hysteresis rivers chatter after 4 ms.
 ADMISSION, HYSTERESIS = 1.2, 0.15
 BESIDE = 0.05  # hysteresis of rivers side by side, as those of a lifted map: position tells them apart, not direction
 # In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of

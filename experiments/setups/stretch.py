@@ -36,10 +36,12 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from sim.users.hand.actions import Grab
 
-REACH = 1.8  # [s] time of the default hand to get to a place: a quarter of a lap at about the curve's own pace
+# [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
+# it.
+REACH = 1.8
 # Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
 OUTSIDE = 2.2
-EASE = 1.0  # [s] time in which the performance of the bent curve comes up to its pace
+EASE = 1.0  # [s] in which the bent curve comes up to its pace: a body in mid-step cannot go on at full speed at once
 _BLINK = 0.05  # [s] airborne phases up to this long are not taken for flights
 _BEND = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 

@@ -17,7 +17,7 @@ from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.motion.clip import Clip
 
-_MARGIN = 8  # frames of the neighbouring laps that the spline is fitted to beyond both ends
+_MARGIN = 8  # frames of the neighbouring laps beyond both ends: the cubic spline's ends decay by 0.27 a frame, to 3e-5
 _SEAM = 1e-3  # [rad], [m]: largest gap between last and first frame of a clip that is repeated
 
 

@@ -25,9 +25,9 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 
-_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: below σ₀ a flight is lowered fully, from σ₁ on not at all
+_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: a flight is lowered fully below (it would need 0.49 g), not at all above (0.81 g)
 _RATE = 10.0  # natural frequency of the approach to the goal [1/s]; a free fall from a jump's height takes 0.3 s
-_SOFTNESS = 2e-3  # softness of the soft minimum over the soles' heights [m]
+_SOFTNESS = 2e-3  # softness of the minimum of the soles' heights [m]: eight level points count 4 mm (ln 8 of it) lower
 _ROUND = 4e-3  # r [m], rounds the onset of S
 
 

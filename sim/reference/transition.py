@@ -17,16 +17,17 @@ from controllers.motion.inertialization import add_offset, offset_left
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 
-DWELL = 0.04  # [s] dwell time: a river must be active for so long before its clip plays; noise lasts less
+DWELL = 0.04  # [s] dwell time of a river before its clip plays: without a filter, noise changes it every 23 ms
 _ROOT = 6  # components of a tangent that belong to the root
 _PULL = 6.0  # [m/s²] largest vertical acceleration of the root by the offset: a leg in single support bears little more
 _ASIDE = 5.0  # [m/s²] the same horizontally, where the root moves on besides
 _THROW = 20.0  # [m/s²] largest linear acceleration of the offset at the change: a thrown hand races its clip
-_BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
+_BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest: 10/√3
 _LONGER = 1.9  # largest factor on the least blend time by which a horizontal offset prolongs a change
 _GIVING = 0.1  # [s] within which the legs' giving way is faded in, and out again
-_FALLS = 0.58  # [m/s²] depth over T² at which the root, lowered along the arc, falls with g
-_STRIDES = 1.2  # [m] two steps: a horizontal offset prolongs a change to at most the time of so much travel
+# [m/s²] largest depth over T². The arc 64 x³ (1 − x)³ accelerates downwards by up to 19.2 depth/T²: here by 1.14 g.
+_FALLS = 0.58
+_STRIDES = 1.2  # [m] two steps, whose time bounds a change that is prolonged: then both feet would be left behind
 _SWING = 0.3  # [rad] largest overshoot of a joint's offset
 
 

@@ -12,7 +12,7 @@ from sim.reference.transition import DWELL, Transition
 
 _FEET_DOWN = 0.01  # [m] clearance of the feet below which the figure stands
 _FEET_UP = 0.05  # [m] clearance of the feet above which it is in a leap
-_RISES = 0.6  # [m/s] vertical speed of the root from which the figure is about to take off
+_RISES = 0.6  # [m/s] vertical speed of the root from which the figure is about to take off: enough to rise by 2 cm
 _PATIENCE = 1.0  # [s] for which a change waits at most
 
 

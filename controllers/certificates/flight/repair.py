@@ -28,7 +28,7 @@ _HASTE = 3.0  # [1/s] scale of the rate of change of the rate's logarithm
 _JOLT = 10.0  # [m/s²] scale of accelerations of the shift
 _TURN = 0.5  # weight of deviations from constant angular momentum
 _RATES = (0.15, 3.0)  # least and greatest playing rate, relative to the recording
-_REACH = 0.998  # largest extension of a leg, as a share of its length
+_REACH = 0.998  # largest extension of a leg, as a share of its length: a knee bent by 7°
 
 
 class RepairError(ControllerError):

@@ -25,7 +25,9 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import piece_velocity
 from controllers.state import Array
 
-FREQUENCIES = 400  # number of frequencies of G, from 1e-4 of the Nyquist frequency up to it
+# Number of frequencies of G, from 1e-4 of the Nyquist frequency up to it: eight times as many lower the largest drag
+# by 0.02 %.
+FREQUENCIES = 400
 
 
 def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:

@@ -17,8 +17,8 @@ from controllers.certificates.report import CertificateError
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
-SEGMENTS = 48  # of the curve
-PARTS = 8  # of a segment's box along each joint
+SEGMENTS = 48  # of the curve: the bound on the demo's largest mass is 0.151 kg, with 24 segments 0.179, with 96 0.145
+PARTS = 8  # of a segment's box along each joint: with 4 that bound is 0.184, with 16, in five times the time, 0.143
 
 
 class TubeBounds(NamedTuple):

@@ -20,7 +20,8 @@ from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_POSE, figure_mode
 
 _TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame [m], about which the heel rises
 _HANG = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards
-_REACH = (0.95, 0.999)  # shares of a leg's length: exact up to the first, limited to the second
+# Shares of a leg's length (knees bent by 36 and 5°): exact up to the first, limited to the second.
+_REACH = (0.95, 0.999)
 _LIFT = np.array([0.06, np.deg2rad(15)])  # default lift of toes [m] and pitch of the foot in mid-swing
 
 

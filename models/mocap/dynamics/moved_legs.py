@@ -7,7 +7,7 @@ from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import global_rotations
 
-_REACH = 0.9995  # largest distance from hip to ankle as a share of the leg's length
+_REACH = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°
 _CHAINS = tuple(
     tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
 )

@@ -21,7 +21,7 @@ from models.mocap.dynamics.coordinates import states
 from models.mocap.dynamics.floor_forces import Demand, Floor, residual
 
 DEGREE = 5
-_STRONG = 0.8  # share of the torque limits beyond which effort is also penalised as strain
+_STRONG = 0.8  # share of the torque limits beyond which effort is also strain: a fifth is left for the feedback
 _LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
 _MARGIN = 0.02  # kept from the joints' limits [rad]
 

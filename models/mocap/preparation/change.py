@@ -23,7 +23,7 @@ from models.mocap.preparation.poses import around, plus
 DEGREE = 5
 _STEP = 1e-3  # step of the finite differences for velocities and accelerations [s]
 _HELD = DEGREE - 1  # outer control points at either end of an open motion that equal the first or last free one
-_MARGIN = 12  # frames beyond the ends of a closed clip through which its spline goes
+_MARGIN = 12  # frames beyond a closed clip's ends: their influence on its cubic spline decays by 0.27 a frame, to 1e-7
 
 
 @dataclass(frozen=True, eq=False)

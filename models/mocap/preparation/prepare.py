@@ -18,7 +18,7 @@ from models.mocap.retargeting.retarget import Hints, RetargetReport
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 _CORNER = 8.0  # low-pass cut-off [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
 _TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which the result counts as another motion
-_LACKS = 0.12  # RMS residual force [body weights] beyond which nothing feasible was found
+_LACKS = 0.12  # RMS residual force [body weights] beyond which nothing feasible was found: `well_formed.FLYING`
 _LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
 

@@ -19,10 +19,12 @@ from models.mocap.preparation.feasible import Borne, borne
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
-LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]
+LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]; the prototype of preparation left 3 mm of penetration
 FLATTEST = np.deg2rad(2.0)  # largest tilt of soles in stance
 SKATE = 0.005  # [m] in a stance
-RESIDUAL, FLYING = 0.05, 0.12  # RMS residual force [body weights] of gaits and gestures, of motions with flights
+# RMS residual force [body weights]: of gaits and gestures, the bound of Hicks et al. (2015); of motions with flights,
+# what the prototype of preparation left to fighting and jumping jacks (11 and 12 %).
+RESIDUAL, FLYING = 0.05, 0.12
 GAP, SEAM = 1e-3, 0.3  # differences of a closed clip's ends [rad, m], and of their velocities [rad/s, m/s]
 REST = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
 LIMIT = np.deg2rad(1.0)  # excess over a joint's range: Euler angles and rotation vectors differ by as much near limits
@@ -32,7 +34,7 @@ _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
 _UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
 ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
-_SHORT_FLIGHT = 0.08  # least duration of a flight [s]
+_SHORT_FLIGHT = 0.08  # least duration of a flight [s]: in a shorter gap of support a foot rolls over (`flight_fit`)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,11 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
 
-_LEVEL = 0.06  # largest height difference of the four contact points of a level sole [m]
-_SHARE = 0.25  # quantile of the heights of level soles that is the floor
+# Largest height difference of the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
+_LEVEL = 0.06
+# Quantile of the heights of level soles that is the floor: half of it moves the floor of 19 captures by 2 mm, twice
+# by 4 (10 in one of them).
+_SHARE = 0.25
 _STILL = 0.4  # largest speed of a standing sole [m/s]
 _SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
 _STEPS, _SURE = 4, 3.0  # least number of stances; least slope in standard errors

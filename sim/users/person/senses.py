@@ -59,7 +59,7 @@ DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 1
 BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
 CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
 DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen further from the felt one is rejected
-VEER_TIME = 0.5  # [s] correlation time of the error of felt direction
+VEER_TIME = 0.5  # [s] correlation time of the error of felt direction, without which the steering law does not hold
 ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
 UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
 
