@@ -25,12 +25,19 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 _REACHED_FOR = 0.12  # [m] height of a foot above which the root is not lowered for it
-_EASE = 0.95  # extension of a limb over its length that the root is lowered for
-_BENT, _GIVES = 0.01, 0.1  # b and g, in lengths of the limb
+# Extension of a limb over its length that the root is lowered for: a knee bent by 36°. 0.9 and 0.98 change the height
+# of feet by 1 mm in the median of 40 changes, and slides not.
+_EASE = 0.95
+# b and g, in lengths of the limb. With half of g the feet are 5 mm in the air in the median of 40 changes of
+# walk, run and squat dance, with this 11 and with twice 21; joints leap by 2.7, 3.4 and 5.4 rad/s in 8 ms.
+_BENT, _GIVES = 0.01, 0.1
 _ROLL, _LEVER = 0.7, 0.15  # [rad] largest roll of a sole over its edge, [m] gain of reach per radian
 _AHEAD, _EDGE = 0.1, 0.02  # [m] horizontal offset of the first joint for a full roll; [m] rounding of the sole's edge
 _FINE = 2e-3  # [m] rounding of a distance at zero
-_FOLDED = 0.55  # distance below which a limb is folded no further, in lengths of the limb
+# Distance below which a limb is folded no further, in lengths of the limb: a knee bent by 113°. In 40 changes of
+# walk, run and squat dance joints leap by up to 25 rad/s in 8 ms; with half of it 49, and with 0.8 soles go 10 mm
+# below the floor.
+_FOLDED = 0.55
 _TWIST, _SWUNG = 1.8, 0.15  # [rad] twist above which, [m] height at which in full, a foot is turned back with its leg
 _FARTHEST, _LOST = 0.5, 1.0  # horizontal distances, in limb lengths, at which lowering of the root begins to fade, ends
 _BACK = 0.04  # [rad] twice the largest hyperextension of a knee that is kept

@@ -19,12 +19,21 @@ from sim.compilation.native import mj_differentiate_pos
 
 DWELL = 0.04  # [s] dwell time of a river before its clip plays: without a filter, noise changes it every 23 ms
 _ROOT = 6  # components of a tangent that belong to the root
-_PULL = 6.0  # [m/s²] largest vertical acceleration of the root by the offset: a leg in single support bears little more
-_ASIDE = 5.0  # [m/s²] the same horizontally, where the root moves on besides
+# [m/s²] largest vertical acceleration of the root by the offset: a leg in single support bears little more. With half
+# of it the worst of 40 changes of walk, run and squat dance slides 3.6 cm instead of 2.9; with twice joints leap by
+# up to 13 rad/s in 8 ms instead of 25.
+_PULL = 6.0
+# [m/s²] the same horizontally, where the root moves on besides: twice lifts the feet of the worst change by 4 mm
+# more.
+_ASIDE = 5.0
 _THROW = 20.0  # [m/s²] largest linear acceleration of the offset at the change: a thrown hand races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest: 10/√3
-_LONGER = 1.9  # largest factor on the least blend time by which a horizontal offset prolongs a change
-_GIVING = 0.1  # [s] within which the legs' giving way is faded in, and out again
+# Largest factor on the least blend time by which a horizontal offset prolongs a change. With 1 the worst of 40
+# changes has its feet 7 mm higher and slides 4 mm less; with twice as much the median has its feet 2 mm lower.
+_LONGER = 1.9
+# [s] within which the legs' giving way is faded in, and out again. In 40 changes joints leap by 3.4 rad/s in 8 ms in
+# the median and 25 at most; with half of it by 9.0 and 25, with twice by 2.7 and 64.
+_GIVING = 0.1
 # [m/s²] largest depth over T². The arc 64 x³ (1 − x)³ accelerates downwards by up to 19.2 depth/T²: here by 1.14 g.
 _FALLS = 0.58
 _STRIDES = 1.2  # [m] two steps, whose time bounds a change that is prolonged: then both feet would be left behind

@@ -24,8 +24,8 @@ from models.mocap.preparation.poses import around, sole_points
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
 _REACH = 0.045  # largest height of a standing part of a sole [m]
 _SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's speed: errors of leg length make feet skate
-# Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of the
-# frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
+# Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
+# the frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
 _LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
 _REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot whose stance is extended [m]
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]

@@ -24,7 +24,9 @@ _SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope 
 _STEPS, _SURE = 4, 3.0  # least number of stances; least slope in standard errors
 _SLOPE = np.deg2rad((0.5, 8.0))  # smaller slopes are none, larger ones are not due to calibration
 _UNEVEN = 0.025  # RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]
-_SMOOTHING = 0.02  # standard deviation of the Gaussian filter for the ankles' correction [s]
+# Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
+# than any ankle turns.
+_SMOOTHING = 0.02
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 _PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
 
