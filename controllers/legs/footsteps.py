@@ -43,7 +43,8 @@ _CAUGHT = 0.12
 # [m/s²], [rad/s²] largest acceleration of the old motion that is continued, as of the root; half or twice the first
 # moves the joints of these changes and stops by 1 rad/s in 8 ms at most.
 _THROW, _TWIRL = 20.0, 100.0
-_SOONEST = 0.05  # [s] least stopping time of a foot
+# [s] least stopping time of a foot: half or twice of it moves joints of these changes by 2 rad/s in 8 ms at most.
+_SOONEST = 0.05
 # A row of `steps`: begin of the step [s]; position (3) and quaternion (4) at which the old motion comes to rest;
 # offsets from there with rates, (3, 3) each, of position and orientation; stopping time [s]; height of the floor [m].
 _BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28

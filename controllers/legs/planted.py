@@ -44,8 +44,9 @@ _LEVEL_EDGE, _LEVEL_SECONDS = 0.15, 0.03
 # captures slides 3.0 cm, 1.5 with half of it and 7.5 with twice; their knees accelerate by up to 1040, 1090 and 980
 # rad/s².
 _LIFT_EDGE = 0.12
-_SMOOTH = 0.0025  # [m] smoothing of a maximum of heights
-# H_0 [m], least height of a foot in swing: the worst of eight led captures slides 3.0 cm, with half of it 4.4, with
+# [m] smoothing of a maximum of heights: half or twice changes the slide of led captures by 0.4 cm at most.
+_SMOOTH = 0.0025
+# h_0 [m], least height of a foot in swing: the worst of eight led captures slides 3.0 cm, with half of it 4.4, with
 # twice 2.4.
 _CLEAR = 0.01
 _CATCH_UP = 8.0  # κ ∫ g over a lap: e⁻⁸ of a gap is left after it; half or twice changes slides by 0.1 mm at most

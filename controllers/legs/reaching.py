@@ -12,7 +12,9 @@ from scipy.spatial.transform import Rotation
 from controllers.legs.limbs import END, Limb
 from controllers.state import Array
 
-_STRETCHED = 0.99  # largest extension of a limb over its length: nearer to straight a led knee stops with 2500 rad/s²
+# Largest extension of a limb over its length: straighter, a led knee stops with 2500 rad/s², beyond its motor. Knees
+# of eight led captures accelerate by up to 1040, with 0.98 by 810, their roots 0.8 cm lower, with 0.998 by 1470.
+_STRETCHED = 0.99
 _LEAST_BEND = 0.03  # [rad] least flexion of the middle joint
 
 

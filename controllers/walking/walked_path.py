@@ -19,7 +19,7 @@ from controllers.gravity import GRAVITY
 from controllers.state import Array
 
 STEP = 0.03  # Δ [m]
-ROWS = 2048  # 61 m of path, which can be gone back
+ROWS = 2048  # rows of the ring buffer: the last 61 m of the path are kept
 PATH_X, PATH_Y, PATH_HEADING, PATH_LEAN, PATH_BEND, PATH_SIDEWARDS, ROW = range(7)
 PACKED_PATH = 1 + ROW * ROWS
 

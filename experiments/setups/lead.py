@@ -44,7 +44,9 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
-_BLINK, _SWING = 0.05, 0.15  # [s] shortest flight between steps, and shortest swing phase or hop
+# [s] shortest flight between steps, and shortest swing phase or hop: half or twice of it changes none of eight
+# captures.
+_BLINK, _SWING = 0.05, 0.15
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
 _FLYING_LATERAL = 1.2
 # Largest pace of a gait with flights, over the clip's own: played faster it lands late, since gravity stays the same.

@@ -36,8 +36,10 @@ _LONGER = 1.9
 _GIVING = 0.1
 # [m/s²] largest depth over T². The arc 64 x³ (1 − x)³ accelerates downwards by up to 19.2 depth/T²: here by 1.14 g.
 _FALLS = 0.58
-_STRIDES = 1.2  # [m] two steps, whose time bounds a change that is prolonged: then both feet would be left behind
-_SWING = 0.3  # [rad] largest overshoot of a joint's offset
+# [m] two steps: a change is prolonged to the time of so much travel at most, or both feet are left behind.
+_STRIDES = 1.2
+# [rad] largest overshoot of a joint's offset: half or twice leaves feet and leaps of 40 changes as they are.
+_SWING = 0.3
 
 
 class Transition(NamedTuple):

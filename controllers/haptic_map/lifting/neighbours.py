@@ -29,8 +29,12 @@ SITE = 4  # channels of a site: r, z, R, and the core b
 
 _NEAR = 1e-7  # [m] ε
 _MOST = 0.35  # E₀
-_REACH = 2.4  # R over the radius of a site's own Voronoi cell: more than 2, so that it includes all adjacent cells
-_RIDGE = 0.01  # λ times the mean reach
+# R over the radius of a site's own Voronoi cell: more than 2, so that it includes all adjacent cells. With 2 nine of
+# ten of these condition numbers are below 59, with 3 below 122.
+_REACH = 2.4
+# λ times the mean reach: nine of ten condition numbers of h_* half way between walk, run, jump and backflip are below
+# 81, with half of it 108, with twice 61.
+_RIDGE = 0.01
 _GRID = 8.0  # steps of the grid on which cells are measured, along each side, per root of the number of clips
 _ROWS, _CLIPS, _CELLS, _LAMBDA, _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _OFFSETS = range(9)
 

