@@ -71,6 +71,15 @@ def piece_velocity(blob: Array, row: int, u: float) -> tuple[float, float, float
 
 
 @njit
+def piece_acceleration(blob: Array, row: int, u: float) -> tuple[float, float, float]:
+    """φ̈ of the piece whose coefficients start at ``blob[row]``, u seconds after its break."""
+    x = 2.0 * blob[row + 14] + 6.0 * u * blob[row + 21]
+    y = 2.0 * blob[row + 15] + 6.0 * u * blob[row + 22]
+    z = 2.0 * blob[row + 16] + 6.0 * u * blob[row + 23]
+    return x, y, z
+
+
+@njit
 def curve_point(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ(t) [m] of the curve packed at ``blob[at:]``."""
     t = wrap_phase(blob, at, t)
@@ -94,12 +103,7 @@ def curve_acceleration(blob: Array, at: int, t: float) -> tuple[float, float, fl
     t = wrap_phase(blob, at, t)
     piece = find_piece(blob, at, t)
     u = t - blob[at + int(blob[at + BREAKS]) + piece]
-    row = at + int(blob[at + COEFFICIENTS]) + piece * PIECE
-    return (
-        2.0 * blob[row + 14] + 6.0 * u * blob[row + 21],
-        2.0 * blob[row + 15] + 6.0 * u * blob[row + 22],
-        2.0 * blob[row + 16] + 6.0 * u * blob[row + 23],
-    )
+    return piece_acceleration(blob, at + int(blob[at + COEFFICIENTS]) + piece * PIECE, u)
 
 
 def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:

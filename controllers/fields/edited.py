@@ -71,7 +71,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         there, speed = work_array(3), work_array(3)
         there[0], there[1], there[2] = curve_point(params, performed, s)
         speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
-        follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square)
+        follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square, 0.0)
         memory[slot + _NEAREST], _ = follow_at(follow, params, curve, memory[slot + _NEAREST], there, speed, wrench)
         share = gains.weight * _nearness(params, performed, s, inverse_square, p)
         for i in range(3):

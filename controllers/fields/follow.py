@@ -9,7 +9,7 @@ from numba import njit
 
 from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
-from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
+from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.fields.instructions import leave_trace
 from controllers.fields.law import Law, Program
 from controllers.fields.window import window
@@ -22,18 +22,35 @@ def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float,
     return k_r * (p_curve - p) + b_d * (v_curve - v)
 
 
+PACES = (0.5, 1.5)
+"""Least and largest γ of a parallel flow, reached half a radius of curvature off the curve; bounds its power."""
+
+
+@njit
+def parallel_pace(
+    p: Array,
+    p_curve: tuple[float, float, float],
+    v_curve: tuple[float, float, float],
+    a_curve: tuple[float, float, float],
+) -> float:
+    """γ = 1 − (p − φ)·φ̈/|φ̇|², speed over the curve's of a point beside it whose nearest point has the curve's pace."""
+    bend = (p[0] - p_curve[0]) * a_curve[0] + (p[1] - p_curve[1]) * a_curve[1] + (p[2] - p_curve[2]) * a_curve[2]
+    return 1.0 - bend / (v_curve[0] ** 2 + v_curve[1] ** 2 + v_curve[2] ** 2)
+
+
 class FollowGains(NamedTuple):
-    """Parameters of `follow_wrench`: k_r [N/m], b_d [N s/m] and 1/ε² [1/m²]."""
+    """Parameters of `follow_wrench`: k_r [N/m], b_d [N s/m], 1/ε² [1/m²], and 1 for a parallel flow, else 0."""
 
     k_r: float
     b_d: float
     inverse_square: float
+    parallel: float
 
 
 @njit
 def follow_gains(params: Array, at: int) -> FollowGains:
     """Gains stored at ``params[at:]``."""
-    return FollowGains(params[at], params[at + 1], params[at + 2])
+    return FollowGains(params[at], params[at + 1], params[at + 2], params[at + 3])
 
 
 @njit
@@ -43,9 +60,12 @@ def follow_at(
     """Write the wrench at position p [m] and velocity v [m/s]; returns t* [s] and the distance [m]."""
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], guess)
     p_curve, v_curve = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
-    w = window(distance * distance * gains.inverse_square)
+    w, pace = window(distance * distance * gains.inverse_square), 1.0
+    if gains.parallel != 0.0 and v_curve != (0.0, 0.0, 0.0):
+        pace = parallel_pace(p, p_curve, v_curve, curve_acceleration(params, curve, phase))
+        pace = min(max(pace, PACES[0]), PACES[1])
     for i in range(3):
-        wrench[i] = w * follow_force(p[i], v[i], p_curve[i], v_curve[i], gains.k_r, gains.b_d)
+        wrench[i] = w * follow_force(p[i], v[i], p_curve[i], pace * v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
     return phase, distance
 
@@ -63,12 +83,17 @@ def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, 
 class Follow(Law):
     r"""River force: carries a free stylus along the curve, and yields to the hand.
 
-    .. math:: F = w(d/\varepsilon)\,\bigl(k_r\,(\varphi(t^*) - p) + b_d\,(\dot\varphi(t^*) - \dot p)\bigr)
+    .. math:: F = w(d/\varepsilon)\,\bigl(k_r\,(\varphi(t^*) - p) + b_d\,(\gamma\dot\varphi(t^*) - \dot p)\bigr)
 
     t* is the phase of the curve's point nearest to the hand, d its distance, w the C² `window`. F is continuous in
     p wherever the nearest point is unique: within `Trajectory.reach` of the curve, and farther out off the medial
     axis. Where two points are equally near, the one found first is kept; beyond ε there is no force. Past an end of an
     open curve t* stays at that end.
+
+    γ is 1, as in the paper. A hand that is pushed off the outside of a bend then takes longer for the same angle: its
+    t* advances at :math:`\dot t^* = \dot p\cdot\dot\varphi\,/\,(|\dot\varphi|^2 - (p - \varphi)\cdot\ddot\varphi)`. A
+    *parallel* flow has γ = 1 − (p − φ)·φ̈/|φ̇|², the speed along the parallel curve through p (1 − κe in path
+    following: Samson 1995), with which t* advances at rate 1 on either side; γ is held between 0.5 and 1.5.
 
     Parameters
     ----------
@@ -81,6 +106,8 @@ class Follow(Law):
     epsilon : float
         ε, radius of the tube [m], may be infinite. The default is about the radius of the workspace: the field reaches
         everywhere and is hardly weakened near the curve (2 % at 2 cm).
+    parallel : bool
+        Whether the flow is parallel, so that a hand which is pushed off keeps the curve's pace.
 
     Raises
     ------
@@ -92,6 +119,7 @@ class Follow(Law):
     k_r: float
     b_d: float
     epsilon: float = 0.25
+    parallel: bool = False
 
     def __post_init__(self) -> None:
         checked("k_r", self.k_r, "N/m")
@@ -100,7 +128,12 @@ class Follow(Law):
 
     @cached_property
     def _program(self) -> Program:
-        return Program.of(self, follow_wrench, FollowGains(self.k_r, self.b_d, self.epsilon**-2), [np.nan], self.curve)
+        return Program.of(self, follow_wrench, self.gains, [np.nan], self.curve)
+
+    @property
+    def gains(self) -> FollowGains:
+        """Parameters of the kernel."""
+        return FollowGains(self.k_r, self.b_d, self.epsilon**-2, float(self.parallel))
 
     def program(self) -> Program:
         """Compiled form of the field."""

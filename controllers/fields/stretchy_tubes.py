@@ -38,7 +38,7 @@ CLICK_TIME = 0.4  # [s] a shorter click undoes the last edit, a longer one redoe
 NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
 # Memory: phase t*, mode, time and position (3) of the last press, largest distance of the stylus from there, normal (3)
 # of a push, FOLLOW's gains (3), largest distance of a held point from the stylus, then the record of the curve.
-_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13, 14
+_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 14, 15
 
 
 class StretchyGains(NamedTuple):
@@ -272,9 +272,7 @@ class StretchyTubes(Law):
     @cached_property
     def _program(self) -> Program:
         follow = self.then
-        then = FollowGains(0.0, 0.0, 0.0)
-        if follow is not None:
-            then = FollowGains(follow.k_r, follow.b_d, follow.epsilon**-2)
+        then = FollowGains(0.0, 0.0, 0.0, 0.0) if follow is None else follow.gains
         state = np.zeros(_RECORD)
         state[_PHASE], state[_GAINS:_OFF] = np.nan, then
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])

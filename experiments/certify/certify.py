@@ -11,7 +11,7 @@ from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.loop.energy import energy
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS
+from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.region import region
@@ -75,7 +75,7 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
         verdicts["passivity" + name] = passivity(river)
         ceiling = ForceLimiter(river.sampling.period).peak
         verdicts["region" + name] = region(river, hands, ceiling, verdicts["stability" + name])
-        if river.law is FOLLOW_LAW:
+        if river.law in (FOLLOW_LAW, PARALLEL_LAW):
             verdicts["energy" + name] = energy(river, push, ceiling)
     if drag > 0.0:
         for name in verdicts:

@@ -8,7 +8,7 @@ import numpy as np
 from controllers.certificates.loop.added_laws import exert_moments, with_added
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
@@ -105,7 +105,8 @@ def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]
         assumed += ("the critical gain is one by which the whole field is scaled, laws of one's own included",)
     law, curve = parts.leading, parts.leading.curve
     if isinstance(law, Follow):
-        base, (k_r, b_d, width) = FOLLOW_LAW, (law.k_r, law.b_d, law.epsilon)
+        base = PARALLEL_LAW if law.parallel else FOLLOW_LAW
+        k_r, b_d, width = law.k_r, law.b_d, law.epsilon
     else:
         base, (k_r, b_d, width) = BUNNY_LAW, law.felt
         if law.attraction == "along":

@@ -69,6 +69,9 @@ class Follow:
         b_d [N s/m].
     tube : float
         ε, beyond which the field ends [m].
+    flow : {"curve", "parallel"}
+        Off the curve, the curve's velocity; or that of its parallel, with which a hand that is pushed off keeps the
+        curve's pace.
     orientation, governor, walls
         What is added, if anything.
     """
@@ -77,6 +80,7 @@ class Follow:
     stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
     damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
+    flow: Literal["curve", "parallel"] | None = None
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
     walls: JointWalls | None = None

@@ -25,17 +25,13 @@ _FIRST = 1.7  # [s] start of the first push
 def toured(made: Lifted, curve: Trajectory) -> Clip:
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
-    A push leaves the hand's speed as it is, as in FOLLOW, so its angular speed is lower the further out it is.
+    The flow of FOLLOW is parallel on these maps: a hand that is pushed off keeps the curve's pace.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
-    pushed, phase = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0)), curve.start
-    points, poses = np.empty((len(times), 3)), np.empty((len(times), made.nq))
-    for point, off in zip(points, pushed, strict=True):
-        point[:] = curve.point(phase)
-        radius = float(np.hypot(point[0], point[1]))
-        point[:2] *= (radius + off) / radius
-        phase += radius / (radius + off) / _FPS
-        phase = curve.start + (phase - curve.start) % curve.duration if curve.periodic else min(phase, curve.end)
+    pushed = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0))
+    phases = times % curve.duration if curve.periodic else np.minimum(times, curve.duration)
+    points, poses = curve.point(curve.start + phases), np.empty((len(times), made.nq))
+    points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
     kind, params, memory = made.compiled()
     poses_along(kind, params, memory.copy(), stylus_path(points), poses)
     return Clip(poses, _FPS, "pushed")

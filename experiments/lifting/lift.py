@@ -36,7 +36,7 @@ from models.mocap.preparation.poses import around
 from sim.errors import SimError
 from sim.world.world import phantom_angles
 
-_SHORTEST = 1.0  # [s] least duration of a lap
+_SHORTEST = 2.0  # [s] least duration of a lap: with 4 s a sprint goes round 8 times, and falls by encoder noise
 
 
 @dataclass(frozen=True, eq=False)

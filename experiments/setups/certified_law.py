@@ -43,10 +43,15 @@ def certified_laws(config: RunConfig) -> Laws:
 
 
 def leading_gains(config: RunConfig) -> tuple[float, float]:
-    """Stiffness [N/m] and damping [N s/m] with which a run leads along its curve; 0 where it does not lead."""
+    """Stiffness [N/m] and damping [N s/m] for which a run's course is timed; 0 where it does not lead along its curve.
+
+    The stiffness is 0 also with a parallel flow, where a hand that runs outside a bend keeps the curve's pace.
+    """
     mode = resolved(config).mode
     if isinstance(mode, Rivers):
         return river_gains(mode)
+    if isinstance(mode, Follow) and mode.flow == "parallel":
+        return 0.0, mode.damping
     return (mode.stiffness, mode.damping) if isinstance(mode, Follow | StretchThenFollow) else (0.0, 0.0)
 
 
@@ -73,7 +78,8 @@ def left_out(config: RunConfig) -> tuple[str, ...]:
 
 
 def _follow(mode: Follow | StretchThenFollow) -> Laws:
-    return {"": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}
+    law = "parallel" if isinstance(mode, Follow) and mode.flow == "parallel" else "follow"
+    return {"": CertifiedLaw(law, mode.stiffness, mode.damping, mode.tube)}
 
 
 def _bunny(mode: Bunny) -> Laws:

@@ -1,12 +1,13 @@
-"""Default gains of a mode that depend on the kind of map.
+"""Defaults of a mode that depend on the kind of map.
 
 Imports only configurations, since certificates import it too.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from experiments.config.maps import MapFile
-from experiments.config.modes import Rivers, Stretch, StretchThenFollow
+from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 
 RIVER_GAINS = {"default": (150.0, 16.0), "file": (50.0, 20.0)}
@@ -18,8 +19,12 @@ SEARCH = {"default": (150.0, 14.0), "file": (50.0, 20.0)}
 # About a circle an edit that is undone takes the hand along in a tenth of a second, not in a fortieth. On a map from a
 # file the seeking spring is as soft as the rivers there: the figure follows every movement of the hand, and
 # neighbouring curves hold different motions.
+_FLOW = {"default": ("curve",), "file": ("parallel",)}
+"""Flow of FOLLOW."""
+# On a map from a file a hand that is pushed is among other clips, and flights bear no change of pace as well.
 _SEARCHED = ("seek", "tube_damping")
-_OPEN: dict[type, tuple[tuple[str, str], dict[str, tuple[float, float]]]] = {
+_OPEN: dict[type, tuple[tuple[str, ...], Mapping[str, tuple[float | str, ...]]]] = {
+    Follow: (("flow",), _FLOW),
     Rivers: (("stiffness", "damping"), RIVER_GAINS),
     Stretch: (_SEARCHED, SEARCH),
     StretchThenFollow: (_SEARCHED, SEARCH),
@@ -27,12 +32,12 @@ _OPEN: dict[type, tuple[tuple[str, str], dict[str, tuple[float, float]]]] = {
 
 
 def resolved(config: RunConfig) -> RunConfig:
-    """A configuration with the gains that it leaves open filled in."""
-    left: dict[str, float] = {}
+    """A configuration with the gains and the flow that it leaves open filled in."""
+    left: dict[str, float | str] = {}
     if type(config.mode) in _OPEN:
         names, values = _OPEN[type(config.mode)]
-        numbers = values["file" if isinstance(config.map, MapFile) else "default"]
-        left = {name: n for name, n in zip(names, numbers, strict=True) if getattr(config.mode, name) is None}
+        chosen = values["file" if isinstance(config.map, MapFile) else "default"]
+        left = {name: x for name, x in zip(names, chosen, strict=True) if getattr(config.mode, name) is None}
     return replace(config, mode=replace(config.mode, **left))
 
 

@@ -1,17 +1,18 @@
 r"""Energy of a river: injected energy per lap, speed of a relaxed hand, and its distance under a bounded force.
 
 A river pushes along its tangent, so it is active by design. Of FOLLOW's force, the spring (k_r) is conservative and the
-damper (b_d) injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: this bounds the power of the ideal law for any motion of the hand;
+damper (b_d) injects b_d (γφ̇ − v)·v ≤ b_d |γφ̇|²/4: this bounds the power of the ideal law for any motion of the hand;
 `injected` bounds what sampling, filter and rounding add to it for a vibrating hand. A relaxed hand moves at the speed
 at which the force balances friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
 
-.. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon))\bigr), \qquad
+.. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon)) + b_d s R\bigr), \qquad
           G = \sum_j \sigma_{max}(E\,A^j B)
 
 with A the state matrix transverse to the curve, B its response to a force, E the displacement of the tip: G is the
 peak gain of the sampled loop, the least number for which this holds. U_0 bounds the force that motion along the lap
-itself needs: inertia, friction and the filter's lag. The last term is the part of the spring that the window removes
-off the curve. A hand that starts on the curve stays within the least solution R: the loop is input-to-state stable.
+itself needs: inertia, friction and the filter's lag. The last terms are the part of the spring that the window removes
+off the curve, and the change of a parallel flow across the curve, s = max |φ̇|κ, else 0. A hand that starts on the
+curve stays within the least solution R: the loop is input-to-state stable.
 """
 
 from typing import NamedTuple
@@ -24,6 +25,7 @@ from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
+from controllers.fields.follow import PACES
 from controllers.fields.river import window
 from controllers.safety.energy_tank import river_power
 from controllers.state import Array
@@ -94,11 +96,11 @@ def own_force(river: River, linear: LinearLoop) -> Array:
 
 
 def distance_bound(river: River, gain: float, force: float) -> float:
-    """Least R [m] with R = G (U + k_r R (1 − w(R/ε))); inf when there is none within the tube."""
-    radius = 0.0
+    """Least R [m] with R = G (U + k_r R (1 − w(R/ε)) + b_d s R); inf when there is none within the tube."""
+    radius, shear = 0.0, river.b_d * river.shear
     for _ in range(500):
         share = float(window(radius * radius * river.width**-2))
-        following = gain * (force + river.k_r * radius * (1.0 - share))
+        following = gain * (force + (river.k_r * (1.0 - share) + shear) * radius)
         if following > river.width:
             return float("inf")
         if abs(following - radius) < 1e-12:
@@ -201,7 +203,7 @@ def _powers(river: River, moving: LinearLoop, executed: Injection) -> dict[str, 
         "terminal_speed": speed,
         "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
         "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
-        "power_bound": river_power(river.b_d, float(np.max(pace))),
+        "power_bound": river_power(river.b_d, (PACES[1] if river.law.parallel else 1.0) * float(np.max(pace))),
         "passive_below": executed.passive_below,
         **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
         "rounding_force": executed.rounding,

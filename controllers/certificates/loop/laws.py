@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import casadi
 
 from controllers.certificates.loop.device import Device, Symbol, matrix, vector
-from controllers.curves.trajectory import PIECE, piece_point, piece_velocity
+from controllers.curves.trajectory import PIECE, piece_acceleration, piece_point, piece_velocity
 from controllers.fields.bunny import gaussian
-from controllers.fields.follow import follow_force
+from controllers.fields.follow import follow_force, parallel_pace
 from controllers.fields.river import window
 from controllers.fields.stretchy_tubes import stretch_force
 
@@ -26,11 +26,14 @@ class Law(NamedTuple):
         displacement along the curve.
     carries : bool
         Whether the hand is driven along the curve; otherwise it comes to rest.
+    parallel : bool
+        Whether its flow is that of parallel curves (`controllers.fields.follow.Follow`).
     """
 
     force: Callable[..., Symbol]
     slides: bool
     carries: bool
+    parallel: bool = False
 
 
 def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
@@ -45,6 +48,15 @@ def _follow(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Sy
     p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
     w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
     return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
+
+
+def _parallel(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
+    """FOLLOW with a parallel flow, within the distance at which γ is not held."""
+    nearest = nearest_phase(p, piece, u)
+    p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
+    pace = parallel_pace.py_func(p, p_curve, v_curve, piece_acceleration.py_func(piece, 0, nearest))
+    w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
+    return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], pace * v_curve[i], k_r, b_d) for i in range(3)])
 
 
 def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
@@ -67,10 +79,11 @@ def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol
 
 
 FOLLOW_LAW = Law(_follow, slides=True, carries=True)
+PARALLEL_LAW = Law(_parallel, slides=True, carries=True, parallel=True)
 BUNNY_LAW = Law(_bunny, slides=False, carries=True)
 SEEK_LAW = Law(_seek, slides=True, carries=False)
 HOLD_LAW = Law(_hold, slides=False, carries=False)
-LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
+LAWS = {"follow": FOLLOW_LAW, "parallel": PARALLEL_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
 
 
 def torque_function(device: Device, law: Law) -> Any:

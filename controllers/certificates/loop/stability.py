@@ -21,6 +21,7 @@ MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] upper ends of the sear
 GRID = 40  # gains on the grid before bisection: half or twice as many find the same critical gains along a bent curve
 # Phases of the curve at which the loop is examined: with eight times as many critical gains are 0.1 % lower.
 PHASES = 48
+_FINE = 4000  # phases at which a curve's own figures are taken, as in `region.remainder`
 LAP_PHASES = 400  # phases for the Floquet multipliers of a lap: four times as many change their logarithm by 0.01 %
 CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may reduce a force
 LATEST = 16  # periods of delay at which the search for the delay margin ends
@@ -36,6 +37,15 @@ class River(NamedTuple):
     curve: Trajectory
     device: Device
     sampling: Sampling
+
+    @property
+    def shear(self) -> float:
+        """Largest change of the flow's speed across the curve [1/s]: |φ̇|κ of a parallel flow, 0 of any other."""
+        if not self.law.parallel:
+            return 0.0
+        phases = self.phases(_FINE)
+        speed = np.linalg.norm(self.curve.velocity(phases), axis=1)
+        return float((speed * np.where(speed > 0.0, self.curve.curvature(phases), 0.0)).max())
 
     def phases(self, n: int = PHASES) -> Array:
         """Equal phases of the curve [s]: all round if it is closed, else within its ends."""

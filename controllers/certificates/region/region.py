@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import FOLLOW_LAW, HOLD_LAW, SEEK_LAW
+from controllers.certificates.loop.laws import FOLLOW_LAW, HOLD_LAW, PARALLEL_LAW, SEEK_LAW
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.decrease_check import Checked, check_form
 from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, find_form
@@ -124,7 +124,7 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
     """
     frozen: Found | None = None
     carries = river.law.carries
-    course = Course.of(river.curve, carries)
+    course = Course.of(river.curve, river.law)
     share = float(window((RADIUS / river.width) ** 2)) if carries else 1.0
     low = np.array([tube.mass_low + hands.mass[0], hands.damping[0], hands.stiffness[0], share])
     high = np.array([tube.mass_high + hands.mass[1], hands.damping[1], hands.stiffness[1], 1.0])
@@ -203,7 +203,7 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
     if linear.verdict == "refuted":
         reason = "no region: the loop is unstable on the curve itself"
         return Verdict("refuted", reason, -1.0, (), linear.counterexample)
-    if river.law not in (FOLLOW_LAW, SEEK_LAW, HOLD_LAW):
+    if river.law not in (FOLLOW_LAW, PARALLEL_LAW, SEEK_LAW, HOLD_LAW):
         return Verdict("unknown", "a region is sought only about curves whose nearest point attracts, and points")
     if river.sampling.rest_delay > 0.0 or river.k_r <= 0.0 or river.b_d <= 0.0:
         return Verdict("unknown", "a region needs a stiffness, a damping, and a delay of whole periods")

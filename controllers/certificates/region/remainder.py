@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.certificates.loop.laws import Law
 from controllers.certificates.region.lyapunov import Axis, Cell, Form
 from controllers.certificates.region.tube_bounds import TubeBounds
 from controllers.curves.trajectory import Trajectory
@@ -25,7 +26,8 @@ DENSE = 120  # masses at which terms that are not convex in the mass are evaluat
 class Course(NamedTuple):
     """Curve data: largest and least pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
 
-    For a law that does not carry the hand, largest pace and |φ̈| are zero.
+    For a law that does not carry the hand, largest pace and |φ̈| are zero. The last is the largest change of the flow's
+    speed across the curve [1/s]: of a parallel flow |φ̇|κ, else 0.
     """
 
     pace: float
@@ -33,19 +35,20 @@ class Course(NamedTuple):
     curvature: float
     acceleration: float
     cosine: float
+    shear: float
 
     @staticmethod
-    def of(curve: Trajectory, carries: bool, n: int = 4000) -> "Course":
+    def of(curve: Trajectory, law: Law, n: int = 4000) -> "Course":
         """Evaluate a curve on a grid that is fine compared with the pieces of its spline."""
         phases = np.linspace(curve.start, curve.end, n)
         velocity, acceleration = curve.velocity(phases), curve.acceleration(phases)
         speed, size = np.linalg.norm(velocity, axis=1), np.linalg.norm(acceleration, axis=1)
         cosine = np.abs(np.einsum("ni,ni->n", velocity, acceleration)) / np.maximum(speed * size, 1e-300)
         bend = size * np.sqrt(np.maximum(0.0, 1.0 - cosine**2)) / speed**2
-        moving = 1.01 * carries
+        moving = 1.01 * law.carries
         return Course(
             moving * float(speed.max()), float(speed.min()), 1.01 * float(bend.max()), moving * float(size.max()),
-            float(cosine.max()),
+            float(cosine.max()), 1.01 * law.parallel * float((bend * speed).max()),
         )  # fmt: skip
 
 
@@ -134,6 +137,7 @@ def remainder(
         tube.jacobian_slope * late * (force * level + b * course.pace * (1.0 - slow_share))
         + tube.weight_slope * late
         + (1.0 - share) * b * course.pace
+        + b * course.shear * e * level
         + tube.coulomb
         + (b + viscous) * float(shift.max()) + (k + tube.mass_slope * speed * b) * tube.rounding
         + axis.slides * 0.5 * t * spring * v * swing * level

@@ -57,7 +57,7 @@ class Room:
         If an interval is empty, a number is not positive and finite, or the approach exceeds the separation.
     """
 
-    r_range: tuple[float, float] = (0.02, 0.072)
+    r_range: tuple[float, float] = (0.04, 0.072)
     z_range: tuple[float, float] = (-0.05, 0.05)
     separation: float = 0.01
     approach: float = 0.002

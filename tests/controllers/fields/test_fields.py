@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.bunny import Bunny
@@ -53,6 +54,32 @@ def test_a_hand_that_moves_with_the_curve_feels_nothing():
     for t in np.linspace(0.0, 4.0, 17):
         force = follow.wrench(HandState.at(CIRCLE.point(t), CIRCLE.velocity(t))).force
         assert np.abs(force).max() < 1e-12
+
+
+def test_a_hand_beside_a_parallel_flow_keeps_the_curves_pace_and_one_beside_the_papers_does_not():
+    rng, step = np.random.default_rng(4), 1e-4
+    t = np.linspace(0.0, 4.0, 41)
+    bent = np.column_stack([0.05 * np.cos(np.pi * t / 2), 0.04 * np.sin(np.pi * t / 2), 0.02 * np.cos(np.pi * t)])
+    curve = Trajectory(t, bent, periodic=True)
+    rates = np.empty((2, 40))
+    for k, phase in enumerate(rng.uniform(0.0, 4.0, 40)):
+        v, normal = curve.velocity(phase), np.cross(curve.velocity(phase), rng.normal(size=3))
+        p = curve.point(phase) + 0.2 / float(curve.curvature(phase)) * normal / np.linalg.norm(normal)
+        for row, parallel in zip(rates, (True, False), strict=True):
+            law = Follow(curve, k_r=200.0, b_d=4.0, epsilon=np.inf, parallel=parallel)
+            # The velocity at which the damper gives no force along the curve; the phase by the curve's own search.
+            along = law.wrench(HandState.at(p)).force @ v / (4.0 * v @ v) * v
+            ahead, behind = (closest_phase(curve.packed(), 0, *(p + d * along), phase)[0] for d in (step, -step))
+            row[k] = (ahead - behind) / (2.0 * step)
+    np.testing.assert_allclose(rates[0], 1.0, atol=1e-5)
+    assert np.abs(rates[1] - 1.0).max() > 0.15
+
+
+@pytest.mark.parametrize(("radius", "pace"), [(0.03, 0.6), (0.01, 0.5), (0.07, 1.4), (0.2, 1.5)])
+def test_a_parallel_flow_turns_with_the_circle_and_is_held(radius, pace):
+    law = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=np.inf, parallel=True)
+    force = law.wrench(HandState.at(np.array([radius, 0.0, 0.0]))).force
+    np.testing.assert_allclose(force, [200.0 * (0.05 - radius), 4.0 * pace * SPEED, 0.0], atol=1e-4)
 
 
 def test_force_has_no_jump_along_lines_through_the_tube():

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from controllers.certificates.loop.energy import distance_bound, energy, peak_gain, terminal_speed
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance, HandRange
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, PARALLEL_LAW, SEEK_LAW
 from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.passivity import damping_needed, passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop, exponentials
@@ -62,10 +62,12 @@ def _difference(function, x, step=1e-6):
     return np.stack(columns, axis=1)
 
 
-@pytest.mark.parametrize("kind", ["follow", "bunny"])
+@pytest.mark.parametrize("kind", ["follow", "parallel", "bunny"])
 def test_the_law_is_differentiated_as_the_kernels_run_it(kind):
     if kind == "follow":
         law, symbolic, width = Follow(CIRCLE, 300.0, 4.0, 0.25), FOLLOW_LAW, 0.25
+    elif kind == "parallel":
+        law, symbolic, width = Follow(CIRCLE, 300.0, 4.0, 0.25, parallel=True), PARALLEL_LAW, 0.25
     else:
         law, symbolic, width = Bunny(CIRCLE, 300.0, 4.0, 0.02, pace="clock"), BUNNY_LAW, 0.02
     linear = linearise(DEVICE, symbolic, CIRCLE, PHASES, NO_HAND, width)
@@ -267,6 +269,20 @@ def test_the_bound_of_the_distance_is_its_own_cause():
     lost = 1.0 - (1.0 - (bound / 0.25) ** 2) ** 3
     assert bound == pytest.approx(gain * (2.0 + 300.0 * bound * lost), rel=1e-9)
     assert distance_bound(RIVER, gain, 40.0) == np.inf
+
+
+def test_a_parallel_flow_gives_more_power_and_its_bound_of_the_distance_is_wider():
+    papers, beside = energy(RIVER, 1.0, 8.5), energy(RIVER._replace(law=PARALLEL_LAW), 1.0, 8.5)
+    assert beside.verdict == "certified"
+    rng, speed = np.random.default_rng(3), 2.0 * np.pi * 0.0477 / 4.0
+    law, most = Follow(CIRCLE, 0.0, 4.0, np.inf, parallel=True), 0.0
+    for _ in range(300):
+        along = np.array([0.0, rng.uniform(0.0, 2.0 * speed), 0.0])
+        most = max(most, float(law.wrench(HandState.at([rng.uniform(0.01, 0.15), 0.0, 0.0], along)).force @ along))
+    assert 0.98 * beside.figures["power_bound"] < most <= beside.figures["power_bound"]
+    assert beside.figures["distance_bound"] > papers.figures["distance_bound"]
+    assert RIVER._replace(law=PARALLEL_LAW).shear == pytest.approx(2.0 * np.pi / 4.0, rel=1e-2)
+    assert RIVER.shear == 0.0
 
 
 def test_the_energy_certificate_knows_what_it_does_not_know():

@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 from controllers.certificates.loop.device import kinematics_function, plant_function
 from controllers.certificates.loop.hand import NO_HANDS, HandRange
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.decrease_check import check_form
@@ -156,6 +156,9 @@ def test_the_demos_river_in_a_firm_hand_has_a_region(lap):
     assert good.figures["ball"] < 2e-3 < good.figures["largest_distance"] <= 6e-3
     assert good.figures["cell_least"] > 0.0
     assert good.figures["remainder_rate"] < good.figures["rate"]
+    beside = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap), law=PARALLEL_LAW), FIRM, 8.5, STABLE)
+    assert beside.verdict == "certified"
+    assert good.figures["remainder_force"] < beside.figures["remainder_force"]
 
 
 @pytest.mark.slow
