@@ -8,11 +8,12 @@ with a smaller share λ, down to 0, where the clip plays alone. Legs that skate,
 ranges are tried last. If nothing is followed well enough, a remark says so.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
@@ -79,18 +80,23 @@ def push_profile(times: Array) -> Array:
 
 
 def sound(made: Cylindrical | Composite, lap: float) -> bool:
+    """Whether the animation of `toured` is sound (`is_sound`)."""
+    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
+    return is_sound(__name__, lambda: toured(made, lap), made_of)
+
+
+def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArray[np.generic]]) -> bool:
     """Whether soles neither penetrate the floor nor skate, and joints stay within ranges, all within tolerances.
 
-    The result is cached; needs compiled code.
+    The result is cached; needs compiled code. The arguments are those of `tried`.
     """
 
     def find() -> Array:
-        poses = toured(made, lap).poses
-        motion = motion_of(poses, _FPS, dynamics=False)
-        return np.array([[motion.lowest, motion.skate, beyond_ranges(poses).max()]])
+        shown = show()
+        motion = motion_of(shown.poses, shown.fps, dynamics=False)
+        return np.array([[motion.lowest, motion.skate, beyond_ranges(shown.poses).max()]])
 
-    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
-    lowest, skate, beyond = kept_array(kept_folder(__name__), "sound", made_of, (1, 3), find)[0]
+    lowest, skate, beyond = kept_array(kept_folder(module), "sound", made_of, (1, 3), find)[0]
     return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
 
 

@@ -71,8 +71,20 @@ def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it
 
     monkeypatch.setattr(pushed_off, "toured", lambda part, curve: part)
     monkeypatch.setattr(pushed_off, "tried", tried)
+    monkeypatch.setattr(pushed_off, "is_sound", lambda *_: True)
     part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs))
     assert (part.legs_of, part.share, told) == (legs, share, said)
+
+
+def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_though_it_would_bear_it(
+    lifted: Lifted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pushed_off, "toured", lambda part, curve: part)
+    monkeypatch.setattr(pushed_off, "tried", lambda *_: Verdict(0.01, np.inf))
+    monkeypatch.setattr(pushed_off, "is_sound", lambda *_: False)
+    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs))
+    assert (part.legs_of, part.share) == (1, 1.0)
+    assert "feet skate" in told[0]
 
 
 def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lifted) -> None:
