@@ -21,7 +21,7 @@ class Followed(NamedTuple):
     Attributes
     ----------
     residual : float
-        RMS of the residual force while the reference stands [body weights].
+        RMS of the residual force while the reference stands, until the end of a clip that is not repeated [weights].
     fell : float or None
         Time at which it first fell, or its root was `FALLEN` from its reference [s]; None if it did not fall.
     seconds : float

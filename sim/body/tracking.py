@@ -1,5 +1,6 @@
 """A clip tracked by the physical figure alone, without Phantom: tracking errors, residual, foot skate, falls."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from controllers.state import Array, Mask
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.motion.clip import Clip, pose_difference
-from sim.body.clip_motion import ClipMotion, clip_motion
+from sim.body.clip_motion import SEAM, ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
@@ -81,6 +82,8 @@ class TrackedMotion(NamedTuple):
         Weight of the figure [N], and height of its centre of mass when it stands [m].
     warnings : int
         Number of MuJoCo's warnings.
+    ends : float
+        Time from which a clip that is not repeated only holds its last pose [s]; infinite if it is repeated.
     """
 
     reference: ClipMotion
@@ -91,6 +94,7 @@ class TrackedMotion(NamedTuple):
     weight: float
     com_height: float
     warnings: int
+    ends: float
 
 
 @dataclass(frozen=True)
@@ -104,7 +108,8 @@ class TrackingReport:
     falls : tuple of float
         Times at which the figure fell [s].
     up_seconds : float
-        Time that the figure neither lay nor was set back [s]. All that follows is measured over that time.
+        Time that the figure neither lay nor was set back [s]. All that follows is measured over that time; residuals of
+        a clip that is not repeated only until its end, for the time that it holds its last pose would dilute them.
     joint_error : float
         RMS over joints and time of the angle between a joint and its reference [deg].
     root_error, root_error_max : float
@@ -221,6 +226,7 @@ def tracked_motion(
         figure.state.weight,
         standing_com(config.stature, config.mass),
         warnings,
+        math.inf if clip.closes(SEAM) else clip.duration,
     )
 
 
@@ -249,7 +255,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
 
     def residual(rows: Mask) -> Residual:
         measure = ResidualMeasure(motion.weight, motion.com_height, period)
-        measure.add(wrench[up & rows])
+        measure.add(wrench[up & rows & (times <= motion.ends)])
         return measure.summary()
 
     stance, stands = residual(~flies), up & ~flies

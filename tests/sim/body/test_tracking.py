@@ -36,6 +36,16 @@ def test_a_feasible_motion_needs_no_help():
     assert result.warnings == 0
 
 
+def test_the_residual_of_a_clip_that_is_not_repeated_is_not_diluted_by_the_time_it_is_held():
+    # A third of a kick that lacks some 10 % of weight.
+    angry = embedded("angry")
+    part = Clip(angry.poses[: angry.n_frames // 3], angry.fps, "part of angry")
+    short, long = track(part, part.duration), track(part, part.duration + 3.0)
+    assert short.residual_force > 0.005
+    assert long.residual_force == pytest.approx(short.residual_force, rel=1e-2)
+    assert long.seconds == pytest.approx(short.seconds + 3.0, abs=0.01)
+
+
 def test_light_and_tall_figures_squat_too():
     result = track(_squats(), 1.0, TrackingConfig(mass=50.0))
     assert result.joint_error < 1.0
