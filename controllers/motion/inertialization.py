@@ -10,8 +10,8 @@ blend time T:
 the quintic with o, ȯ, ö at s = 0 and value, velocity and acceleration zero at s = T. So pose, velocity and acceleration
 are continuous at both ends. Every component keeps its own rate, also where it points away from the new motion, which
 Bollo clips: a joint then overshoots by up to 0.2 T ȯ, as by its inertia. That could throw a fast leg beyond its joint
-limits; so where the overshoot would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their
-own, for which it equals that swing.
+limits; so where 0.16 T ȯ would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their own,
+for which it equals that swing: the overshoot is then up to 1.24 times the swing.
 
 For the position of the figure on the floor, which need not return, see `stopping_way`.
 """
