@@ -29,6 +29,8 @@ from controllers.state import Array
 ROWS = 64  # control points round the lap
 _PER_ROW = 3
 SAMPLES = ROWS * _PER_ROW  # angles at which the energy is evaluated
+# Sensitivities of the constants in this folder: walk, run, jump and backflip in a room of r from 20 mm.
+
 # [rad] from a transition within which two curves may be nearer than the separation: with half of it walk and run come
 # within 12.7 mm instead of 10.1, jump and backflip within 8.7 instead of 5.0.
 WINDOW = 0.9
