@@ -1,0 +1,30 @@
+"""FOLLOW's flow beside its curve: what a push across the curve does to the pace of a hand on the simulated Phantom."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from controllers.state import Array
+from experiments.config.words import run_config
+from experiments.runs.run import run
+from sim.recording.recording import Recording
+
+
+def _angle(out: Path, flow: Literal["curve", "parallel"], user: Literal["push", "relaxed"]) -> Array:
+    run(run_config(user=user, figure="none", flow=flow, seconds=7.0), out, True, 0.0)
+    with Recording(out / "run.h5") as recording:
+        p, off = recording.channel("ticks", "p")[:], recording.channel("ticks", "distance")[:].max()
+    assert (off > 7e-3) == (user == "push")
+    return np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
+
+
+def test_a_hand_that_is_pushed_off_keeps_its_angle_in_a_parallel_flow_and_falls_behind_in_the_papers(
+    tmp_path: Path,
+) -> None:
+    late = {
+        flow: float(np.abs(_angle(tmp_path, flow, "push") - _angle(tmp_path, flow, "relaxed")).max())
+        for flow in ("parallel", "curve")
+    }
+    assert late["parallel"] < 0.02
+    assert late["curve"] > 0.1
