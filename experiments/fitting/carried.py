@@ -21,14 +21,14 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from experiments.fitting.alike import motion_of
-from experiments.fitting.verdict import Verdict, tried
+from experiments.fitting.verdict import BEARABLE, Verdict, tried
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
-WELL = 0.06  # [body weights] RMS residual, half of `verdict.BEARABLE`: up to this the first clip is taken at once
+WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is taken at once
 # Largest floor penetration [m], foot skate [m] and excess angle [rad]; the first two are the bounds of
 # docs/validation/blended-motions.md.
 SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)

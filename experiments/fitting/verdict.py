@@ -10,10 +10,12 @@ from controllers.state import Array
 from experiments.console.working import working
 from experiments.files.kept import kept_array
 from models.mocap.motion.clip import Clip
+from models.mocap.preparation.bounds import FLYING
 from sim.compilation.sources import kept_folder
 from sim.compilation.unit_workers import compile_units
 
-BEARABLE = 0.12  # [body weights] RMS, as in `followed`
+BEARABLE = FLYING
+"""Largest bearable RMS residual [body weights]."""
 
 
 class Verdict(NamedTuple):

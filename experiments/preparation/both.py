@@ -9,7 +9,7 @@ import viser
 
 from controllers.state import Array
 from models.humanoid.skeleton import figure_model
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import followed
@@ -27,7 +27,7 @@ def both_html(captured: Clip, prepared: Clip) -> str:
 
     A closed clip is repeated, an open one holds its last pose. Both are kept in view, and the floor moves under them.
     """
-    longest = max(captured.duration, prepared.duration, _SECONDS if prepared.closes(1e-3) else 0.0)
+    longest = max(captured.duration, prepared.duration, _SECONDS if prepared.closes(CLOSES) else 0.0)
     times = np.arange(int(min(longest, _SECONDS) * _FPS) + 1) / _FPS
     model = figure_model()
     data = mujoco.MjData(model)

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.preparation.bounds import FLYING, RESIDUAL
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
 SECONDS = 20.0  # default duration of a trial
 FALLEN = 1.0  # distance of the root from its reference that counts as a fall [m]
-FEASIBLE, LEAPING = 0.05, 0.12  # acceptable RMS residual [body weights] of gaits and gestures; of jumps and fights
 
 
 class Followed(NamedTuple):
@@ -37,8 +37,8 @@ class Followed(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not fall and its residual is at most `LEAPING`."""
-        return self.fell is None and self.residual <= LEAPING
+        """Whether it did not fall and its residual is at most `FLYING`."""
+        return self.fell is None and self.residual <= FLYING
 
     def __str__(self) -> str:
         """Residual in percent, with the time of a fall in brackets."""
@@ -53,7 +53,7 @@ class Followed(NamedTuple):
 
     def faults(self, leaps: bool) -> tuple[str, ...]:
         """Faults, a line each; `leaps` says whether the clip has flights, which raises the bound of the residual."""
-        bound = LEAPING if leaps else FEASIBLE
+        bound = FLYING if leaps else RESIDUAL
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:

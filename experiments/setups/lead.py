@@ -30,8 +30,8 @@ from experiments.setups.hands import participant
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.contacts import Contacts, contacts
-from models.mocap.motion.clip import Clip
-from models.mocap.preparation.laps import CLOSES, lap_of
+from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.preparation.laps import lap_of
 from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant

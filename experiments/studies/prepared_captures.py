@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.preparation.followed import LEAPING, followed
+from experiments.preparation.followed import followed
 from models.errors import ModelError
 from models.mocap.library import embedded
+from models.mocap.preparation.bounds import FLYING
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
@@ -30,7 +31,7 @@ def row(name: str, made: Prepared) -> str:
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
     most = kept.extremes[0]
-    why = "" if after.stands else "motion" if not made.near or change.residual > LEAPING / 2 else "figure"
+    why = "" if after.stands else "motion" if not made.near or change.residual > FLYING / 2 else "figure"
     cells = (
         name,
         f"{made.looped.kind} {seconds:.2f} s" + (f", {made.paced.pace:.2f}×" if made.paced.pace != 1.0 else ""),

@@ -15,11 +15,9 @@ from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
 
 _MARGIN = 8  # frames of the neighbouring laps beyond both ends: the cubic spline's ends decay by 0.27 a frame, to 3e-5
-SEAM = 1e-3
-"""Largest gap between last and first frame of a clip that is repeated [rad], [m]."""
 
 
 class ClipMotion(NamedTuple):
@@ -75,7 +73,7 @@ def _relative(q: Array, r: Array) -> Array:
 def _frames(clip: Clip, end: float) -> tuple[Array, int]:
     """Frames from before time 0 to beyond `end` [s], and the index of the frame at time 0."""
     wanted = int(np.ceil(end * clip.fps)) + _MARGIN + 1
-    if not clip.closes(SEAM):
+    if not clip.closes(CLOSES):
         held = np.repeat(clip.poses[-1:], max(wanted - clip.n_frames, 1), axis=0)
         return np.concatenate((clip.poses, held)), 0
     lap = clip.poses[:-1]

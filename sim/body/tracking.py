@@ -14,8 +14,8 @@ from controllers.lent import lend
 from controllers.state import Array, Mask
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
-from models.mocap.motion.clip import Clip, pose_difference
-from sim.body.clip_motion import SEAM, ClipMotion, clip_motion
+from models.mocap.motion.clip import CLOSES, Clip, pose_difference
+from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
@@ -226,7 +226,7 @@ def tracked_motion(
         figure.state.weight,
         standing_com(config.stature, config.mass),
         warnings,
-        math.inf if clip.closes(SEAM) else clip.duration,
+        math.inf if clip.closes(CLOSES) else clip.duration,
     )
 
 

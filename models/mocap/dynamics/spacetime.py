@@ -23,7 +23,7 @@ from models.mocap.dynamics.floor_forces import Demand, Floor, residual
 DEGREE = 5
 _STRONG = 0.8  # share of the torque limits beyond which effort is also strain: a fifth is left for the feedback
 _LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
-_MARGIN = 0.02  # kept from the joints' limits [rad]
+MARGIN = 0.02  # kept from the joints' limits [rad]
 
 
 class Stance(NamedTuple):
@@ -239,7 +239,7 @@ class Motion:
             slip.reshape(len(u), 24),
             w.depth * np.where(standing, 0.0, np.minimum(low, 0.0)),
             w.effort * share + w.strain * (share - np.clip(share, -_STRONG, _STRONG)),
-            w.limit * (vectors - np.clip(vectors, limits[:, 0] + _MARGIN, limits[:, 1] - _MARGIN)),
+            w.limit * (vectors - np.clip(vectors, limits[:, 0] + MARGIN, limits[:, 1] - MARGIN)),
         ]
         return Errors(np.concatenate(parts, axis=1), grip, missing, demand)
 

@@ -9,6 +9,9 @@ from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
 from models.mocap.motion import quaternions
 
+CLOSES = 1e-3
+"""Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
+
 
 @dataclass(frozen=True)
 class PlanarDisplacement:

@@ -22,13 +22,13 @@ import numpy.typing as npt
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import EDGES, Floor
+from models.mocap.dynamics.spacetime import MARGIN
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.change import DEGREE, Change, Normal
 from models.mocap.preparation.inverse_dynamics import InverseDynamics, cross_matrix
 from models.mocap.preparation.stances import Stances, clearance
 
-_MARGIN = 0.02  # kept from the joints' limits [rad]
 _STRONG = 0.75  # share of the torque limits of the legs beyond which torque is penalised
 _KNOT, _STEP = 0.05, 0.0125  # spacing of knots and of instants [s]; 80 and 20 ms halve the time, but a run falls
 _TOLERANCE, _LAST = 0.01, 3  # iteration ends when the last 3 steps together lower the cost by less than 1 %
@@ -193,7 +193,7 @@ class _Problem:
         self.pinned = np.repeat(schedule.kept[frames][:, :, None], 3, axis=2)
         self.pinned[:, :, 2] = self.grounded
         self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
-        self.low, self.high = joint_range().reshape(-1, 2).T + np.array([[_MARGIN], [-_MARGIN]])
+        self.low, self.high = joint_range().reshape(-1, 2).T + np.array([[MARGIN], [-MARGIN]])
         self.fixed = Normal(change)
         tracking = weights.tracking() ** 2
         calm = np.where(np.arange(N_TANGENT) < 3, weights.sway, weights.jerk) ** 2

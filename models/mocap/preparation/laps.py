@@ -18,12 +18,11 @@ import numpy as np
 from models.arrays import Array, IntArray
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
 
 # Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ decides: half of it loops two of them otherwise and
 # moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
 _TIME, _LENGTH = 0.1, 0.5
-CLOSES = 1e-3  # largest gap of the ends of a clip that is already a lap [rad], [m]
 _SHORTEST = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44
 _TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest change of heading of a lap
 _MOST_FRAMES = 1200  # frames that are compared with each other, at most: a matrix of them takes 12 MB

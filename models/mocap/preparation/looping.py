@@ -15,13 +15,12 @@ import numpy as np
 from models.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.clip import CLOSES, Clip, PlanarDisplacement, pose_difference
 from models.mocap.preparation.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
 from models.mocap.preparation.stances import stances
 
 _GAIT, _PLACE = 0.38, 0.30  # largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3
-_DIGITS = 1e-3  # gap between the ends of a closed lap that was written with few digits [rad], [m]
 # Largest d of a clip that its file declares to be cyclic [rad]: half or twice loops 18 and 19 of 19 captures alike.
 _WRAPS = 0.45
 # Share of the clip's frames that must have a frame of the cycle within this d [rad]. A share of 0.5 loops all of 19
@@ -107,7 +106,7 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
         return _closed(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
     if clip.closes():
         return Looped(clip, "cycle", 0.0, clip.duration, 0.0)
-    if clip.closes(_DIGITS):
+    if clip.closes(CLOSES):
         return _closed(clip, *whole, 0.0)
     gap = float(_distances(clip, np.array(whole))[0, 1])
     if wraps and gap < _WRAPS:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from models.errors import ModelError
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
+from models.mocap.preparation.bounds import FLYING
 from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
@@ -18,7 +19,6 @@ from models.mocap.retargeting.retarget import Hints, RetargetReport
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 _CORNER = 8.0  # low-pass cut-off [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
 _TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which the result counts as another motion
-_LACKS = 0.12  # RMS residual force [body weights] beyond which nothing feasible was found: `well_formed.FLYING`
 _LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
 
@@ -94,7 +94,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     smooth = smoothed(cycle.clip, _CORNER)
     schedule = rested(stances(cycle.clip, smooth), cycle.clip)
     made = feasible(smooth, schedule, fps=FPS)
-    near = made.turned < _TURNED and made.moved < _MOVED and made.residual < _LACKS
+    near = made.turned < _TURNED and made.moved < _MOVED and made.residual < FLYING
     taken = made.clip if near else smooth
     clip = Clip(taken.poses, taken.fps, captured.name)
     kept = fidelity(clip, captured, cycle, timed.pace)

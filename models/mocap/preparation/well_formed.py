@@ -1,6 +1,6 @@
 """Quality measures of a clip: soles, foot skate, continuity, joint ranges and dynamics, with their bounds.
 
-The bounds are the constants below; `WellFormed.faults` names the measures that exceed them.
+The bounds are those of `bounds`; `WellFormed.faults` names the measures that exceed them.
 """
 
 from dataclasses import dataclass
@@ -13,22 +13,24 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations, pose_difference
+from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.preparation.bounds import (
+    FLATTEST,
+    FLIGHT,
+    FLYING,
+    HIGHEST,
+    LIMIT,
+    LOWEST,
+    RESIDUAL,
+    REST,
+    SEAM,
+    SKATE,
+)
 from models.mocap.preparation.feasible import Borne, borne
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
-LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]; the prototype of preparation left 3 mm of penetration
-FLATTEST = np.deg2rad(2.0)  # largest tilt of soles in stance
-SKATE = 0.005  # [m] in a stance
-# RMS residual force [body weights]: of gaits and gestures, the bound of Hicks et al. (2015); of motions with flights,
-# what the prototype of preparation left to fighting and jumping jacks (11 and 12 %).
-RESIDUAL, FLYING = 0.05, 0.12
-GAP, SEAM = 1e-3, 0.3  # differences of a closed clip's ends [rad, m], and of their velocities [rad/s, m/s]
-REST = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
-LIMIT = np.deg2rad(1.0)  # excess over a joint's range: Euler angles and rotation vectors differ by as much near limits
-FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
 _STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
 _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
@@ -131,7 +133,7 @@ class WellFormed:
 def well_formed(clip: Clip) -> WellFormed:
     """Measure a clip."""
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
-    closed = clip.closes(GAP)
+    closed = clip.closes(CLOSES)
     schedule = stances(clip, smoothed(clip, 8.0))
     points = sole_points(clip.poses)
     heights = points[:, :, 2] - CONTACT_RADIUS
@@ -156,7 +158,7 @@ def outliers(clip: Clip) -> int:
     """Number of frames with a joint acceleration far above the median of the half second around them."""
     if clip.n_frames < 8:
         return 0
-    poses = around(clip, 2)[0] if clip.closes(GAP) else clip.poses
+    poses = around(clip, 2)[0] if clip.closes(CLOSES) else clip.poses
     steps = pose_difference(poses[:-1], poses[1:])[:, 3:]
     accelerations = np.sqrt(np.mean((np.diff(steps, axis=0) * clip.fps**2) ** 2, axis=1))
     width = max(3, round(clip.fps / 4.0))
