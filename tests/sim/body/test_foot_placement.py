@@ -113,7 +113,8 @@ def test_a_somersault_is_not_disturbed():
         pytest.skip(f"needs motion capture in {MOCAP}")
     report = track(prepared_clips([file])[0].clip, 8.0)
     assert not report.falls
-    assert report.residual_force < 0.12  # 10 %; 27 % with falls where feet beside and above the root were placed, too
+    # 13 % until its end; 34 % with falls where feet beside and above the root were placed, too.
+    assert report.residual_force < 0.15
 
 
 @pytest.mark.slow
