@@ -9,6 +9,7 @@ curve's own clip, and it carries as large a share of the others' arms as it can,
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
@@ -24,14 +25,16 @@ _PUSHED = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
 _FIRST = 1.7  # [s] start of the first push
 
 
-def toured(made: Lifted, curve: Trajectory) -> Clip:
+def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
-    The flow of FOLLOW is parallel on these maps: a hand that is pushed off keeps the curve's pace.
+    Where the field does not keep its pace there (`Follow.parallel`), a push leaves the hand's speed as it is, so its
+    angular speed is lower the further out it is.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
     pushed = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0))
-    phases = times % curve.duration if curve.periodic else np.minimum(times, curve.duration)
+    since = times if keeps_pace else _slowed(curve, pushed)
+    phases = since % curve.duration if curve.periodic else np.minimum(since, curve.duration)
     points, poses = curve.point(curve.start + phases), np.empty((len(times), made.nq))
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
     kind, params, memory = made.compiled()
@@ -39,7 +42,19 @@ def toured(made: Lifted, curve: Trajectory) -> Clip:
     return Clip(poses, _FPS, "pushed")
 
 
-def followed_map(made: Lifted, curve: Trajectory, clip: int, arms: Sequence[int]) -> tuple[Lifted, tuple[str, ...]]:
+def _slowed(curve: Trajectory, pushed: Array) -> Array:
+    """Phase since the curve's start [s] of a hand off the curve by `pushed` [m], at the speed that it has on it."""
+    since = np.zeros(len(pushed))
+    for k, off in enumerate(pushed[:-1]):
+        at = since[k] % curve.duration if curve.periodic else min(since[k], curve.duration)
+        radius = float(np.hypot(*curve.point(curve.start + at)[:2]))
+        since[k + 1] = since[k] + radius / (radius + off) / _FPS
+    return since
+
+
+def followed_map(
+    made: Lifted, curve: Trajectory, clip: int, arms: Sequence[int], keeps_pace: bool
+) -> tuple[Lifted, tuple[str, ...]]:
     """The map, or as much of it as the physical figure follows when pushed off a curve, and remarks.
 
     Parameters
@@ -52,16 +67,18 @@ def followed_map(made: Lifted, curve: Trajectory, clip: int, arms: Sequence[int]
         Its clip, whose legs the figure keeps where it does not follow the whole map.
     arms : sequence of int
         Joints that are then still blended, counted from 1.
+    keeps_pace : bool
+        Whether the field keeps the pace of a hand that is pushed off (`Follow.parallel`).
     """
 
-    def made_of(part: Lifted) -> tuple[Array, ...]:
-        return part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions)
+    def made_of(part: Lifted) -> tuple[npt.NDArray[np.generic], ...]:
+        return part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
 
     def verdict_on(part: Lifted) -> Verdict:
-        return tried(__name__, lambda: toured(part, curve), _SECONDS, made_of(part))
+        return tried(__name__, lambda: toured(part, curve, keeps_pace), _SECONDS, made_of(part))
 
     whole = verdict_on(made)
-    sound = not whole.bearable or is_sound(__name__, lambda: toured(made, curve), made_of(made))
+    sound = not whole.bearable or is_sound(__name__, lambda: toured(made, curve, keeps_pace), made_of(made))
     if whole.bearable and sound:
         return made, ()
     best, found = (made, whole) if sound else (made, Verdict(np.inf, 0.0))

@@ -24,7 +24,7 @@ from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import in_step
 from controllers.state import Array
 from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
-from experiments.config.modes import Rivers
+from experiments.config.modes import Follow, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
@@ -187,7 +187,9 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = _on_lifted(part, made, clips)
         if config.user.does == "push" and config.figure.kind == "physical" and not isinstance(config.mode, Rivers):
-            followed = partial(followed_map, made, parts.curve, curve_number(made, part.curve), arms(made.limbs))
+            keeps_pace = isinstance(config.mode, Follow) and config.mode.flow == "parallel"
+            number = curve_number(made, part.curve)
+            followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), keeps_pace)
             parts = replace(parts, refined=followed)
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")

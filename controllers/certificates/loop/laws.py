@@ -1,6 +1,7 @@
 """Laws of force on CasADi symbols, built from the same kernels that the servo executes."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import casadi
@@ -42,19 +43,14 @@ def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
     return u - slope / casadi.jacobian(slope, u)
 
 
-def _follow(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-    """FOLLOW, attracted by the nearest point."""
-    nearest = nearest_phase(p, piece, u)
+def _follow(
+    p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol, parallel: bool = False
+) -> Symbol:
+    """FOLLOW, attracted by the nearest point; a parallel flow within the distance at which γ is not held."""
+    nearest, pace = nearest_phase(p, piece, u), 1.0
     p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
-    w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
-    return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
-
-
-def _parallel(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-    """FOLLOW with a parallel flow, within the distance at which γ is not held."""
-    nearest = nearest_phase(p, piece, u)
-    p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
-    pace = parallel_pace.py_func(p, p_curve, v_curve, piece_acceleration.py_func(piece, 0, nearest))
+    if parallel:
+        pace = parallel_pace.py_func(p, p_curve, v_curve, piece_acceleration.py_func(piece, 0, nearest))
     w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
     return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], pace * v_curve[i], k_r, b_d) for i in range(3)])
 
@@ -79,7 +75,7 @@ def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol
 
 
 FOLLOW_LAW = Law(_follow, slides=True, carries=True)
-PARALLEL_LAW = Law(_parallel, slides=True, carries=True, parallel=True)
+PARALLEL_LAW = Law(partial(_follow, parallel=True), slides=True, carries=True, parallel=True)
 BUNNY_LAW = Law(_bunny, slides=False, carries=True)
 SEEK_LAW = Law(_seek, slides=True, carries=False)
 HOLD_LAW = Law(_hold, slides=False, carries=False)

@@ -27,14 +27,24 @@ def lifted() -> Lifted:
 
 def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
-    shown = pushed_off.toured(lifted, curve).poses
+    shown = pushed_off.toured(lifted, curve, True).poses
     monkeypatch.setattr(pushed_off, "_PUSHED", 0.0)
-    alone = pushed_off.toured(lifted, curve).poses
+    alone = pushed_off.toured(lifted, curve, True).poses
     apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
     times = np.arange(len(shown)) / 120.0
     assert apart[times < 1.69].max() < 1e-9
     assert apart[(times > 2.1) & (times < 4.7)].min() > 1e-3
     assert apart.max() > 0.05
+
+
+def test_a_hand_whose_field_does_not_keep_its_pace_is_late_outside_and_early_inside(lifted: Lifted) -> None:
+    curve = lifted.curve(0)
+    pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
+    late = np.arange(360) / 120.0 - pushed_off._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    assert np.abs(late[:61]).max() < 1e-12
+    # On radii of 40 to 60 mm.
+    assert 8.0 / 68.0 < late[180] < 8.0 / 48.0
+    assert late[359] < late[240]
 
 
 FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
@@ -69,20 +79,20 @@ def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it
         part = show()
         return verdicts["whole" if part.legs_of is None else part.share]
 
-    monkeypatch.setattr(pushed_off, "toured", lambda part, curve: part)
+    monkeypatch.setattr(pushed_off, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(pushed_off, "tried", tried)
     monkeypatch.setattr(pushed_off, "is_sound", lambda *_: True)
-    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs))
+    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, told) == (legs, share, said)
 
 
 def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_though_it_would_bear_it(
     lifted: Lifted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pushed_off, "toured", lambda part, curve: part)
+    monkeypatch.setattr(pushed_off, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(pushed_off, "tried", lambda *_: Verdict(0.01, np.inf))
     monkeypatch.setattr(pushed_off, "is_sound", lambda *_: False)
-    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs))
+    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
     assert "feet skate" in told[0]
 
@@ -91,7 +101,7 @@ def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lift
     curve = lifted.curve(1)
     kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
     alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
-    pushed, own = (pushed_off.toured(part, curve).poses for part in (kept, alone))
+    pushed, own = (pushed_off.toured(part, curve, True).poses for part in (kept, alone))
     apart = np.abs(pose_difference(pushed, own))
     upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
     assert apart[:, upper].max() > 0.01
