@@ -4,7 +4,7 @@ r"""Weighted mean pose of several clips at a phase, and its derivative.
 
 θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
 the ground by its twist ξ (`loops`); the ends of limbs are blended like the root, and the limbs follow by inverse
-kinematics (`limbs`, `support`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
+kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from controllers.borrowed import borrowed
 from controllers.legs.floor import keep_above
 from controllers.legs.footing import go_on, keep_footing, mixed
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
-from controllers.legs.support import lowering
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation
@@ -176,22 +175,16 @@ def _combine(
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
-    root, end, lower = work_array((4, 3)), work_array((4, 3)), work_array(4)
-    lower[:] = 0.0
+    root, end = work_array((4, 3)), work_array((4, 3))
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
         for k in range(4):
             root[k, 0] += correction[k, 0]
             root[k, 1] += correction[k, 1]
-    elif limbs > 0:
-        clearance = slice(3 + 4 * rotations + END - 1, value.shape[1], END)
-        lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)
     for n in range(limbs):
         limb = packed[LIMB * n : LIMB * (n + 1)]
         last, column = int(limb[LAST]), 3 + 4 * rotations + END * n
         _mean_position(value, slope, column, weights[0], changes[0], end)
-        for k in range(4):
-            end[k, 2] -= lower[k]
         heading = 0.0
         if corrected:
             at = ROOT + FOOT * n

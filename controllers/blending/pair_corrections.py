@@ -44,7 +44,7 @@ def packed_pairs(channels: Array, drifts: Array, limbs: Sequence[Limb], pairs: S
 
     Parameters
     ----------
-    channels : Array, shape (n, m, nq + 5 limbs)
+    channels : Array, shape (n, m, nq + 4 limbs)
         Channels of the clips at equal steps of the lap, limbs given by their ends (`limb_ends`).
     drifts : Array, shape (m, 3)
         Drifts ξ of the clips.

@@ -365,10 +365,6 @@ class Lifted(ClipMap):
                 result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
                 ends.append(end)
             channels.append(np.concatenate([result, *ends], axis=2)[:, 0])
-        first = 3 + 4 * rotations
-        ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if limbs), default=0.0)
-        for c in channels:
-            c[:, first + END - 1 :: END] -= ground
         splines = [
             lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(self._placed, channels, strict=True)
         ]

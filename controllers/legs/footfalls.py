@@ -118,7 +118,7 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
 
     Parameters
     ----------
-    channels : Array, shape (n, m, nq + 5 limbs)
+    channels : Array, shape (n, m, nq + 4 limbs)
         Channels of the clips at equal steps of the lap (`with_ends`).
     drifts : Array, shape (m, 3)
         Drifts ξ of the clips.
@@ -164,7 +164,7 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
 
 
 def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
-    """End of limb j in each clip: position, λ and clearance (n, m, 5), and orientation (n, m, 4)."""
+    """End of limb j in each clip: position and λ (n, m, 4), and orientation (n, m, 4)."""
     at, column = channels.shape[2] - END * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
     return channels[..., at : at + END], channels[..., column : column + 4]
 

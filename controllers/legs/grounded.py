@@ -45,9 +45,9 @@ def grounded(
 
     Parameters
     ----------
-    rows : Array, shape (n, nq + 5 limbs)
+    rows : Array, shape (n, nq + 4 limbs)
         Channels at equal steps of the lap: remainder, then each limb's end.
-    signs : Array, shape (nq + 5 limbs,)
+    signs : Array, shape (nq + 4 limbs,)
         −1 where a channel returns with the opposite sign after a lap.
     stride : float
         Length of a lap [m], along x.

@@ -133,19 +133,19 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     -------
     quaternions : Array, shape (n, m, 4)
         Orientations of the end, in the frame that moves by exp(λ ξ).
-    ends : Array, shape (n, m, 5)
-        Position of the end in that frame (3) [m], λ, and the height of its lowest point [m].
+    ends : Array, shape (n, m, 4)
+        Position of the end in that frame (3) [m], and λ.
 
     Raises
     ------
     ParameterError
         If the poses lack a joint of the limb.
     """
-    place, quaternions, height = end_poses(channels, limb)
+    place, quaternions, _ = end_poses(channels, limb)
     shift, angle = plane_exponential(lag[:, None, None] * drifts)
     place[..., :2] = turned(-angle, place[..., :2] - shift)
-    lags = np.broadcast_to(lag[:, None], height.shape)
-    return yawed(-angle, quaternions), np.concatenate([place, lags[..., None], height[..., None]], axis=2)
+    lags = np.broadcast_to(lag[:, None, None], (*place.shape[:2], 1))
+    return yawed(-angle, quaternions), np.concatenate([place, lags], axis=2)
 
 
 def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
@@ -161,9 +161,9 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
 
     Returns
     -------
-    Array, shape (n, m, nq + 5 limbs)
+    Array, shape (n, m, nq + 4 limbs)
         The quaternion of each limb's last joint is replaced by the end's orientation; appended are, limb by limb, the
-        end's position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
+        end's position and λ.
 
     Raises
     ------
@@ -176,9 +176,6 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
         column = 3 + 4 * limb.joints[2]
         result[..., column : column + 4] = quaternions
         ends.append(end)
-    ground = min((float(end[..., 4].min()) for end in ends), default=0.0)
-    for end in ends:
-        end[..., 4] -= ground
     return np.concatenate([result, *ends], axis=2)
 
 
@@ -187,7 +184,7 @@ def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> 
 
     Parameters
     ----------
-    channels : Array, shape (n, m, nq + 5 limbs)
+    channels : Array, shape (n, m, nq + 4 limbs)
         From `with_ends`.
     limbs : sequence of Limb
         At least one.

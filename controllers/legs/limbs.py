@@ -30,7 +30,7 @@ from controllers.state import Array, Vec3
 # points, limits (3, 3, 2); a limb that steps has the points of its sole behind that (`footsteps`).
 FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB = 0, 1, 2, 3, 12, 15, 18, 36
 THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # the offsets of the middle and the last joint: the limb's two segments
-END = 5  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`), clearance
+END = 4  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`)
 
 _STRAIGHT = 0.2  # [rad] flexion below which the correction saturates
 _SLACK = 0.03  # [rad] least flexion, for a target out of reach

@@ -93,8 +93,8 @@ def planted_ends(
     -------
     quaternions : Array, shape (n, 4)
         Orientations of the end.
-    ends : Array, shape (n, 5)
-        Position (3), λ, height of the lowest point.
+    ends : Array, shape (n, 4)
+        Position (3) and λ.
     """
     n, stays, free = len(channels), window(stands, _STANCE_EDGE), window(~stands, _SWING_EDGE)
     if stands.all() or not stands.any():
@@ -178,7 +178,7 @@ def with_planted_ends(
 
     Parameters
     ----------
-    rows : Array, shape (n, nq + 5 limbs)
+    rows : Array, shape (n, nq + 4 limbs)
         Channels at equal steps of the lap: remainder, then each limb's end, as in the clip.
     channels : Array, shape (n, nq)
         The remainder, with the limbs' own joints.

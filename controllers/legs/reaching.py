@@ -28,7 +28,7 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
 
     Parameters
     ----------
-    rows : Array, shape (n, nq + 5 limbs)
+    rows : Array, shape (n, nq + 4 limbs)
         Channels (`led`).
     stride : float
         Length of a lap [m], along x.
@@ -45,7 +45,7 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
 
 
 def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
-    """Channels (n, nq + 5 limbs) with the first two joints of each limb solved so that its last joint meets its end.
+    """Channels (n, nq + 4 limbs) with the first two joints of each limb solved so that its last joint meets its end.
 
     The middle joint turns about its flexion axis, to the side to which it is bent on average; the first joint turns
     the shortest way.

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb, flexion, place_limb
-from controllers.legs.support import lowering
 from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
@@ -143,31 +142,6 @@ def test_the_end_is_where_it_should_be_or_as_near_as_the_limb_is_long(target, an
     out_of_reach = max(0.0, distance - STRAIGHT, 0.2 - distance)
     if abs(angles[6]) > 0.2:
         assert np.linalg.norm(place - target) < 2e-3 + out_of_reach
-
-
-def test_feet_lifted_in_turn_are_not_both_off_the_ground():
-    weights, changes = np.array([0.5, 0.5]), np.array([[0.0, 0.0], [-1.0, 1.0], [0.0, 0.0]])
-    lower, none = np.empty(4), np.zeros((2, 2))
-    lowering(np.array([[0.1, 0.0], [0.0, 0.08]]), none, weights, changes, lower)
-    assert 0.03 < lower[0] < 0.04
-    for heights in ([[0.1, 0.0], [0.1, 0.0]], [[0.0, 0.0], [0.0, 0.0]], [[0.1, 0.0], [0.0, 0.0]]):
-        lowering(np.array(heights), none, weights, changes, lower)
-        assert lower[0] == pytest.approx(0.0, abs=1e-12)
-    # Both clips fly: so does the blend.
-    lowering(np.array([[0.3, 0.2], [0.1, 0.3]]), none, weights, changes, lower)
-    assert lower[0] < 0.06
-
-
-def test_the_lowering_changes_as_its_derivatives_say():
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        value, slope, step, around = rng.uniform(0.0, 0.05, (3, 2)), rng.normal(size=(3, 2)), 1e-6, np.empty((2, 4))
-        weights, changes, lower = rng.dirichlet(np.ones(3)), rng.normal(size=(3, 3)), np.empty(4)
-        lowering(value, slope, weights, changes, lower)
-        for way, (d_value, d_weights) in enumerate([(slope, changes[0]), (0.0, changes[1]), (0.0, changes[2])]):
-            for sign, out in zip((-step, step), around, strict=True):
-                lowering(value + sign * d_value, slope, weights + sign * d_weights, changes, out)
-            assert lower[1 + way] == pytest.approx((around[1, 0] - around[0, 0]) / (2 * step), abs=1e-6)
 
 
 def turning(frames=120):
