@@ -1,16 +1,14 @@
 r"""Inverse kinematics of a stepping limb: near singularities the foot target is moved, so that no joint jumps.
 
-Joints jump where the limb snaps straight, where it folds up under its first joint, and where its last joint flips. With
-d the distance of the last joint from the first, ℓ the length of the limb, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot
-is drawn nearer by
+Joints jump where the limb snaps straight, and where it folds up under its first joint. With d the distance of the last
+joint from the first, ℓ the length of the limb, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot is drawn nearer by
 
 .. math:: g\,\ell\,\bigl(x - x / (1 + x^3)^{1/3}\bigr), \qquad x > 0
 
 so d stays below (1 − b) ℓ, with a C³ onset at x = 0. A foot too near to the first joint is moved below it, to the
 distance ½ + n³ − ½ n⁴ from the first joint for an original distance n, both in units of the distance at which this
-begins. A foot in mid-swing that is turned against its leg by almost half a turn is turned back with the leg. b, g and
-the folding distance are scaled by a share that is 0 at the beginning and end of a change, where the limb is left as in
-its motion.
+begins. b, g and the folding distance are scaled by a share that is 0 at the beginning and end of a change, where the
+limb is left as in its motion.
 """
 
 import numpy as np
@@ -18,9 +16,9 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.legs.footsteps import FLOOR, lever, sole_height
-from controllers.legs.limbs import AXIS, CENTRE, FIRST, LAST, LIMB, MIDDLE, OFFSETS, SHANK, THIGH, place_limb
+from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB, MIDDLE, OFFSETS, SHANK, THIGH, place_limb
 from controllers.motion.vectors import cross, dot, product, turned_back, vector_at
-from controllers.rotations import exponential, logarithm, multiply, relative
+from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
@@ -41,7 +39,6 @@ _FINE = 2e-3  # [m] rounding of a distance at zero
 # walk, run and squat dance joints leap by up to 25 rad/s in 8 ms; with half of it 49, and with 0.8 soles go 10 mm
 # below the floor.
 _FOLDED = 0.55
-_TWIST, _SWUNG = 1.8, 0.15  # [rad] twist above which, [m] height at which in full, a foot is turned back with its leg
 _FARTHEST, _LOST = 0.5, 1.0  # horizontal distances, in limb lengths, at which lowering of the root begins to fade, ends
 _BACK = 0.04  # [rad] twice the largest hyperextension of a knee that is kept
 
@@ -146,42 +143,12 @@ def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
 
 
 @njit
-def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Array) -> None:
-    """Turn an end in mid-swing back with its limb, where it is almost half a turn from the joint's own rotation `own`.
-
-    At half a turn neither direction is shorter and the joint would flip, so the turn is reduced to zero there.
-    """
-    swings = smooth_step((sole_height(limb, end) - step[FLOOR]) / _SWUNG)
-    w, a, b, c = rotations[0]
-    for joint in (limb[FIRST], limb[MIDDLE]):
-        r = rotations[int(joint)]
-        w, a, b, c = multiply(w, a, b, c, r[0], r[1], r[2], r[3])
-    w, a, b, c = multiply(w, a, b, c, own[0], own[1], own[2], own[3])
-    turn = logarithm(*relative(w, a, b, c, end[3], end[4], end[5], end[6]))
-    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
-    if angle <= _TWIST:
-        return
-    wide = np.pi - _TWIST
-    u = (angle - _TWIST) / wide
-    kept = (1.0 - u) ** 2 * ((1.0 + 2.0 * u) * _TWIST + u * wide) + u * u * (1.0 - u) * wide
-    share = 1.0 + swings * (kept / angle - 1.0)
-    before = lever(limb, CENTRE, end)
-    end[3:] = multiply(w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2]))
-    after = lever(limb, CENTRE, end)
-    for i in range(3):
-        end[i] += after[i] - before[i]
-
-
-@njit
-def put_limb(limb: Array, step: Array, pose: Pose, end: Array, share: float) -> None:
+def put_limb(limb: Array, pose: Pose, end: Array, share: float) -> None:
     """Correct the joints of a stepping limb so that its end has the pose `end`, adjusted by `share` (`_hold_back`)."""
     rotations, last = pose[3:].reshape(-1, 4), int(limb[LAST])
     _bend_forwards(limb, rotations)
     _hold_back(limb, pose, end, share)
-    own = rotations[last].copy()
     # Twice, since from a straight limb one iteration leaves an error of up to two centimetres.
-    for again in range(2):
+    for _ in range(2):
         rotations[last] = end[3:]
         place_limb(limb, rotations, work_array((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
-        if again == 0:
-            _turn_along(limb, step, rotations, own, end)

@@ -153,7 +153,7 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
     share = smooth_step(min(at, lasts - at) / _GIVING) ** 2
     for n in range(limbs.shape[0]):
-        put_limb(limbs[n], transition.steps[n], pose, ends[n], share)
+        put_limb(limbs[n], pose, ends[n], share)
 
 
 @njit
