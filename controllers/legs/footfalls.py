@@ -26,16 +26,16 @@ import numpy as np
 from controllers.easing import smooth_steps
 from controllers.legs.limb_ends import contact_moves, lowest_point
 from controllers.legs.limbs import END, Limb
+from controllers.legs.sole_heights import STANDS, SWINGS
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 _SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights: four level points count 0.7 mm (ln 4 of it) lower
-# h_0 [m], height from which the foot moves freely. Cheer with ginga slides 1.0 cm with half or twice of it, too;
-# walk, run, ginga and cheer, which are not blended as a whole, 2.3 or 0.8 cm in the median instead of 1.0.
-_SWING_HEIGHT = 0.008
-_STANCE_HEIGHT, _SHARE_STANCE = 0.003, 0.2  # [m] height up to which it does not move; share of the lap's lift at most
-_SHARE_SWING = 0.5  # h_0 is at most this share of the largest lift of the lap
+# Largest shares of the lap's lift that `STANDS` and h_0, which is `SWINGS`, may take up. Cheer with ginga slides 1.0 cm
+# with half or twice of h_0, too; walk, run, ginga and cheer, which are not blended as a whole, 2.3 or 0.8 cm in the
+# median instead of 1.0.
+_SHARE_STANCE, _SHARE_SWING = 0.2, 0.5
 _LIFTED = 0.002  # [m] a foot that is never lifted by more than this is not held
 # c, h_c [m]. Half or twice c leaves the largest slide of cheer with ginga at 1.0 cm; in blends of walk, run, ginga
 # and cheer the median slides 1.2 or 0.7 cm instead of 1.0, and soles sink 5 or 8 mm instead of 6.
@@ -183,8 +183,8 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     raised = np.maximum(0.0, _raise(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    least = np.minimum(_STANCE_HEIGHT, _SHARE_STANCE * highest)
-    free = smooth_steps((up - least) / np.maximum(np.minimum(_SWING_HEIGHT, _SHARE_SWING * highest) - least, 1e-6))
+    least = np.minimum(STANDS, _SHARE_STANCE * highest)
+    free = smooth_steps((up - least) / np.maximum(np.minimum(SWINGS, _SHARE_SWING * highest) - least, 1e-6))
     # A foot that the clips do not lift follows the mean.
     held = smooth_steps(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)

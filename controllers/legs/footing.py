@@ -21,11 +21,12 @@ from numba import njit
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
+from controllers.legs.sole_heights import STANDS
 from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-_STANCE_HEIGHT, _SWING_HEIGHT = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
+_SWING_HEIGHT = 0.006  # [m] height of the sole from which σ₀ is 0; up to `STANDS` it is 1
 _MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0: of two clips, weights 0.72 and 0.985
 # κ [1/rad], and the additional rate where a clip is alone: half or twice of κ leaves the slide of the example at
 # `_MOST` at 0.3 cm.
@@ -140,7 +141,7 @@ def keep_footing(
     turn = _yawed(frame[2] + state[_OFFSET + 2], q)
     low = _levers(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stands = _step_down(end[2] + low - ground, _STANCE_HEIGHT, _SWING_HEIGHT)
+    stands = _step_down(end[2] + low - ground, STANDS, _SWING_HEIGHT)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MOST**2 + (state[_OFFSET + 2] / _MOST_TURN) ** 2
     held = stands * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0

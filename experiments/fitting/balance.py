@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.legs.sole_heights import SWINGS
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from models.gravity import GRAVITY
@@ -26,7 +27,6 @@ from sim.reference.reference import poses_along
 _ROWS = 96  # samples of a lap
 _ROUNDS = 3
 _CUTOFF = 6.0  # highest frequency of the sway [Hz]
-_SUPPORT_HEIGHT = 0.008  # height below which a contact point counts as support [m]
 _SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
 _FARTHEST = 0.2  # largest sway [m]
 
@@ -110,7 +110,7 @@ def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
     Array, shape (..., 2)
         The point itself where it lies inside, or where nothing touches the floor.
     """
-    touching = contacts[..., 2] < _SUPPORT_HEIGHT
+    touching = contacts[..., 2] < SWINGS
     count = touching.sum(axis=-1)[..., None]
     middle = (contacts[..., :2] * touching[..., None]).sum(axis=-2) / np.maximum(count, 1)
     # Points that do not touch are put at the middle, so that every polygon has the same number of corners.

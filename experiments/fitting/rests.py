@@ -6,8 +6,8 @@ import numpy.typing as npt
 
 from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.river_clips import RIVER, RiverClips
+from controllers.legs.sole_heights import STANDS
 from experiments.fitting.balance import nearest_supported
-from experiments.results.soles import CONTACT_HEIGHT
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import poses_along
 
@@ -44,7 +44,7 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
             mujoco.mj_comPos(figure, data)
             centre[i], contacts[i] = data.subtree_com[1, :2], data.geom_xpos[feet]
         contacts[..., 2] -= CONTACT_RADIUS
-        touch = contacts[..., 2] < CONTACT_HEIGHT
+        touch = contacts[..., 2] < STANDS
         missing = np.linalg.norm(nearest_supported(centre, contacts, _SHARE) - centre, axis=1)
         missing[~touch.any(axis=1)] = _UNSUPPORTED
         # FOOT_CONTACTS begins with the four points of the left foot.

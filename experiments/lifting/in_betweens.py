@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights
+from controllers.legs.sole_heights import STANDS
 from controllers.state import Array
-from experiments.results.soles import CONTACT_HEIGHT
 from models.humanoid.skeleton import (
     CONTACT_RADIUS,
     FOOT_CONTACTS,
@@ -29,7 +29,7 @@ class MotionMeasure(NamedTuple):
     limits : float
         Excess of a joint over its limits [rad].
     slide : float
-        Distance of a contact point of a sole from where it touched down, while it is within 3 mm of the floor [m].
+        Distance of a contact point of a sole from where it touched down, while it is lower than `STANDS` [m].
     penetration : float
         Depth of the body below the floor [m].
     ballistic : float
@@ -77,10 +77,10 @@ def soles(poses: Array) -> Array:
 
 
 def largest_slide(points: Array) -> float:
-    """Largest horizontal distance of a point of `soles` from its touch-down while within 3 mm of the floor [m]."""
+    """Largest horizontal distance of a point of `soles` from its touch-down while lower than `STANDS` [m]."""
     came_down, worst = np.full((points.shape[1], 2), np.nan), 0.0
     for places in points:
-        touches = places[:, 2] < CONTACT_HEIGHT
+        touches = places[:, 2] < STANDS
         fresh = touches & np.isnan(came_down[:, 0])
         came_down[fresh] = places[fresh, :2]
         came_down[~touches] = np.nan

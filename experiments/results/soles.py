@@ -3,11 +3,10 @@
 import mujoco
 import numpy as np
 
+from controllers.legs.sole_heights import STANDS
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.world.scene import SceneConfig
-
-CONTACT_HEIGHT = 0.003  # [m] height below which a point of a sole counts as in contact
 
 
 class Soles:
@@ -21,7 +20,7 @@ class Soles:
         Least height of a point above the floor [m]; infinite before the first pose.
     """
 
-    def __init__(self, scene: SceneConfig, touch: float = CONTACT_HEIGHT):
+    def __init__(self, scene: SceneConfig, touch: float = STANDS):
         self._touch = touch
         self._model = figure_model(scene.stature, scene.mass)
         self._data = mujoco.MjData(self._model)

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from controllers.legs.sole_heights import SWINGS
 from controllers.state import Array, IntArray
 from sim.body.falls import FallState
 from sim.body.mass_matrix import MassMatrix
@@ -66,7 +67,7 @@ class FigureGains(NamedTuple):
     reference_reach: float = 0.03
     contact_reach: float = 0.002
     settling_reach: float = 0.015
-    stance_height: float = 0.008
+    stance_height: float = SWINGS
     swing_speed: float = 1.0
     flight_height: float = 0.02
     lift_time: float = 0.02
