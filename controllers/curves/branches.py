@@ -18,6 +18,9 @@ from controllers.work_array import work_array, work_integers
 
 BRANCHES = 8  # largest number of branches of one curve; further ones are ignored
 
+SAME_BRANCH = 0.1
+"""Largest change of phase from one tick to the next, of a lap, at which a branch is still the one that was followed."""
+
 
 @njit
 def _runs(blob: Array, at: int, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array) -> int:

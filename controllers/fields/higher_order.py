@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import checked, one_of
-from controllers.curves.branches import BRANCHES, branches
+from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
 from controllers.fields.admissible import admissible_speeds
@@ -56,8 +56,6 @@ _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 
 # Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s]].
 _ACTIVE, _HELD_PHASE, _WHEN, _SEEN, _MEMORY = 0, 1, 2, 3, 6
-
-_NEIGHBOUR = 0.1  # of a lap: a branch whose phase differs by more is a different branch
 
 
 @njit
@@ -189,7 +187,7 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
             away = abs(table[k, _PHASE] - memory[slot + _HELD_PHASE])
             if params[curve + PERIODIC] > 0.0:
                 away = min(away, lap - away)
-            if away < min(nearest, _NEIGHBOUR * lap):
+            if away < min(nearest, SAME_BRANCH * lap):
                 current, nearest = k, away
         if best < 0 or table[k, _SCORE] < table[best, _SCORE]:
             best = k

@@ -9,7 +9,7 @@ from numba import njit
 
 from controllers.blending.blend import blend
 from controllers.blending.combination import fresh_lap
-from controllers.curves.branches import BRANCHES, branches
+from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import (
     END,
@@ -53,7 +53,6 @@ _CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand de
 _PAST = 0.25  # of a lap: a phase that lies before a moment by less than this counts as before it, otherwise as after it
 LONGEST = 0.7  # of a lap: longest duration of a change
 _ALIKE = 1e-6  # [s] largest difference of the laps of two rivers with a change between them
-_NEIGHBOUR = 0.1  # of a lap: a branch whose phase differs by more is a different branch
 
 
 @njit
@@ -61,7 +60,7 @@ def _phase_near(params: Array, curve: int, x: Array, last: float) -> float:
     """Phase [s] of the curve's point nearest to the stylus; of several branches, that which continues `last`."""
     found = work_array((BRANCHES, 2))
     start, end = params[curve + START], params[curve + END]
-    best, nearest = np.nan, _NEIGHBOUR * (end - start)
+    best, nearest = np.nan, SAME_BRANCH * (end - start)
     for k in range(branches(params, curve, x[0], x[1], x[2], params[_TUBE], found)):
         away = abs(found[k, 0] - last)
         away = min(away, end - start - away)
