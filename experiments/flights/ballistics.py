@@ -15,7 +15,7 @@ from controllers.certificates.flight.ballistic import (
 )
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
 from controllers.certificates.flight.flight_fit import FlightFit, best_fall
-from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
+from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
 from controllers.gravity import GRAVITY
@@ -33,7 +33,6 @@ from sim.body.tracking import TrackingConfig, tracked_motion
 
 _LIFT = 10.0  # height at which a flight is flown, out of reach of the floor [m]
 _FINE = 480.0  # frame rate at which a flight is flown [1/s]
-_ANY_RATE = 100.0  # rate above which a bound counts as none
 # Frames after the landing that shape the reference's spline: an end's influence decays by 0.27 a frame, to 3e-5.
 _AFTER = 8
 
@@ -80,7 +79,7 @@ class ClipBallistics:
 def _in_words(rates: tuple[float, float] | None) -> str:
     if rates is None or not np.isfinite(rates[0]):
         return "at no rate"
-    return f"at {rates[0]:.2f} or more" if rates[1] > _ANY_RATE else f"at {rates[0]:.2f} to {rates[1]:.2f}"
+    return f"at {rates[0]:.2f} or more" if rates[1] > ANY_RATE else f"at {rates[0]:.2f} to {rates[1]:.2f}"
 
 
 class FlightTrial(NamedTuple):

@@ -26,7 +26,7 @@ from controllers.errors import ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array
 
-_ANY_RATE = 100.0  # a larger admissible rate is no practical bound
+ANY_RATE = 100.0  # a larger admissible rate is no practical bound
 _WINDOW = 0.2  # [s] window of the local parabolas whose second derivative is the acceleration
 
 
@@ -142,10 +142,10 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     )
     if not np.isfinite(rate):
         return Verdict("certified", "nothing turns, starts or stops on the floor", None, assumptions)
-    up_to = f"up to {rate:.2f} of" if rate < _ANY_RATE else f"more than {_ANY_RATE:g} times"
+    up_to = f"up to {rate:.2f} of" if rate < ANY_RATE else f"more than {ANY_RATE:g} times"
     reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
-        return Verdict("certified", reason, rate**2 - 1.0 if rate < _ANY_RATE else None, assumptions)
+        return Verdict("certified", reason, rate**2 - 1.0 if rate < ANY_RATE else None, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
     reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.1f} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
