@@ -24,14 +24,17 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.easing import smooth_steps
-from controllers.legs.limb_ends import contact_moves, lowest_point
+from controllers.legs.limb_ends import SHARP, contact_moves, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.sole_heights import STANDS, SWINGS
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights: four level points count 0.7 mm (ln 4 of it) lower
+CATCH_UP = 8.0
+"""κ ∫ g over a lap, at least: e⁻⁸ of a gap is left after it. Half or twice changes no slide of blends, nor of led
+captures, by more than 0.1 mm."""
+
 # Largest shares of the lap's lift that `STANDS` and h_0, which is `SWINGS`, may take up. Cheer with ginga slides 1.0 cm
 # with half or twice of h_0, too; walk, run, ginga and cheer, which are not blended as a whole, 2.3 or 0.8 cm in the
 # median instead of 1.0.
@@ -40,8 +43,6 @@ _LIFTED = 0.002  # [m] a foot that is never lifted by more than this is not held
 # c, h_c [m]. Half or twice c leaves the largest slide of cheer with ginga at 1.0 cm; in blends of walk, run, ginga
 # and cheer the median slides 1.2 or 0.7 cm instead of 1.0, and soles sink 5 or 8 mm instead of 6.
 _RAISE, _RAISE_FROM = 0.02, 0.003
-# κ ∫ g over a lap, at least: e⁻⁸ of a gap is left after it; half or twice changes no slide of blends by 0.1 mm.
-_CATCH_UP = 8.0
 _FADE = 4  # power of a clip's weight with which its own foot skate is kept: half way a sixteenth
 _LAPS = 4  # laps of integration until the path is periodic: each leaves e⁻⁸ of the error, four 1e-14
 
@@ -152,13 +153,13 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
         shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
         place, turn = np.einsum("km,nmx->nkx", weights, ends[..., :3]), _mean_rotations(turns, weights)
-        height.append(place[..., 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
+        height.append(place[..., 2] + lowest_point(turn, limb, SHARP) - ground)
         place = np.concatenate([place, place[:1]])[..., :2]
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
         over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
-        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, _SOFTNESS))
+        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, SHARP))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
 
@@ -171,7 +172,7 @@ def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Arr
 
 def _own_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
     end, turn = _own_end(channels, limbs, j)
-    return end[..., 2] + lowest_point(turn, limbs[j], _SOFTNESS)
+    return end[..., 2] + lowest_point(turn, limbs[j], SHARP)
 
 
 def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
@@ -188,7 +189,7 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     # A foot that the clips do not lift follows the mean.
     held = smooth_steps(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)
-    rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
+    rate = np.maximum(CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
     slips = (1.0 - free)[..., None] * feet.moves
     ahead = gap(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])
     result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))

@@ -15,8 +15,11 @@ from controllers.legs.limbs import END, Limb
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SOFTNESS = 0.003  # [m] softness of the minimum of heights: four level points count 4 mm (ln 4 of it) lower
-_HARD = 5e-4  # [m] the same, for the height of the ground
+SHARP = 5e-4
+"""Softness of the minimum of a sole's heights where feet are planted or the ground is estimated [m]: four level points
+count 0.7 mm (ln 4 of it) lower."""
+
+_SOFTNESS = 0.003  # [m] the same in the map, where heights must be smooth: 4 mm lower
 _RARE = 0.02  # share of frames in which a clip may be below the ground that is estimated from it
 
 
@@ -208,4 +211,4 @@ def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
 
     `channels` and `limbs` are as in `lowest_of_limbs`.
     """
-    return np.quantile(lowest_of_limbs(channels, limbs, _HARD), _RARE, axis=0)
+    return np.quantile(lowest_of_limbs(channels, limbs, SHARP), _RARE, axis=0)

@@ -24,9 +24,9 @@ from scipy.spatial.transform import Rotation
 
 from controllers.curves.splines import round_lap
 from controllers.easing import smooth_steps
-from controllers.legs.footfalls import gap
+from controllers.legs.footfalls import CATCH_UP, gap
 from controllers.legs.grounded import runs
-from controllers.legs.limb_ends import contact_moves, end_channels, lowest_point
+from controllers.legs.limb_ends import SHARP, contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import reached, shortfall
 from controllers.motion.loops import plane_exponential, turned, yawed
@@ -49,12 +49,10 @@ _SMOOTH = 0.0025
 # h_0 [m], least height of a foot in swing: the worst of eight led captures slides 3.0 cm, with half of it 4.4, with
 # twice 2.4.
 _CLEAR = 0.01
-_CATCH_UP = 8.0  # κ ∫ g over a lap: e⁻⁸ of a gap is left after it; half or twice changes slides by 0.1 mm at most
 _NARROW = 0.02  # [m] an end of less breadth is not levelled
 _LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which it is levelled less, and not at all
 # β_0 [rad]: ankles of eight led captures accelerate by up to 950 rad/s², with half of it 1280, with twice 800.
 _FLAT = 0.05
-_SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights: four level points count 0.7 mm (ln 4 of it) lower
 
 
 def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
@@ -104,7 +102,7 @@ def planted_ends(
     lag -= lag.mean()
     turns, parts = end_channels(channels[:, None], drift[None], limb, lag)
     quaternions, ends = _level(turns[:, 0], limb, 1.0 - free), parts[:, 0]
-    heights = ends[:, 2] + lowest_point(quaternions, limb, _SOFTNESS) - radius
+    heights = ends[:, 2] + lowest_point(quaternions, limb, SHARP) - radius
     # Over the ground, for one lap: the last sample is the first one a lap later.
     shift, angle = plane_exponential((np.arange(n + 1) / n + np.append(lag, lag[0]))[:, None] * drift)
     places = turned(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
@@ -112,8 +110,8 @@ def planted_ends(
     for kept in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
         over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
-        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, _SOFTNESS)[:, 0]
-        ahead = kept * gap(stays[:, None] * moves, np.exp(-_CATCH_UP * free / free.sum()), drift[2])
+        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, SHARP)[:, 0]
+        ahead = kept * gap(stays[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
