@@ -29,6 +29,10 @@ from controllers.rotations import exponential, logarithm, multiply, relative, ro
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
+THROW = 20.0
+"""Largest linear acceleration of the old motion that is continued in a change, of the root and of feet [m/s²]: a thrown
+hand races its clip. Half or twice for feet moves joints by 1 rad/s in 8 ms at most in the changes and stops below."""
+
 # λ: height of a step over its length. In 40 changes and 40 stops of walk, run and squat dance (`change_trials`)
 # joints leap by up to 25 and 36 rad/s in 8 ms, with half of it by 11 and 24, with twice by 94 and 48; feet slide
 # alike (2.9 cm).
@@ -40,9 +44,7 @@ _FIRST = 1e3  # urgency of a stance foot's step; that of any other foot is below
 # [m] largest stopping distance of a foot, unless it is too fast for that. With half of it the worst of these changes
 # slides 1.3 cm instead of 2.9, and the worst stop is 9 cm in the air instead of 12; with twice 17.
 _CAUGHT = 0.12
-# [m/s²], [rad/s²] largest acceleration of the old motion that is continued, as of the root; half or twice the first
-# moves the joints of these changes and stops by 1 rad/s in 8 ms at most.
-_THROW, _TWIRL = 20.0, 100.0
+_TWIRL = 100.0  # [rad/s²] as `THROW`, of the turning of a foot
 # [s] least stopping time of a foot: half or twice of it moves joints of these changes by 2 rad/s in 8 ms at most.
 _SOONEST = 0.05
 # A row of `steps`: begin of the step [s]; position (3) and quaternion (4) at which the old motion comes to rest;
@@ -191,7 +193,7 @@ def plan_steps(
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _CAUGHT / max(speed, 1e-9), _SOONEST))
         step[_STOP], step[FLOOR] = stop, ground
-        _come_to_rest(ends[:, :3], period, stop, _THROW, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
+        _come_to_rest(ends[:, :3], period, stop, THROW, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
         w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))

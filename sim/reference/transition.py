@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from controllers.easing import smooth_step
-from controllers.legs.footsteps import STEP, limb_end, pivot, plan_steps, step_end
+from controllers.legs.footsteps import STEP, THROW, limb_end, pivot, plan_steps, step_end
 from controllers.legs.stepping_limbs import put_limb, shortfall
 from controllers.motion.inertialization import add_offset, offset_left
 from controllers.state import Array
@@ -26,7 +26,6 @@ _PULL = 6.0
 # [m/s²] the same horizontally, where the root moves on besides: twice lifts the feet of the worst change by 4 mm
 # more.
 _ASIDE = 5.0
-_THROW = 20.0  # [m/s²] largest linear acceleration of the offset at the change: a thrown hand races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest: 10/√3
 # Largest factor on the least blend time by which a horizontal offset prolongs a change. With 1 the worst of 40
 # changes has its feet 7 mm higher and slides 4 mm less; with twice as much the median has its feet 2 mm lower.
@@ -192,7 +191,7 @@ def note_change(
         transition.change[1, i] = 0.5 * (next_[i] - then[i]) / period
         transition.change[2, i] = (next_[i] - 2.0 * now[i] + then[i]) / period**2
     for i in range(3):
-        transition.change[2, i] = min(max(transition.change[2, i], -_THROW), _THROW)
+        transition.change[2, i] = min(max(transition.change[2, i], -THROW), THROW)
     if transition.seconds > 0.0:
         plan_steps(
             transition.limbs, transition.steps, transition.shown, pose, period, transition.lasts[0], second,
