@@ -12,7 +12,10 @@ from controllers.rotations import rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-SOFTNESS = 2e-3  # [m] of the minimum of a sole's heights: four level points count 3 mm (ln 4 of it) lower
+SOFTNESS = 2e-3
+"""Softness of the minimum of soles' heights where a pose is put onto the floor [m]: four level points count 3 mm (ln 4
+of it) lower."""
+
 _ROUND = 4e-3  # s [m]
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit, types
 
 from controllers.easing import cubic_step
+from controllers.legs.floor import SOFTNESS
 from controllers.legs.footsteps import lever, limb_end
 from controllers.legs.limbs import LIMB
 from controllers.state import Array
@@ -27,7 +28,6 @@ from sim.compilation.units import Unit
 
 _HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: a flight is lowered fully below (it would need 0.49 g), not at all above (0.81 g)
 _RATE = 10.0  # natural frequency of the approach to the goal [1/s]; a free fall from a jump's height takes 0.3 s
-_SOFTNESS = 2e-3  # softness of the minimum of the soles' heights [m]: eight level points count 4 mm (ln 8 of it) lower
 _ROUND = 4e-3  # r [m], rounds the onset of S
 
 
@@ -57,7 +57,10 @@ def _height(limb: Array, end: Array, k: int) -> float:
 
 @njit
 def clearance(limbs: Array, ends: Array, pose: Array) -> float:
-    """Height over the floor of the lowest point of all soles [m], by a soft minimum; `ends` (n, 7) is scratch."""
+    """Height over the floor of the lowest point of all soles [m], by a soft minimum; `ends` (n, 7) is scratch.
+
+    Eight level points count 4 mm (ln 8 of `SOFTNESS`) lower.
+    """
     least = math.inf
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
@@ -66,8 +69,8 @@ def clearance(limbs: Array, ends: Array, pose: Array) -> float:
     total = 0.0
     for n in range(limbs.shape[0]):
         for k in range(LIMB, limbs.shape[1], 3):
-            total += math.exp((least - _height(limbs[n], ends[n], k)) / _SOFTNESS)
-    return least - _SOFTNESS * math.log(total)
+            total += math.exp((least - _height(limbs[n], ends[n], k)) / SOFTNESS)
+    return least - SOFTNESS * math.log(total)
 
 
 @njit
