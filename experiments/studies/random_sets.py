@@ -34,6 +34,7 @@ from experiments.trials.trial.trial_log import TrialLog
 from models.errors import ModelError
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.preparation.bounds import LIMIT
 from sim.body.falls import UP
 from sim.loop.loop import Loop
 
@@ -52,7 +53,6 @@ JUDGING = (
 
 SECONDS = 20.0
 MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
-_WITHIN = np.deg2rad(1.0)  # tolerance beyond a joint's range: difference of Euler angles and rotation vectors there
 _EVERY = 5  # every fifth frame of the animation is measured: 100 a second
 
 
@@ -142,7 +142,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
     """Lowest sole [cm], foot skate in a stance (95 %, largest) [cm], and joints beyond limits [°] of the animation."""
     motion = motion_of(poses, fps, dynamics=False)
-    excess = float(beyond_ranges(poses).max()) - _WITHIN
+    excess = float(beyond_ranges(poses).max()) - LIMIT
     return {
         "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,
         "beyond": float(np.rad2deg(max(excess, 0.0))),

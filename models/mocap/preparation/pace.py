@@ -20,6 +20,7 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
+from models.mocap.preparation.bounds import FLIGHT
 from models.mocap.preparation.poses import contact_points
 
 _HIGH = 0.03  # least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand
@@ -29,7 +30,6 @@ _CLEAR = 0.08
 # Least duration of a flight from which acceleration is estimated [s]: half of it slows SNU's run to 0.80 of its pace,
 # and twice finds no flight in DeepMimic's run; the other 17 of 19 captures keep their pace.
 _SHORT = 0.09
-_RIGHT = 1.5  # excess over gravity that is left uncorrected [m/s²], as `well_formed` allows
 _SLOWEST = 0.35  # least pace; a slower one would be due to another fault
 
 
@@ -52,9 +52,9 @@ class Paced(NamedTuple):
 
 
 def paced(clip: Clip) -> Paced:
-    """The clip at the pace at which its flights are ballistic; unchanged if they fall with g or less, or none exist."""
+    """The clip at the pace at which its flights are ballistic; unchanged if none exist or `FLIGHT` allows theirs."""
     falls = falling(clip)
-    if falls is None or falls < GRAVITY + _RIGHT or falls > GRAVITY / _SLOWEST**2:
+    if falls is None or falls < GRAVITY + FLIGHT or falls > GRAVITY / _SLOWEST**2:
         return Paced(clip, 1.0, falls)
     pace = float(np.sqrt(GRAVITY / falls))
     return Paced(Clip(clip.poses, clip.fps * pace, clip.name), pace, falls)
