@@ -15,6 +15,7 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles
 
 SIDES = ("left", "right")
+AT_REST = 0.3  # speed up to which a joint is at rest [leg lengths/s]: a walker's swinging foot has 3
 _TOES = np.sin(np.deg2rad(30.0))  # least median sine of toes to the shank: 50 to 90° off it in captures
 
 

@@ -24,7 +24,7 @@ _TURN = np.deg2rad(15.0)  # least jump of a joint [rad]
 _WAY = 0.25  # least jump of the root [thigh lengths]
 _BACK = 0.3  # largest step across a gap, as a share of the lesser jump
 _JOINTS = 0.25  # least share of the joints that jump at once where the whole pose does
-_FEWEST = 10  # least number of frames that define usual steps
+FEWEST = 10  # least number of frames that define usual steps
 _BESIDE = 3  # frames on either side of a gap through which it is interpolated
 
 
@@ -53,7 +53,7 @@ def repaired(motion: SourceMotion, roles: Roles) -> Repaired:
     joint turns so far in a frame and back within `_LONGEST`. Joints that no segment of the figure follows do not count.
     """
     broken = np.zeros(motion.n_frames, dtype=bool)
-    if motion.n_frames < _FEWEST:
+    if motion.n_frames < FEWEST:
         return Repaired(motion, (), ())
     used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
     pelvis = ancestry(roles.segments["pelvis"], motion.parents)

@@ -27,7 +27,7 @@ from scipy.spatial.transform import Rotation
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
-from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
+from models.mocap.retargeting.body_lines import AT_REST, SIDES, BodyLines, unit
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 _Z = np.array([0.0, 0.0, 1.0])
@@ -37,9 +37,8 @@ _STRAIGHT = np.deg2rad(20.0)
 _BEND = np.sin(np.deg2rad(12.0))  # least bend that defines a plane: knees of straight legs are up to 12° off the line
 # Weight of the parent's axis beside the hinge axis: that of a bend by 15°; half or twice turns joints by 0.3° RMS.
 _UNBENT = 0.01
-_STILL = 0.3  # speed below which ankle and toes are at rest [leg lengths/s]: a walker's swinging foot has 3
 _TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
-_PATIENCE = (1.0, 2.0, 4.0)  # factors on both, tried in turn: runs and 16 frames a second show no foot at rest
+_PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs, and 16 frames a second, need more
 # Height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]: half of it turns
 # the joints of 19 captures by 0.5° RMS, twice by 0.02°.
 _LOW = 0.05
@@ -283,7 +282,7 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
     heights = lines.lowest_joints @ up
     low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
     for factor in _PATIENCE:
-        flat = np.flatnonzero(low & (passing < factor * _STILL) & (turning < factor * _TURNS))
+        flat = np.flatnonzero(low & (passing < factor * AT_REST) & (turning < factor * _TURNS))
         if len(flat) >= _LEAST:
             return flat
     return np.zeros(0, dtype=np.intp)

@@ -18,12 +18,12 @@ from models.arrays import Array
 from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
+from models.mocap.retargeting.broken_frames import FEWEST
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 _SHARE = 0.25  # largest share of a motion that may be such a pose, held
 _TIMES = 5.0  # least ratio of the jump to the 99th percentile of the steps
 _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns so far in a frame
-_FEWEST = 10  # least number of frames that define usual steps
 _HELD = 0.1  # largest step while the pose is held, as a share of the jump
 # Of a calibration pose: bend of its limbs, difference of its sides, least angle of its arms to the trunk's line and
 # largest to the trunk's plane.
@@ -41,7 +41,7 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     early = steps[: max(1, int(_SHARE * n))]
     if n < 4 or early.max() < _TURN:
         return 0
-    if n >= _FEWEST:
+    if n >= FEWEST:
         jump = int(np.argmax(early))
         usual = float(np.quantile(np.delete(steps, jump), 0.99))
         # The pose is held still; if there is motion before the jump, the jump is a fault of the capture.

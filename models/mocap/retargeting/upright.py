@@ -18,7 +18,7 @@ import numpy as np
 from models.arrays import Array, IntArray, Mask
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import BodyLines, unit
+from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
 
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 _CUSTOM = 0.1  # β
@@ -27,7 +27,6 @@ _CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared
 # ../shared/mocap it is 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a
 # second have 0.1 and less, and 0.37 and less.
 _LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
-_REST = 0.3  # speed up to which a joint is at rest [leg lengths/s], as `calibration` takes soles for
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
 _SAMPLES = 200  # number of frames that are evaluated
@@ -83,7 +82,7 @@ def _calm(positions: Array, fps: float, lost: Mask) -> tuple[IntArray, bool]:
         return np.arange(len(positions)), True
     slowest = np.linalg.norm(np.gradient(positions, axis=0), axis=2).min(axis=1) * fps
     calm = float(np.quantile(slowest[~lost], _CALM))
-    return np.flatnonzero((slowest <= max(_REST, calm)) & ~lost), calm <= _REST
+    return np.flatnonzero((slowest <= max(AT_REST, calm)) & ~lost), calm <= AT_REST
 
 
 def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> float:
