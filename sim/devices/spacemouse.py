@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from controllers.state import LONGEST_STEP, Array
 from models.phantom.kinematics import R_HP, inside_workspace
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import BAD, READ, DeviceIdentity, DriverFault, fresh_telemetry
@@ -29,7 +29,6 @@ FULL = 350.0
 """Axis value at full deflection."""
 DEAD_ZONE = 0.03
 """Share of the full deflection below which it is taken as zero: a cap at rest may report so much."""
-_LONGEST = 0.05  # [s] longest integration step: after a page froze the stylus must not jump
 _TRANSLATION, _TURN, _BUTTONS = 1, 2, 3
 # From the cap's axes to H: right is −y, towards the user −x, down −z.
 _R_HC = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -86,7 +85,7 @@ class SpaceMouse:
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         now = self._clock()
-        self._move(0.0 if self._last is None else min(now - self._last, _LONGEST))
+        self._move(0.0 if self._last is None else min(now - self._last, LONGEST_STEP))
         self._last = now
         told = np.zeros(READING_SIZE)
         write_pose(told, np.array(R_HP).T @ self._p_H, self._r_HS)
