@@ -17,13 +17,14 @@ from sim.devices.driver import READ, DeviceIdentity, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
 from sim.errors import SimError
 from sim.users.hand.arm import Arm
+from sim.users.hand.dragged import TREMBLES
 from sim.world.linkage import Linkage
 from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
 from sim.world.world import World
 
-TREMOR, TREMOR_FREQUENCY = 1e-4, 10.0
-"""Amplitude [m] and frequency [Hz] of the physiological tremor of a hand at rest: some 0.1 mm at 8 to 12 Hz."""
+TREMOR_FREQUENCY = 10.0
+"""Frequency of the physiological tremor of a hand at rest [Hz]: the middle of 8 to 12."""
 
 
 @entry_point
@@ -35,7 +36,7 @@ def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Ar
 def tremor(seconds: float, period: float) -> Array:
     """Tremor displacement of a hand at rest [m], shape (n, 3), sampled every `period` [s]."""
     t = np.arange(0.0, seconds, period)
-    return TREMOR * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
+    return TREMBLES * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
 
 
 def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:

@@ -16,7 +16,9 @@ from sim.users.hand.arm import CompiledArm
 _SPAN = 1e6  # [s] between the two samples of a path, longer than any run
 _FOR_EVER = 1e9  # [s] hold time of a grab
 _TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
-_TREMBLES = 1e-4  # [m] amplitude of the tremor
+
+TREMBLES = 1e-4
+"""Amplitude of the physiological tremor of a hand at rest [m]: a tenth of a millimetre at 8 to 12 Hz."""
 
 
 def relaxed(arm: CompiledArm) -> CompiledArm:
@@ -55,4 +57,4 @@ def tremor(t: float) -> Array:
     A real hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54), so the plausibility check of a device
     takes constant readings for a fault.
     """
-    return np.array([_TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])
+    return np.array([TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])
