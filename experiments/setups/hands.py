@@ -30,11 +30,11 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
+NEAR = 3e-3  # [m] from its place within which a push across begins: less than a fifth of the rivers' tubes, of 15 mm
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
-_PLACE = 3e-3  # [m] from its place within which a push begins
 _AWAY = 1e-3  # [m] standard deviation of the start position
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
 
@@ -197,4 +197,4 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     lap = curve.duration
     x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD))
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
-    return tuple(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, 1.0), (x, y, z), _PLACE) for start in starts)
+    return tuple(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)

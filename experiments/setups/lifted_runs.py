@@ -11,6 +11,7 @@ from controllers.state import Array
 from experiments.config.modes import Rivers
 from experiments.setups.budget import fastest
 from experiments.setups.defaults import river_gains
+from experiments.setups.hands import NEAR
 from experiments.setups.pace import paced
 from experiments.setups.parts import RiverChoice
 from experiments.setups.rivers import BESIDE, river_time
@@ -22,7 +23,6 @@ _SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that come
 _SECONDS = 0.6  # [s] duration of a push from one curve to another
 _LEAD = 0.36  # [s] before the transition at which the push begins: with 0.34 to 0.55 the figure stands (nine pushes)
 _CROSSING = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
-_NEAR = 3e-3  # [m] from its place within which a push begins
 _STAY = 3  # laps on the other curve
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
@@ -144,7 +144,7 @@ def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start
     distance = float(np.linalg.norm(way))
     x, y, z = (float(value) for value in way)
     p, q, r = (float(value) for value in place)
-    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), _NEAR)
+    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), NEAR)
 
 
 def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:
