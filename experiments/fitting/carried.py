@@ -21,7 +21,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from experiments.fitting.alike import motion_of
-from experiments.fitting.verdict import BEARABLE, Verdict, tried
+from experiments.fitting.verdict import BEARABLE, FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder
@@ -32,9 +32,8 @@ WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is
 # Largest floor penetration [m], foot skate [m] and excess angle [rad]; the first two are the bounds of
 # docs/validation/blended-motions.md.
 SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)
-_SECONDS, _FPS = 20.0, 120.0
 _PUSHED = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, in 50 mm
-_EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand
+EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand
 
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
@@ -43,7 +42,7 @@ Carrying = TypeVar("Carrying", Cylindrical, Composite)
 def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
     """How the physical figure follows a map about a circle for 20 s; cached, and needs compiled code."""
     made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
-    return tried(__name__, lambda: toured(made, lap), _SECONDS, made_of)
+    return tried(__name__, lambda: toured(made, lap), SECONDS, made_of)
 
 
 def _domain(made: Cylindrical | Composite) -> Array:
@@ -57,26 +56,26 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
     so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW.
     """
-    times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
-    turn, pushed = 2.0 * np.pi * times / _SECONDS, _PUSHED * push_profile(times)
+    times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
+    turn, pushed = 2.0 * np.pi * times / SECONDS, _PUSHED * push_profile(times)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = _domain(made).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
-    angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / _FPS
+    angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
     stylus, poses = np.zeros((len(times), 7)), np.empty((len(times), made.nq))
     stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
     kind, params, memory = made.compiled()
     poses_along(kind, params, memory.copy(), stylus, poses)
-    return Clip(poses, _FPS, "blend")
+    return Clip(poses, FPS, "blend")
 
 
 def push_profile(times: Array) -> Array:
     """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
-    phase = times / _EVERY % 2.0
-    ramp = np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN
-    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0))
+    phase = times / EVERY % 2.0
+    ramp = np.minimum(phase, 2.0 - phase) * EVERY / _WITHIN
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
 def sound(made: Cylindrical | Composite, lap: float) -> bool:

@@ -15,14 +15,12 @@ from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
-from experiments.fitting.carried import SHARES, WELL, is_sound, push_profile
-from experiments.fitting.verdict import Verdict, tried
+from experiments.fitting.carried import EVERY, SHARES, WELL, is_sound, push_profile
+from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import poses_along
 
-_SECONDS, _FPS = 20.0, 120.0
 _PUSHED = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
-_FIRST = 1.7  # [s] start of the first push
 
 
 def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
@@ -31,15 +29,15 @@ def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     Where the field does not keep its pace there (`Follow.parallel`), a push leaves the hand's speed as it is, so its
     angular speed is lower the further out it is.
     """
-    times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
-    pushed = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0))
+    times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
+    pushed = _PUSHED * push_profile(np.maximum(times - EVERY, 0.0))
     since = times if keeps_pace else _slowed(curve, pushed)
     phases = since % curve.duration if curve.periodic else np.minimum(since, curve.duration)
     points, poses = curve.point(curve.start + phases), np.empty((len(times), made.nq))
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
     kind, params, memory = made.compiled()
     poses_along(kind, params, memory.copy(), stylus_path(points), poses)
-    return Clip(poses, _FPS, "pushed")
+    return Clip(poses, FPS, "pushed")
 
 
 def _slowed(curve: Trajectory, pushed: Array) -> Array:
@@ -48,7 +46,7 @@ def _slowed(curve: Trajectory, pushed: Array) -> Array:
     for k, off in enumerate(pushed[:-1]):
         at = since[k] % curve.duration if curve.periodic else min(since[k], curve.duration)
         radius = float(np.hypot(*curve.point(curve.start + at)[:2]))
-        since[k + 1] = since[k] + radius / (radius + off) / _FPS
+        since[k + 1] = since[k] + radius / (radius + off) / FPS
     return since
 
 
@@ -75,7 +73,7 @@ def followed_map(
         return part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
 
     def verdict_on(part: Lifted) -> Verdict:
-        return tried(__name__, lambda: toured(part, curve, keeps_pace), _SECONDS, made_of(part))
+        return tried(__name__, lambda: toured(part, curve, keeps_pace), SECONDS, made_of(part))
 
     whole = verdict_on(made)
     sound = not whole.bearable or is_sound(__name__, lambda: toured(made, curve, keeps_pace), made_of(made))

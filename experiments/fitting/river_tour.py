@@ -11,11 +11,10 @@ from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
-from experiments.fitting.verdict import tried
+from experiments.fitting.verdict import FPS, tried
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 
-_FPS = 120.0
 _WAY = (0, 1, 2, 0, 2, 1, 0)  # order of the three rivers: each change from one to another occurs once
 _STAY, _GLIDE = 5.5, 0.3  # [s] on a river, enough to pass a gate and end the transition; [s] of a change of river
 _SECONDS = _STAY * len(_WAY)
@@ -24,7 +23,7 @@ _SECONDS = _STAY * len(_WAY)
 def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     """The animation of a hand that moves at the rivers' pace and changes once between every two of the three rivers."""
     # The stylus filter begins at rest: its first second is dropped.
-    times = np.arange(round((_SECONDS + 2.0) * _FPS)) / _FPS - 1.0
+    times = np.arange(round((_SECONDS + 2.0) * FPS)) / FPS - 1.0
     stay = np.clip(times // _STAY, 0, len(_WAY) - 1).astype(int)
     way = np.array(_WAY)
     share = smooth_steps((times - _STAY * stay) / _GLIDE)[:, None]
@@ -34,9 +33,9 @@ def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     now, before = points[way[stay], rows], points[way[np.maximum(stay - 1, 0)], rows]
     traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
     traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = way[stay], phases[way[stay], rows]
-    reference = make_reference(figure, made.compiled(), 1.0 / _FPS, part.smoothing, part.blend, packed_legs(figure))
+    reference = make_reference(figure, made.compiled(), 1.0 / FPS, part.smoothing, part.blend, packed_legs(figure))
     reference_along(reference, stylus_path(before + share * (now - before)), traces, poses)
-    return Clip(poses[times >= 0.0], _FPS, "rivers")
+    return Clip(poses[times >= 0.0], FPS, "rivers")
 
 
 def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:

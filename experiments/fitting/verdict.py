@@ -17,6 +17,9 @@ from sim.compilation.unit_workers import compile_units
 BEARABLE = FLYING
 """Largest bearable RMS residual [body weights]."""
 
+SECONDS, FPS = 20.0, 120.0
+"""Duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
+
 
 class Verdict(NamedTuple):
     """How the physical figure follows a map.

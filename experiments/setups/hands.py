@@ -30,7 +30,7 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-NEAR = 3e-3  # [m] from its place within which a push across begins: less than a fifth of the rivers' tubes, of 15 mm
+NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river
