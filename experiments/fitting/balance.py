@@ -27,7 +27,7 @@ from sim.reference.reference import poses_along
 _ROWS = 96  # samples of a lap
 _ROUNDS = 3
 _CUTOFF = 6.0  # highest frequency of the sway [Hz]
-_SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
+SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
 _FARTHEST = 0.2  # largest sway [m]
 
 
@@ -81,7 +81,7 @@ def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
     sway = np.zeros((_ROWS, len(weights), 2))
     for k in range(_ROUNDS):
         laps = _laps(haptic_map.with_sway(sway) if k > 0 else haptic_map, figure, lap)
-        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
+        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, SHARE) - laps.zmp)
         own = outside[corners]
         outside -= np.einsum("km,mnx->knx", weights, own)
         c, s = np.cos(turn), np.sin(turn)

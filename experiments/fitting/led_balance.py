@@ -5,7 +5,7 @@ import numpy as np
 
 from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
-from experiments.fitting.balance import measured_laps, nearest_supported, sway_of
+from experiments.fitting.balance import SHARE, measured_laps, nearest_supported, sway_of
 from sim.body.figure import FigureGains
 from sim.reference.reference import poses_along
 
@@ -19,7 +19,6 @@ _FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace
 _ROWS = 192  # samples of a lap
 _ROUNDS = 6
 _PACE = 0.8  # pace at which the sway is computed, over the gait's own
-_SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
 
 
 def led_gains(led: Led) -> FigureGains:
@@ -40,7 +39,7 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
         compiled = result.compiled()
         poses_along(compiled.kind, compiled.params, compiled.memory, walker, poses[0])
         laps = measured_laps(poses, seconds / _ROWS, figure)
-        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
+        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, SHARE) - laps.zmp)
         # The flights have the clip's own mean root position: a constant offset would have to be undone and throw the
         # figure.
         mean = outside[0].mean(axis=0) if gait.flies else 0.0
