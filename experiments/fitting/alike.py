@@ -20,7 +20,10 @@ from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
-LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] above the clips' median: from there on clips count as different
+SKATES = 0.02
+"""Largest foot skate of a blend, 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
+
+LACKS = 0.06  # [body weights] RMS above that of the clips: from there on, or from `SKATES` above it, clips differ
 _FPS = 60.0
 _TRUNK = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
