@@ -24,9 +24,9 @@ from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTAC
 from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 
 UP, DOWN, SET_BACK = 0.0, 1.0, 2.0
+TOUCHES = 2e-3  # [m] height below which a body touches the floor: MuJoCo's contacts are about as soft
 FALLEN = 0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
 LIES, RISES = 1.0, 1.0  # [s] of lying on the floor, and of the way back onto the animation
-_CONTACT_HEIGHT = 2e-3  # [m] height below which a body counts as in contact: MuJoCo's contacts are about as soft
 _HELD_ABOVE = 0.05  # [m] height from which a body of the reference is clear of the floor; a standing shank is at 0.058
 _CLEARANCE = 0.25  # [m] h at the default stature; the interpolation alone takes the feet 0.15 m below the floor
 _MODE, _SINCE, _FALLS = 0, 1, 2  # places in `FallState.state`
@@ -113,7 +113,7 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
         lowest = min(lowest, height)
         if height < 0.0 and _lowest(kind, size, fall.twin_pos[twin], fall.twin_mat[twin]) > _HELD_ABOVE:
             fallen = True
-    touches = lowest < _CONTACT_HEIGHT
+    touches = lowest < TOUCHES
     if state[_MODE] == UP:
         away = np.sqrt((pose[0] - q_r[0]) ** 2 + (pose[1] - q_r[1]) ** 2 + (pose[2] - q_r[2]) ** 2)
         if fallen or (touches and away > FALLEN):

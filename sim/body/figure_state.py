@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from controllers.legs.sole_heights import SWINGS
 from controllers.state import Array, IntArray
-from sim.body.falls import FallState
+from sim.body.falls import TOUCHES, FallState
 from sim.body.mass_matrix import MassMatrix
 
 N_FOOT = 4  # contact points of a foot
@@ -65,7 +65,7 @@ class FigureGains(NamedTuple):
     force_bound: float = 0.5
     moment_bound: float = 0.1
     reference_reach: float = 0.03
-    contact_reach: float = 0.002
+    contact_reach: float = TOUCHES
     settling_reach: float = 0.015
     stance_height: float = SWINGS
     swing_speed: float = 1.0
