@@ -45,8 +45,9 @@ from controllers.work_array import work_array
 LED = 7
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
-_LEAST_TRAVEL = 0.5  # [m] least length of a lap
-_LARGEST_TURN = np.deg2rad(30.0)  # [rad] largest turn of a lap
+LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
+"""Least length [m] and largest turn [rad] of a lap that is led; `models.mocap.preparation.laps` cuts laps by them."""
+
 _UPRIGHT = 0.015  # [rad] lean below which the root is hardly lowered
 _STOOP = 2.0  # lowering of the root over the rise of the outer hip; above 1, since in bends feet also swing outwards
 
@@ -254,10 +255,10 @@ class Led(HapticMap):
         self.phase = phase
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration
-        if self.stride < _LEAST_TRAVEL or abs(turn) > _LARGEST_TURN:
+        if self.stride < LEAST_TRAVEL or abs(turn) > LARGEST_TURN:
             raise ParameterError(
-                f"a clip that is led must go somewhere: {_LEAST_TRAVEL} m or more a lap, turning by at most "
-                f"{np.degrees(_LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
+                f"a clip that is led must go somewhere: {LEAST_TRAVEL} m or more a lap, turning by at most "
+                f"{np.degrees(LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
                 f"{np.degrees(turn):.0f}°. Walk and run do"
             )
         samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))

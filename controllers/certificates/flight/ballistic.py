@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.certificates.flight.flight_fit import (
+    SHORTEST_FLIGHT,
     FlightFit,
     Mask,
     best_fall,
@@ -156,7 +157,8 @@ def ballistic_verdict(
         f"gravity is {GRAVITY} m/s², without drag, on the figure's own size and mass",
         f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
         "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
-        "flights are what contacts of feet, hands and other parts leave, of five frames and 0.08 s or more",
+        "flights are what contacts of feet, hands and other parts leave, of five frames and "
+        f"{SHORTEST_FLIGHT} s or more",
         f"a turn about the vertical of up to {9.4 * np.rad2deg(tolerance.yaw):.0f}° that begins and ends in the air "
         "is not noticed",
     )

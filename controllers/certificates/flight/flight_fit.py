@@ -17,7 +17,7 @@ from controllers.state import Array, Mask
 
 NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 FEWEST = 5  # frames of a flight: two more than a parabola has coefficients
-_SHORTEST = 0.08  # [s] a shorter gap in support is a foot that rolls over, not a flight
+SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support is a foot that rolls over; `bounds` in models has the same
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[True], supported, [True]]).astype(np.int8)))
     spans = [(max(int(a) - 1, 0), min(int(b), len(supported) - 1)) for a, b in edges.reshape(-1, 2)]
-    return [(a, b) for a, b in spans if b - a + 1 >= FEWEST and (b - a) / fps >= _SHORTEST]
+    return [(a, b) for a, b in spans if b - a + 1 >= FEWEST and (b - a) / fps >= SHORTEST_FLIGHT]
 
 
 def fit_flight(

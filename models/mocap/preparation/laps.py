@@ -24,7 +24,7 @@ from models.mocap.motion.clip import CLOSES, Clip
 # moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
 _TIME, _LENGTH = 0.1, 0.5
 _SHORTEST = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44
-_TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest change of heading of a lap
+LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)  # [m], change of heading [rad] of a lap; `led` asks for the same
 _MOST_FRAMES = 1200  # frames that are compared with each other, at most: a matrix of them takes 12 MB
 
 
@@ -58,7 +58,7 @@ def lap_of(clip: Clip) -> Lap:
     travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
     turn = np.abs(headings[:, None] - headings)
     later = frames[None, :] - frames[:, None]
-    lap = (later >= _SHORTEST * clip.fps) & (travel >= _TRAVEL) & (turn <= _TURN)
+    lap = (later >= _SHORTEST * clip.fps) & (travel >= LEAST_TRAVEL) & (turn <= LARGEST_TURN)
     planted = contacts(clip).planted
     for foot in range(planted.shape[1]):
         stood = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]

@@ -25,6 +25,7 @@ from models.mocap.preparation.bounds import (
     RESIDUAL,
     REST,
     SEAM,
+    SHORTEST_FLIGHT,
     SKATE,
 )
 from models.mocap.preparation.feasible import Borne, borne
@@ -36,7 +37,6 @@ _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
 _UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
 ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
-_SHORT_FLIGHT = 0.08  # least duration of a flight [s]: in a shorter gap of support a foot rolls over (`flight_fit`)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class WellFormed:
     seam : float
         RMS over the joints of the difference of the ends' velocities if closed, else of the larger velocity [rad/s].
     flights : int
-        How often nothing touches the floor for more than 0.08 s.
+        How often nothing touches the floor for more than `SHORTEST_FLIGHT`.
     falling : float
         RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
@@ -203,7 +203,7 @@ def _flights(clip: Clip) -> tuple[int, float]:
         return 0, 0.0
     flying = ~contacts(clip).supported
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flying.astype(int), [0]))))
-    spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > _SHORT_FLIGHT * clip.fps]
+    spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > SHORTEST_FLIGHT * clip.fps]
     if not spans:
         return 0, 0.0
     com = momentum(clip).com
