@@ -44,9 +44,8 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
-# [s] shortest flight between steps, and shortest swing phase or hop: half or twice of it changes none of eight
-# captures.
-_BLINK, _SWING = 0.05, 0.15
+BLINK = 0.05  # [s] shortest flight that counts: half or twice of it changes none of eight captures that are led
+_SWING = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
 _FLYING_LATERAL = 1.2
 # Largest pace of a gait with flights, over the clip's own: played faster it lands late, since gravity stays the same.
@@ -133,7 +132,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
 
     Contact marks are cleaned in three steps. A foot that is up for less than `_SWING` stands throughout. Where no foot
     is settled, one that stood and is still planted goes on standing: it has not left the floor, but sunk into it. A
-    flight shorter than `_BLINK` is none: the feet that stood before it go on standing.
+    flight shorter than `BLINK` is none: the feet that stood before it go on standing.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
@@ -147,7 +146,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
             if not stands[sample % n].any():
                 break
     for start, end in runs(~np.any(stands, axis=1)):
-        if end - start < _BLINK * fps:
+        if end - start < BLINK * fps:
             stands[np.arange(start, end) % n] = stands[start - 1]
     return stands
 

@@ -30,6 +30,7 @@ from experiments.setups.hands import (
     turning_remark,
     user_hand,
 )
+from experiments.setups.lead import BLINK
 from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from models.mocap.dynamics.contacts import contacts
@@ -42,7 +43,6 @@ REACH = 1.8
 # Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
 OUTSIDE = 2.2
 EASE = 1.0  # [s] in which the bent curve comes up to its pace: a body in mid-step cannot go on at full speed at once
-_BLINK = 0.05  # [s] airborne phases up to this long are not taken for flights
 _BEND = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 
 
@@ -137,7 +137,7 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
     for clip in clips:
         air = ~contacts(clip).supported
         longest = max((len(run) for run in "".join("x" if flies else " " for flies in air).split()), default=0)
-        if longest <= _BLINK * clip.fps:
+        if longest <= BLINK * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.
