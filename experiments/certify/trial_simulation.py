@@ -232,6 +232,10 @@ class Conditions:
     start: float = START
 
 
+EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+"""The conditions of a run: the world's own integrator, quantised encoders and Coulomb friction."""
+
+
 def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
     """Displacement across the curve from the trial's place at each tick [m], shape (n, 3); see `hand_path`."""
     tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))

@@ -7,7 +7,6 @@ are released with random offsets and velocities. ``python -m experiments.studies
 from pathlib import Path
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import tyro
 
@@ -17,7 +16,7 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
+from experiments.certify.trial_simulation import EVERYTHING, LAP, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
 
@@ -27,7 +26,6 @@ LEFT = 0.2  # remaining share of the slowest mode at the end of a simulation, un
 LONGEST = 2000  # [ticks] longest simulation
 COUNTS = 5e-5  # [m] by which readings of a hand at rest change: one or two encoder counts
 ASSUMED = Conditions(16)
-EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 
 
 class Certified(NamedTuple):

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import tyro
 
@@ -22,12 +21,11 @@ from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.certify.certify import certified_rivers
-from experiments.certify.trial_simulation import Conditions, Trial, hand_path
+from experiments.certify.trial_simulation import EVERYTHING, Trial, hand_path
 from experiments.config.run_config import RunConfig
 
 CONFIG, HANDS = RunConfig(), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400
-EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 
 
 class Outcome(NamedTuple):

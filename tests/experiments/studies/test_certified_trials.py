@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from experiments.certify.trial_simulation import EVERYTHING
 from experiments.studies import certified_trials
-from experiments.studies.certified_trials import ASSUMED, EVERYTHING, Let, draw_certified, let_go
+from experiments.studies.certified_trials import ASSUMED, Let, draw_certified, let_go
 
 
 @pytest.fixture(scope="module")

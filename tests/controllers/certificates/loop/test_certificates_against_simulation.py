@@ -14,7 +14,15 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
+from experiments.certify.trial_simulation import (
+    EVERYTHING,
+    LAP,
+    Conditions,
+    Trial,
+    draw_trial,
+    hand_path,
+    simulate,
+)
 from experiments.studies.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
 from sim.users.hand.arm import Arm
 
@@ -23,7 +31,6 @@ pytestmark = pytest.mark.slow
 CIRCLE = Trajectory.circle(0.0477, 4.0)
 STILL = Trajectory.circle(0.0477, LAP)
 RIVER = River(FOLLOW_LAW, 300.0, 4.0, 0.25, CIRCLE, phantom_device(), Sampling(1e-3))
-EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 
 
 def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
