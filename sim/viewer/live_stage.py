@@ -14,6 +14,7 @@ import viser
 from controllers.state import Array
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
+from sim.viewer.framing import TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_shapes, coarser, tube
 from sim.viewer.shown import Shown
@@ -25,7 +26,6 @@ METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] drawn length below which a force is hidden
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force of a field slice
 FOLLOWS = 0.5  # [s] time constant with which the view follows a travelling figure
-TRAVELS = 1.5  # [m] distance from its start beyond which a figure is followed
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] mesh resolution, coarse enough for a phone
 LEAPS = 3.0  # [m] distance from the view's position beyond which a figure was relocated, not moved
 
@@ -159,8 +159,8 @@ class LiveStage:
             self._origin = place.copy()
         way = place - self._origin
         if np.linalg.norm(way - self._followed) > LEAPS:
-            self._followed = way if np.linalg.norm(way) > TRAVELS else np.zeros(2)
-        elif np.linalg.norm(way) > TRAVELS or np.any(self._followed != 0.0):
+            self._followed = way if np.linalg.norm(way) > TRAVEL else np.zeros(2)
+        elif np.linalg.norm(way) > TRAVEL or np.any(self._followed != 0.0):
             share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)
             self._followed = self._followed + share * (way - self._followed)
         self._t = t
