@@ -4,9 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
 from experiments.config.part import above, at_least, part
-
-STIFFEST, MOST_DAMPED = 1e6, 1e4  # [N/m], [N s/m] no device gives more, and certificates search no further
 
 
 @part
@@ -35,7 +34,7 @@ class SpeedGovernor:
         Of the hand's speed beyond what is admissible [N s/m].
     """
 
-    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
 
 
 @part
@@ -77,8 +76,8 @@ class Follow:
     """
 
     kind: Literal["follow"] = "follow"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     flow: Literal["curve", "parallel"] | None = None
     orientation: OrientationMoment | None = None
@@ -107,8 +106,8 @@ class Bunny:
     """
 
     kind: Literal["bunny"] = "bunny"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
     bunny_width: float = at_least(1e-4, default=0.05, unit="m")
     bunny_attraction: Literal["point", "along", "convolution"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
@@ -137,8 +136,8 @@ class Rivers:
     """
 
     kind: Literal["rivers"] = "rivers"
-    stiffness: float | None = above(0.0, default=None, unit="N/m", most=STIFFEST)
-    damping: float | None = above(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    stiffness: float | None = above(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
+    damping: float | None = above(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
     river_tube: float = at_least(1e-4, default=0.015, unit="m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     orientation: OrientationMoment | None = None
@@ -170,9 +169,9 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MOST_STIFFNESS)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
     rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
@@ -194,14 +193,14 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MOST_STIFFNESS)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
     rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     walls: JointWalls | None = None
 
@@ -221,8 +220,8 @@ class Lead:
     """
 
     kind: Literal["lead"] = "lead"
-    leash: float = at_least(0.0, default=120.0, unit="N/m", most=STIFFEST)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
+    leash: float = at_least(0.0, default=120.0, unit="N/m", most=MOST_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
     floor_scale: float | None = at_least(1e-3, default=None)
 
 

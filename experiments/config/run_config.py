@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
 
+from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Led, Map
-from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Lead, Mode, StretchThenFollow
+from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
@@ -296,8 +297,8 @@ class ArmConfig:
     user: Literal["relaxed", "push"] = "push"
     seconds: Annotated[float, at_least(1.5, unit="s")] = 12.0
     seed: Annotated[int, whole(0)] = 1
-    stiffness: Annotated[float, at_least(0.0, unit="N/m", most=STIFFEST)] = 300.0
-    damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPED)] = 8.0
+    stiffness: Annotated[float, at_least(0.0, unit="N/m", most=MOST_STIFFNESS)] = 300.0
+    damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPING)] = 8.0
     tube: Annotated[float, at_least(1e-4, unit="m", infinite=True)] = 0.25
     lap: Annotated[float, above(0.0, unit="s")] = 4.0
     radius: Annotated[float, above(0.0, unit="m")] = 0.05

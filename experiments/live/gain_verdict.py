@@ -12,9 +12,10 @@ import numpy as np
 
 from controllers.certificates.loop.governed import most_drag
 from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.largest_gains import MOST_STIFFNESS
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import MOST_STIFFNESS, River, critical_stiffness, lap_multipliers
+from controllers.certificates.loop.stability import River, critical_stiffness, lap_multipliers
 from controllers.certificates.report import Outcome, Verdict, leaving_out
 from controllers.errors import ControllerError
 from experiments.certify.certify import certified_rivers

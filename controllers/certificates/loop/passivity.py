@@ -13,6 +13,7 @@ the directions across the curve; both conditions are for one axis and are applie
 import numpy as np
 
 from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.largest_gains import MOST_STIFFNESS
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
@@ -23,7 +24,6 @@ from controllers.state import Array
 DIRECTIONS = 24  # directions across the curve, over half a turn: half or four times as many need the same damping
 # Number of frequencies up to the Nyquist frequency, where most damping is needed; a quarter of them gives the same.
 FREQUENCIES = 4000
-STIFFEST = 1e6  # [N/m] largest of the springs that are tried as counterexamples
 
 
 def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]:
@@ -88,7 +88,7 @@ def passivity(river: River) -> Verdict:
     )
     if margin > 0.0:
         return Verdict("certified", reason, margin, assumptions, {}, figures)
-    for stiffness in np.geomspace(10.0, STIFFEST, 24):
+    for stiffness in np.geomspace(10.0, MOST_STIFFNESS, 24):
         hand = HandImpedance(stiffness=float(stiffness))
         loop = SampledLoop(river.still(hand), river.sampling)
         radius = loop.radius(river.k_r, river.b_d)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
+from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.linear_loop import LinearLoop, linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
@@ -17,7 +18,6 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, Mask
 
-MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] upper ends of the searches, beyond any device
 GRID = 40  # gains on the grid before bisection: half or twice as many find the same critical gains along a bent curve
 # Phases of the curve at which the loop is examined: with eight times as many critical gains are 0.1 % lower.
 PHASES = 48
