@@ -22,7 +22,7 @@ from models.mocap.dynamics.floor_forces import Demand, Floor, residual
 
 DEGREE = 5
 _STRONG = 0.8  # share of the torque limits beyond which effort is also strain: a fifth is left for the feedback
-_LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
+LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
 MARGIN = 0.02  # kept from the joints' limits [rad]
 
 
@@ -201,7 +201,7 @@ class Motion:
         for stance in task.stances:
             now = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
             self._standing[now, stance.sphere] = True
-            firm = (task.times > stance.start + _LAG) & (task.times < stance.end - _LAG)
+            firm = (task.times > stance.start + LAG) & (task.times < stance.end - LAG)
             self._pushing[firm, stance.sphere] = True
             self._places[now, stance.sphere, :2] = stance.place
         misfit = (task.sketch - self._offsets[0]).ravel()

@@ -18,6 +18,7 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
+from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.poses import around, sole_points
 
@@ -29,7 +30,6 @@ _SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's spe
 _LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
 _REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot whose stance is extended [m]
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
-_LAG = 0.012  # a sphere stands this long before and after it may bear load [s]
 _LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
 _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
@@ -96,7 +96,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     heights = points[:, :, 2] - CONTACT_RADIUS
     lowest = heights.min(axis=1, keepdims=True)
     sliding = bare[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
-    lag = max(1, round(_LAG * fps))
+    lag = max(1, round(LAG * fps))
     firm = standing.copy()
     for shift in range(1, lag + 1):
         firm[shift:] &= standing[:-shift]
