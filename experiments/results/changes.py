@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.results.blocks import ROWS
 from sim.recording.recording import Recording
 from sim.reference.transition import DWELL
-
-ROWS = 100_000  # rows of the recording that are read at a time
 
 
 class RiverChange(NamedTuple):

@@ -3,9 +3,8 @@
 import numpy as np
 
 from controllers.safety.faults import Fault, LatchedFault
+from experiments.results.blocks import ROWS
 from sim.recording.recording import Recording
-
-_ROWS = 100_000  # rows of the recording that are read at a time
 
 
 def fault_lines(recording: Recording) -> tuple[str, ...]:
@@ -15,8 +14,8 @@ def fault_lines(recording: Recording) -> tuple[str, ...]:
         return ()
     lines: list[str] = []
     before, gaps = 0.0, 0
-    for first in range(0, len(ticks["t"]), _ROWS):
-        rows = slice(first, first + _ROWS)
+    for first in range(0, len(ticks["t"]), ROWS):
+        rows = slice(first, first + ROWS)
         codes, gaps = ticks["fault"][rows], int(ticks["gaps"][rows][-1])
         changes = np.flatnonzero(np.diff(codes, prepend=before) != 0.0)
         for row in changes[codes[changes] != 0.0]:

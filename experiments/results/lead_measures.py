@@ -9,12 +9,12 @@ from controllers.state import Array, IntArray
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from controllers.walking.walker import walker_at
+from experiments.results.blocks import BLOCK_FRAMES
 from experiments.results.soles import Soles
 from models.humanoid.skeleton import N_POSE
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
 
-BLOCK_FRAMES = 2000
 _FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] weighted equally in the search for the nearest earlier pose
 _REMEMBERED = 6000  # poses kept of the way forwards, one per centimetre of the path
 

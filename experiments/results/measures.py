@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from controllers.state import Array, Mask
+from experiments.results.blocks import BLOCK_FRAMES, BLOCK_ROWS
 from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
 from experiments.results.figure_measure import FigureMeasure, MeanSquare
@@ -33,8 +34,6 @@ SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has 
 HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
 STILL = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
-BLOCK_FRAMES = 2000  # frames of the figure that are read at a time
-BLOCK_ROWS = 16_000  # ticks that are read at a time
 _TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 

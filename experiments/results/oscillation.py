@@ -18,10 +18,10 @@ import numpy as np
 
 from controllers.safety.oscillation import OscillationDetector, shaken
 from controllers.state import Array, Mask
+from experiments.results.blocks import BLOCK_ROWS
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
-_ROWS = 16_000  # rows of the recording that are read at a time
 # At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; above the critical gain it does not stop.
 _SHAKEN = 0.25  # [s] of uninterrupted shaking from which it is reported
 _WINDOW = 0.02  # [s] over which the envelope of the motion is averaged
@@ -91,8 +91,8 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
     detector, measure = OscillationDetector(period), _Fast(period)
     memory: list[float] = detector.fresh_memory().tolist()
     count, unbroken, since, n = 0, 0, math.nan, len(ticks["t"])
-    for first in range(0, n, _ROWS):
-        rows = slice(first, first + _ROWS)
+    for first in range(0, n, BLOCK_ROWS):
+        rows = slice(first, first + BLOCK_ROWS)
         force = np.nan_to_num(ticks["force"][rows])
         found = shaken(detector, force, memory)
         p, nearest = ticks["p"][rows], ticks["nearest"][rows]

@@ -8,11 +8,11 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
 from controllers.state import Array
+from experiments.results.blocks import ROWS
 from experiments.results.measures import Span, measured
 from experiments.results.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
 from sim.recording.recording import Channel, Recording
 
-_ROWS = 100_000  # rows of the recording that are read at a time
 _CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
 _HELD = 1e-9  # [m] distance from the stylus below which a point of the curve counts as held
 
@@ -79,8 +79,8 @@ def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]
     """First tick of every press, and the first tick after it."""
     edges: list[int] = []
     pressed = False
-    for first in range(0, len(switch), _ROWS):
-        down = (switch[first : first + _ROWS] > 0.5) & (t[first : first + _ROWS] < until)
+    for first in range(0, len(switch), ROWS):
+        down = (switch[first : first + ROWS] > 0.5) & (t[first : first + ROWS] < until)
         edges.extend(int(edge) + first for edge in np.flatnonzero(np.diff(down, prepend=pressed)))
         pressed = bool(down[-1])
     if len(edges) % 2:

@@ -18,6 +18,7 @@ from experiments.console.foresight import SIMULATING, check_length, foreseen
 from experiments.console.working import keep_seconds, simulating
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
+from experiments.results.blocks import BLOCK_FRAMES
 from experiments.results.folder import (
     CONFIG,
     DEFAULT,
@@ -30,7 +31,7 @@ from experiments.results.folder import (
     claimed,
     clear_folder,
 )
-from experiments.results.measures import BLOCK_FRAMES, summarise
+from experiments.results.measures import summarise
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import SpeedSummary
 from experiments.setups.default_animation import default_poses

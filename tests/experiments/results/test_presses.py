@@ -74,7 +74,7 @@ def test_the_default_tour_is_told_as_the_field_keeps_it(tmp_path: Path, monkeypa
     field, memory, recording = recorded(tmp_path / "run.h5", grabs, 14.2)
     with recording:
         presses = press_summaries(recording, CURVE, EPSILON)
-        monkeypatch.setattr(stretch_measures, "_ROWS", 777)
+        monkeypatch.setattr(stretch_measures, "ROWS", 777)
         assert press_summaries(recording, CURVE, EPSILON) == presses
         assert [press.what for press in press_summaries(recording, CURVE, EPSILON, 6.0)] == ["held"]
     assert [press.what for press in presses] == ["held", "held", "undo", "redo", "pushed"]
