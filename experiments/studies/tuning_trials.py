@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from controllers.state import Array
+from experiments.trials.analysis.mixed_model import LEVEL
 from experiments.tuning.tune_config import TuneConfig, read_tuning
 from experiments.tuning.tuning import Tuned, run_tuning
-
-LEVEL = 0.95
 
 
 def replication(config: TuneConfig, number: int) -> TuneConfig:

@@ -14,12 +14,12 @@ from controllers.state import Array
 from experiments.certify.certify import certified_rivers
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import RunConfig
+from experiments.trials.analysis.statistics import RESAMPLES
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
 from experiments.tuning.tune_config import TuneConfig
 
 HALF = 0.5  # share of the critical gain: Ziegler and Nichols, "Optimum settings for automatic controllers", 1942
-RESAMPLES = 4999
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from experiments.trials.analysis.interactions import interactions_of
 from experiments.trials.analysis.mixed_model import LEVEL, NO_FIT, Fit, fitted
 
 RESAMPLES = 4999
+"""Bootstrap resamples, such that the ends of an interval fall on one: (4999 + 1) × 2.5 % is whole (Davison & Hinkley
+1997, Bootstrap methods and their application)."""
 
 
 @dataclass(frozen=True)
