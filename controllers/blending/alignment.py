@@ -10,8 +10,10 @@ from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 
+LARGEST_LEAD = 0.125  # share of the lap by which a warp leads or lags at most
+
 _SAMPLES = 128
-_BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
+_BAND = int(LARGEST_LEAD * _SAMPLES)
 _STEEPEST = 0.25  # and changes the pace by at most a quarter
 # Weight of stance relative to rotations: cheer with ginga slides 1.0 cm, with half of it as well, with twice 0.7.
 _STANCE = 2.0

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from controllers.blending.alignment import LARGEST_LEAD
 from controllers.easing import smooth_steps
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
 from controllers.state import Array
@@ -17,7 +18,7 @@ from controllers.state import Array
 SAMPLES = 385  # samples of a motion's features over its duration
 _STEPS = 96  # steps of the lap in the dynamic programme
 _FINE = 4  # leads per step: paces change by quarters of the clip's own
-_BAND = _STEPS * _FINE // 8  # the warp leads or lags by at most an eighth of the lap
+_BAND = int(LARGEST_LEAD * _STEPS * _FINE)
 _CHANGES = np.arange(-2, 3)  # changes of the lead in a step: paces 0.5 to 1.5
 _STEEPEST = 0.4  # largest change of the pace after smoothing
 _COST = 0.02  # cost of a change of pace by a quarter, as a share of the mean mismatch; grows with its square
