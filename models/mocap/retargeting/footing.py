@@ -19,11 +19,19 @@ _LEVEL = 0.06
 # Quantile of the heights of level soles that is the floor: half of it moves the floor of 19 captures by 2 mm, twice
 # by 4 (10 in one of them).
 _SHARE = 0.25
-_STILL = 0.4  # largest speed of a standing sole [m/s]
+# Largest speed of a standing sole [m/s]: with half of it the slope of one of 17 captures goes unseen, twice moves
+# floors by 2 mm.
+_STILL = 0.4
 _SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
-_STEPS, _SURE = 4, 3.0  # least number of stances; least slope in standard errors
-_SLOPE = np.deg2rad((0.5, 8.0))  # smaller slopes are none, larger ones are not due to calibration
-_UNEVEN = 0.025  # RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]
+# Least number of stances; least slope in standard errors. Half of each changes none of 17 captures, twice leaves one of
+# them its slope.
+_STEPS, _SURE = 4, 3.0
+# Smaller slopes are none, larger ones are not due to calibration. With 1° two of 17 captures keep theirs; 0.25, 4 or
+# 16° change none.
+_SLOPE = np.deg2rad((0.5, 8.0))
+# RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]: half or twice changes none of
+# 17 captures.
+_UNEVEN = 0.025
 # Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
 # than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
