@@ -14,8 +14,11 @@ from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
 from models.mocap.motion.clip import Clip
 
-_CERTAIN = 0.005  # height below which a part touches at any speed [m]
+# Height below which a part touches at any speed [m]: half or twice changes whether a body is supported in 0.8 % of the
+# frames of 17 captures.
+_CERTAIN = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
+# Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
 _REACH, _HAND_REACH = 0.06, 0.12
 # Speed below which it rests [m/s]: soles slip and roll more slowly in stance, and pass faster in swing. Knees of
 # eight led captures accelerate by up to 1040 rad/s², with half of it 700 (and roots 1 cm lower), with twice 2090; the
@@ -23,7 +26,9 @@ _REACH, _HAND_REACH = 0.06, 0.12
 _SLOW = 0.6
 # Largest height of a settled foot over the median of its stance [m]: half or twice of it moves led slides by 0.7 cm.
 _HIGHER = 0.005
-_LOW, _LEVEL = 0.03, 0.25  # a part below this height [m] and vertical speed [m/s] slides over the floor
+# A part below this height [m] and vertical speed [m/s] slides over the floor. Half of the first changes whether a body
+# is supported in 1.2 % of these frames, twice in 0.2 %; half or twice of the second in 0.6 %.
+_LOW, _LEVEL = 0.03, 0.25
 
 
 class Contacts(NamedTuple):

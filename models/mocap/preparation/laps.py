@@ -23,8 +23,10 @@ from models.mocap.motion.clip import CLOSES, Clip
 # Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ decides: half of it loops two of them otherwise and
 # moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
 _TIME, _LENGTH = 0.1, 0.5
-_SHORTEST = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44
-LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)  # [m], change of heading [rad] of a lap; `led` asks for the same
+_SHORTEST = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44; half changes none of 17 captures
+# [m], change of heading [rad] of a lap; `controllers.haptic_map.led` asks for the same. Half or twice of the first, and
+# twice of the second, change no lap of 17 captures; with 15° a hop on the spot is none.
+LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
 _MOST_FRAMES = 1200  # frames that are compared with each other, at most: a matrix of them takes 12 MB
 
 

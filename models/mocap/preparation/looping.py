@@ -20,14 +20,19 @@ from models.mocap.preparation.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
 from models.mocap.preparation.stances import stances
 
-_GAIT, _PLACE = 0.38, 0.30  # largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3
-# Largest d of a clip that its file declares to be cyclic [rad]: half or twice loops 18 and 19 of 19 captures alike.
+# Largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3. Of 17 captures half of the
+# first loops two otherwise, twice one; half of the second none, twice takes a backflip and two kicks for cycles.
+_GAIT, _PLACE = 0.38, 0.30
+# Largest d of a clip that its file declares to be cyclic [rad]: of 17 captures half loops a run otherwise, twice closes
+# a backflip and a kick.
 _WRAPS = 0.45
 # Share of the clip's frames that must have a frame of the cycle within this d [rad]. A share of 0.5 loops all of 19
 # captures alike, 0.9 one otherwise; half of d leaves CMU 01_01 open, twice takes a dance for a cycle.
 _COVERS, _NEAR = 0.7, 0.35
 _LIVELY = 0.7  # least mean speed of a cycle over the clip's: standing still is none; half of it loops 19 captures alike
-_MIRRORED = 0.25  # largest d of the mirrored ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3
+# Largest d of the mirrored ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3. Twice changes none of
+# 17 captures, half leaves a run open.
+_MIRRORED = 0.25
 _HALF = 0.25  # least duration of half a stride [s]: sprinters take 0.22
 # Speed of the root at both ends above which it cannot be brought to rest quickly [m/s]; of 19 captures none is near.
 _FAST = 1.0
@@ -45,7 +50,7 @@ _STEP, _YAW = 0.10, np.deg2rad(15.0)
 # each m/s of its speed, up to the last number.
 _REST = 0.35
 _REST_LONGER, _REST_LONGEST = 0.2, 0.8
-_FRAMES = 500  # frames compared with each other, about: a matrix of them takes 2 MB
+_FRAMES = 500  # frames compared with each other, about: a matrix takes 2 MB; half or twice loops 17 captures alike
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
 
