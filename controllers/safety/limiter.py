@@ -10,6 +10,9 @@ from controllers.safety.faults import FORCE_NOT_FINITE, LIMITER_NOT_FINITE
 from controllers.state import Array
 
 _CONTINUOUS, _PEAK, _SHARE, _STEP = range(4)
+THERMAL_TIME = 10.0
+"""Thermal time constant of a motor's winding [s]: the RE 25's is of this order."""
+
 LIMITER_HEAT, LIMITER_FORCE, LIMITER_FAULT, LIMITER_SIZE = 0, 1, 4, 5
 
 
@@ -132,7 +135,7 @@ class ForceLimiter:
     period: float
     continuous: float = 1.5
     peak: float = 8.5
-    thermal_time: float = 10.0
+    thermal_time: float = THERMAL_TIME
     slew: float = 5000.0
 
     def __post_init__(self) -> None:

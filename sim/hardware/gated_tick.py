@@ -9,7 +9,7 @@ from controllers.safety.arming import pushes
 from controllers.safety.energy_tank import book_force
 from controllers.safety.faults import FAULT_CODE, Fault, latch
 from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
-from controllers.safety.limiter import LIMITER_FORCE
+from controllers.safety.limiter import LIMITER_FORCE, THERMAL_TIME
 from controllers.safety.thermal import hold_to_heat
 from controllers.state import HAND_TIME, Array
 from models.phantom.dynamics import gravity_torques
@@ -19,8 +19,6 @@ from sim.devices.exchange import COMMAND_FAULT, COMMAND_FORCE, COMMAND_TORQUE, E
 from sim.world.encoders import ANGLES, PEAK_TORQUE, motor_torques
 
 CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
-THERMAL_TIME = 10.0
-"""Thermal time constant of a motor's winding [s]: the RE 25's is of this order."""
 HOT = 0.98
 """Share of a motor's heat capacity above which a fault is latched."""
 
