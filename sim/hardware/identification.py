@@ -60,7 +60,7 @@ _SMOOTH = 4  # readings on either side over which the rate that gives the direct
 _SLOWEST = 0.1  # [rad/s] rate below which that direction is uncertain
 _STEPS = 12  # Gauss–Newton steps
 _LONGEST = 1.999  # longest delay, in periods, for which the equations hold torques
-_LAGS = 4  # number of following windows that share noise with one, since windows overlap
+_LAGS = round(1.0 / _HOP)  # number of following windows that share noise with one: those that begin before it ends
 CONFIDENCE = 0.95
 """Joint confidence level of all intervals."""
 _DIFFERENCES, _GAIN = 6, 924  # order of the differences, and their gain on the variance of white noise: 12 over 6

@@ -9,9 +9,8 @@ from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 
-_PASSES = (
-    0.802  # a second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off (Winter)
-)
+# A second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off, (√2 − 1)^¼ (Winter).
+_PASSES = 0.802
 
 
 def plus(poses: Array, tangents: Array) -> Array:
