@@ -38,8 +38,12 @@ from controllers.state import Array
 
 SERIES = 12  # terms of the exponential of a period: the remainder is below 1e-9 while b_h T/μ < 1
 LENGTH = 0.01  # [m] scale of the forms, for conditioning
-MASSES = 3  # masses at which the optimisation imposes the decrease; the check imposes it everywhere
+# Masses at which the optimisation imposes the decrease, with 2 or 6 as well; the check imposes it everywhere.
+MASSES = 3
 _HEAVY, _VISCOUS, _STIFF = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
+# Weights. From 5.0 mm off the demo's curve, or 0.125 m/s, a hand comes within 1.8 mm. Half or twice of the first: 5.0
+# or 4.4 mm and 1.8 or 2.2 mm; of the second: 5.0 or 5.4 and 1.65 or 1.8; half of the third: the same, with twice no
+# form suits all hands.
 FILTER_WEIGHT = 10.0  # weight of the size in the filter's state, which decays in a period or two
 SPEED_WEIGHT = 0.25  # weight of the size in velocity relative to that in position
 PUSH_WEIGHT = 10.0  # weight of the level sustained by the neglected forces relative to size
