@@ -32,6 +32,8 @@ from models.mocap.preparation.feasible import Borne, borne
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
+# Half or twice of either of the next two finds no other frame in the nine embedded clips and 17 captures; of the third,
+# names other faults in 6 and 3 of these 26; of the last two, in none.
 _STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
 _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
 _AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
