@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.legs.limb_ends import end_poses
+from controllers.legs.limb_ends import SHARP, end_poses, lowest_point
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
@@ -41,7 +41,8 @@ def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
 
 def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
     """Degree from 0 to 1 to which an end is in stance (low, and slow over the ground); shape (samples,)."""
-    place, _, height = (part[:, 0] for part in end_poses(channels[:, None], limb))
+    place, quaternions = (part[:, 0] for part in end_poses(channels[:, None], limb))
+    height = place[:, 2] + lowest_point(quaternions, limb, SHARP)
     ahead, behind = (np.roll(place, shift, axis=0) for shift in (-1, 1))
     across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
     # The velocity over the ground is that of the drift plus that in the frame of the drift.

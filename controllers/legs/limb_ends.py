@@ -19,12 +19,11 @@ SHARP = 5e-4
 """Softness of the minimum of a sole's heights where feet are planted or the ground is estimated [m]: four level points
 count 0.7 mm (ln 4 of it) lower."""
 
-_SOFTNESS = 0.003  # [m] the same in the map, where heights must be smooth: 4 mm lower
 _RARE = 0.02  # share of frames in which a clip may be below the ground that is estimated from it
 
 
-def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
-    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq), and height (n, m)."""
+def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
+    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq)."""
     n, m, numbers = channels.shape
     if max(limb.joints) > (numbers - 7) // 4:
         raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb wants {limb.joints}")
@@ -32,24 +31,18 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
     for joint, offset in zip(limb.joints, limb.offsets, strict=True):
         place = place + turn.apply(offset)
         turn = turn * _rotations(channels, joint)
-    height = place[:, 2] + _lowest(turn, limb.points, _SOFTNESS)
     place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
     dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
     quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
-    return place.reshape(n, m, 3), quaternions, height.reshape(n, m)
-
-
-def _lowest(turn: Rotation, points: Array, softness: float) -> Array:
-    """Height of the lowest of points over the origin of their turned frame: a soft minimum, which is smooth."""
-    heights = np.stack([turn.apply(point)[..., 2] for point in points])
-    return -softness * np.log(np.exp(-heights / softness).sum(axis=0))
+    return place.reshape(n, m, 3), quaternions
 
 
 def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
-    """Height of a limb's lowest point over the centre of its points, with the end's orientations (..., 4)."""
+    """Height of a limb's lowest point over the centre of its points, a soft minimum; orientations (..., 4)."""
     turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
-    return _lowest(turn, limb.points - limb.points.mean(axis=0), softness).reshape(quaternions.shape[:-1])
+    heights = np.stack([turn.apply(point)[:, 2] for point in limb.points - limb.points.mean(axis=0)])
+    return (-softness * np.log(np.exp(-heights / softness).sum(axis=0))).reshape(quaternions.shape[:-1])
 
 
 def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
@@ -144,7 +137,7 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     ParameterError
         If the poses lack a joint of the limb.
     """
-    place, quaternions, _ = end_poses(channels, limb)
+    place, quaternions = end_poses(channels, limb)
     shift, angle = plane_exponential(lag[:, None, None] * drifts)
     place[..., :2] = turned(-angle, place[..., :2] - shift)
     lags = np.broadcast_to(lag[:, None, None], (*place.shape[:2], 1))
