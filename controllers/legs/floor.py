@@ -2,8 +2,8 @@ r"""Floor constraint of a blend: feet do not go below the lowest point of all cl
 
 With l = z + m(R s_k) the height of an end (foot), m a soft minimum over its points s_k, and l₀ the lowest over all
 clips' frames, the end is raised by S(l₀ − l); S(x) = x³/(x² + s²), 0 for x < 0: C², and within s/2 of x. A clip alone
-is left unchanged. Of 30 hands that wander at random through nine lifted clips the lowest sole is at −12 mm, without this
-constraint at −126.
+is left unchanged. Of 30 hands that wander at random through nine lifted clips the lowest sole is at −12 mm, without
+this constraint at −126.
 """
 
 import numpy as np
