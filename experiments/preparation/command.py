@@ -17,6 +17,7 @@ from models.mocap.preparation.well_formed import WellFormed, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.retarget import Hints
 
+_CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
 _COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 
 
@@ -119,6 +120,10 @@ def changes(made: Prepared) -> tuple[str, ...]:
         )
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+    if made.carried > _CARRIED:
+        lines.append(
+            f"carried over the floor by up to {100 * made.carried:.0f} cm, since a foot that bears the load slides"
+        )
     if not made.near:
         return (*lines, "dynamics and feet as captured")
     lines.append(

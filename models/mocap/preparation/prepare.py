@@ -1,8 +1,13 @@
-"""Pipeline from a motion file to a well-formed clip: load, correct pace, loop, low-pass, detect stances, optimise."""
+"""Pipeline from a motion file to a well-formed clip.
+
+Load, correct the pace, loop, carry the root so that supporting feet rest, low-pass, detect stances, optimise.
+"""
 
 from pathlib import Path
 from time import process_time
 from typing import NamedTuple
+
+import numpy as np
 
 from models.errors import ModelError
 from models.mocap.library import load
@@ -13,6 +18,7 @@ from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import resampled, smoothed
+from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import rested, stances
 from models.mocap.retargeting.retarget import Hints, RetargetReport
 
@@ -37,6 +43,8 @@ class Prepared(NamedTuple):
         Result of the pace correction.
     looped : Looped
         Result of looping, before optimisation.
+    carried : float
+        Largest displacement over the floor by which a supporting foot was kept from sliding (`root_path`) [m].
     feasible : Feasible
         Result of the optimisation.
     fidelity : Fidelity
@@ -53,6 +61,7 @@ class Prepared(NamedTuple):
     report: RetargetReport | None
     paced: Paced
     looped: Looped
+    carried: float
     feasible: Feasible
     fidelity: Fidelity
     seconds: float
@@ -91,11 +100,14 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
         raise ModelError(
             f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, or --loop START:END of a part"
         )
-    smooth = smoothed(cycle.clip, _CORNER)
-    schedule = rested(stances(cycle.clip, smooth), cycle.clip)
+    calm = smoothed(cycle.clip, _CORNER)
+    held = on_resting_support(cycle.clip, calm)
+    smooth = smoothed(held, _CORNER)
+    schedule = rested(stances(held, smooth), held)
     made = feasible(smooth, schedule, fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED and made.residual < FLYING
-    taken = made.clip if near else smooth
+    carried = float(np.linalg.norm((held.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
+    taken = made.clip if near else calm
     clip = Clip(taken.poses, taken.fps, captured.name)
     kept = fidelity(clip, captured, cycle, timed.pace)
-    return Prepared(clip, captured, loaded.report, timed, cycle, made, kept, process_time() - began, near)
+    return Prepared(clip, captured, loaded.report, timed, cycle, carried, made, kept, process_time() - began, near)

@@ -4,8 +4,8 @@ Heel and toes of a foot stand while they are near the floor and slow; each stanc
 at rest beside a standing heel stand as well. Where nothing stands although the centre of mass accelerates as if under
 load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the stance came before and on
 the lower part of the foot if it comes after. Without such a stance the lowest part of the feet bears load while
-sliding. An open clip with an upright end rests there on both feet, since nobody can rest on the toes of one, as
-captures may be cut.
+sliding, most of which `root_path` removes before. An open clip with an upright end rests there on both feet, since
+nobody can rest on the toes of one, as captures may be cut.
 """
 
 from typing import NamedTuple
@@ -83,19 +83,13 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     else:
         poses, calm, first = clip.poses, smooth.poses, 0
     points, fps = sole_points(poses), clip.fps
-    parts = _parts(points, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
-    load = _load(calm, fps)
-    for start, end in _runs(_cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)):
-        _bear(points, parts, start, end)
+    parts, load = _support(poses, points, calm, fps)
     turned = global_rotations(poses)
     standing, places = np.repeat(parts, 2, axis=2).reshape(len(points), 8), np.full(points.shape, CONTACT_RADIUS)
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
         _place(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], parts[:, foot], places[:, mine])
-    bare = _cleaned(~standing.any(axis=1) & (load > _LOADED), round(0.03 * fps), 2)
-    heights = points[:, :, 2] - CONTACT_RADIUS
-    lowest = heights.min(axis=1, keepdims=True)
-    sliding = bare[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
+    sliding = _slides(points, parts, load, fps)
     lag = max(1, round(LAG * fps))
     firm = standing.copy()
     for shift in range(1, lag + 1):
@@ -108,6 +102,20 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     kept = _kept(standing, places, round(_KEPT * fps))
     here = slice(first, first + clip.n_frames)
     return Stances(standing[here], pushing[here], places[here], sliding[here] & ~standing[here], kept[here])
+
+
+def sliding_support(poses: Array, calm: Array, fps: float) -> Mask:
+    """Which contact spheres bear load without resting, shape (n, 8).
+
+    Parameters
+    ----------
+    poses, calm : Array
+        Poses as captured, and low-passed, shape (n, 75).
+    fps : float
+        Frame rate [1/s].
+    """
+    points = sole_points(poses)
+    return _slides(points, *_support(poses, points, calm, fps), fps)
 
 
 def rested(schedule: Stances, clip: Clip) -> Stances:
@@ -168,6 +176,27 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
             risen = np.where(swings, _SWING, 0.0) * np.minimum(away / (_RISE * fps), 1.0)
             least[:, sphere] = risen[here]
     return least
+
+
+def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Array]:
+    """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs, and this load (n,)."""
+    parts = _parts(points, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+    load = _load(calm, fps)
+    for start, end in _runs(_bare(parts, load, fps)):
+        _bear(points, parts, start, end)
+    return parts, load
+
+
+def _bare(parts: Mask, load: Array, fps: float) -> Mask:
+    """Where nothing stands under load, shape (n,)."""
+    return _cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)
+
+
+def _slides(points: Array, parts: Mask, load: Array, fps: float) -> Mask:
+    """The lowest spheres where nothing stands under load, shape (n, 8)."""
+    heights = points[:, :, 2] - CONTACT_RADIUS
+    lowest = heights.min(axis=1, keepdims=True)
+    return _bare(parts, load, fps)[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
 
 
 def _parts(points: Array, pace: Array, fps: float) -> Mask:

@@ -1,0 +1,51 @@
+r"""Root path of a capture whose supporting foot slides: the body is carried so that this foot rests.
+
+Where the centre of mass accelerates as under load but nothing on the floor is at rest (`stances.sliding_support`), the
+captured path of the root is wrong by what the supporting foot moves, as where a capture gives rotations of limbs and an
+estimate of the root, or the feet slid on a floor with little friction. Static friction could not bear such a load, and
+kinetic friction would brake the body by μ g. So the velocity of the root over the floor is changed by
+
+.. math:: \Delta v(t) = -(G_\sigma * u)(t) ,
+
+where u is the velocity of the slowest of the spheres that bear the load, zero elsewhere, and G_σ a Gaussian. Other
+stances are then detected on the carried motion. Inertial motion capture without positions finds the root's velocity
+from the supporting foot in the same way (Yi et al. 2021, TransPose, section 3.2).
+"""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation.poses import around, sole_points
+from models.mocap.preparation.stances import sliding_support
+
+_SMOOTHING = 0.04  # σ [s]: about a frame of 30 Hz captures; the optimisation of the dynamics smooths further
+
+
+def on_resting_support(clip: Clip, smooth: Clip) -> Clip:
+    """The clip with its root carried over the floor so that the supporting foot does not slide.
+
+    Parameters
+    ----------
+    clip : Clip
+        The clip as captured; a closed one is extended periodically, and its displacement per lap changes.
+    smooth : Clip
+        The same low-passed.
+    """
+    n = clip.n_frames
+    if clip.closes():
+        poses, first = around(clip, n)
+        calm, _ = around(smooth, n)
+    else:
+        poses, calm, first = clip.poses, smooth.poses, 0
+    bearing = sliding_support(poses, calm, clip.fps)
+    if not bearing.any():
+        return clip
+    velocities = np.gradient(sole_points(calm)[:, :, :2], axis=0) * clip.fps
+    speeds = np.where(bearing, np.linalg.norm(velocities, axis=2), np.inf)
+    slowest = velocities[np.arange(len(poses)), speeds.argmin(axis=1)]
+    slowest[~np.any(bearing, axis=1)] = 0.0
+    drift = gaussian_filter1d(slowest, _SMOOTHING * clip.fps, axis=0)
+    carried = poses[first : first + n].copy()
+    carried[1:, :2] -= np.cumsum(drift[first : first + n - 1], axis=0) / clip.fps
+    return Clip(carried, clip.fps, clip.name)
