@@ -9,7 +9,7 @@ kinetic friction would brake the body by μ g. So the velocity of the root over 
 
 where u is the velocity of the slowest of the spheres that bear the load, zero elsewhere, and G_σ a Gaussian. Other
 stances are then detected on the carried motion. Inertial motion capture without positions finds the root's velocity
-from the supporting foot in the same way (Yi et al. 2021, TransPose, section 3.2).
+from the supporting foot in the same way (Yi et al. 2021, TransPose, ACM Trans. Graph. 40).
 """
 
 import numpy as np
