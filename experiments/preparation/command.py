@@ -18,7 +18,6 @@ from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.retarget import Hints
 
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
-_COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 
 
 class PreparedFile(NamedTuple):
@@ -113,11 +112,6 @@ def changes(made: Prepared) -> tuple[str, ...]:
         "open": "the whole, at rest at both ends",
     }
     lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
-    if made.captured.fps < _COARSE:
-        lines.append(
-            f"in the file a frame lasts {1.0 / made.captured.fps:.2g} s, longer than a camera's: if that is not so, "
-            "correct its Frame Time"
-        )
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
     if made.carried > _CARRIED:

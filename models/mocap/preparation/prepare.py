@@ -20,7 +20,7 @@ from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import rested, stances
-from models.mocap.retargeting.retarget import Hints, RetargetReport
+from models.mocap.retargeting.retarget import COARSE, Hints, RetargetReport
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 _CORNER = 8.0  # low-pass cut-off [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
@@ -87,13 +87,17 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     MotionFileError
         If the file cannot be read, or contradicts itself.
     ModelError
-        If the motion has a single frame, what is taken of it is longer than two minutes, or the loop is not within it.
+        If the motion has a single frame, its frames are so long that it lasts longer than two minutes, what is taken
+        of it does, or the loop is not within it.
     """
     began = process_time()
     loaded = load(path, hints)
     captured = loaded.clip
     if captured.n_frames < 2:
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_LONGEST:.0f} s")
+    if captured.fps < COARSE and captured.duration > _LONGEST:
+        what = f"lasts {captured.duration:.0f} s, since a frame lasts {1.0 / captured.fps:.2g} s"
+        raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}")
     timed = paced(resampled(captured, FPS))
     cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
     if (lasts := cycle.clip.duration) > _LONGEST:

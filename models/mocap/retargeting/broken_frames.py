@@ -40,7 +40,8 @@ class Repaired(NamedTuple):
     frames : tuple of int
         Those frames.
     jumps : tuple of int
-        Frames after which the whole pose jumps nevertheless: a calibration pose in front, or a longer gap.
+        Frames after which the whole pose or its place jumps nevertheless: a calibration pose in front, a longer gap, or
+        a cut between two takes.
     """
 
     motion: SourceMotion
@@ -83,6 +84,7 @@ def repaired(motion: SourceMotion, roles: Roles) -> Repaired:
     left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
     lost = motion.at_rest(used)
     left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
+    left |= _cuts(motion.translations[:, pelvis].sum(axis=1), _WAY * thigh)
     return Repaired(motion, _indices(broken), _indices(left))
 
 
@@ -123,6 +125,13 @@ class _Track:
 def _limits(measures: Array, own: int) -> Array:
     """What a joint's measures exceed in a gap only; the `own` largest, which a gap itself causes, are not counted."""
     return _TIMES * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
+
+
+def _cuts(root: Array, least: float) -> npt.NDArray[np.bool_]:
+    """Steps of the root that are large beside its usual ones and beside both that are next to them, shape (n − 1,)."""
+    ways = _ways(root[:-1], root[1:])
+    beside = np.maximum(np.append(0.0, ways[:-1]), np.append(ways[1:], 0.0))
+    return (ways > least) & (ways > _limits(ways, 2)) & (ways > _TIMES * beside)
 
 
 def _indices(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:

@@ -38,6 +38,7 @@ _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its s
 _STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
 _NAMED = 12  # unused joints that are named: rigs with faces and fingers have hundreds
 _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
+COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -196,7 +197,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
-    remarks = list(_named_gaps(broken, [k for k in jumps if k >= dropped], motion.fps))
+    remarks = list(_named_frames(broken, [k for k in jumps if k >= dropped], motion.fps))
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):
@@ -279,8 +280,10 @@ def _named_endless(lines: BodyLines, roles: Roles) -> str:
     return f"nothing tells where {', '.join(without)} end: how they point is a guess" if without else ""
 
 
-def _named_gaps(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:
-    """Remarks on frames that were lost, and on jumps that are left."""
+def _named_frames(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:
+    """Remarks on frames that are long, on those that were lost, and on jumps that are left."""
+    if fps < COARSE:
+        yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, correct its Frame Time"
     if broken:
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"

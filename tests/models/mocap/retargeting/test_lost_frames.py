@@ -1,15 +1,18 @@
 """What is in a file and is no part of its motion: a calibration pose in front, frames that were lost."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from models.errors import ModelError
 from models.humanoid.skeleton import BODIES
 from models.mocap.library import embedded, embedded_names, load, read_motion
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.preparation.prepare import prepared
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.leading_pose import leading_frames
@@ -167,3 +170,20 @@ def test_a_long_gap_is_said_and_left(walked):
     lost = table.copy()
     lost[12:22] = 0.0
     assert any("the whole body jumps in a frame at 0.37 s, 0.70 s:" in line for line in loaded(lost).report.remarks)
+
+
+def test_a_cut_between_two_takes_is_said(walked):
+    table, loaded = walked
+    cut = table.copy()
+    cut[20:, [0, 2]] += np.abs(table[:, 1]).max()
+    assert not any("jumps" in line for line in loaded(table).report.remarks)
+    assert any("the whole body jumps in a frame at 0.63 s:" in line for line in loaded(cut).report.remarks)
+
+
+def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
+    text = (tmp_path / "r.bvh").read_text()
+    (tmp_path / "r.bvh").write_text(re.sub(r"Frame Time: \S+", "Frame Time: 33.3333", text))
+    told = "a frame lasts 33 s, longer than a camera's: if that is not so, correct its Frame Time"
+    assert told in load(tmp_path / "r.bvh").report.remarks
+    with pytest.raises(ModelError, match=r"since a frame lasts 33 s; expected a Frame Time in seconds, such as"):
+        prepared(tmp_path / "r.bvh")
