@@ -131,7 +131,9 @@ def _wished(clip: Clip, wish: str) -> tuple[int, int]:
     except ValueError:
         raise ModelError(f"--loop {wish!r}; expected auto, open, or START:END in seconds") from None
     if not 0.0 <= start < end - 0.2 <= clip.duration:
-        raise ModelError(f"--loop {wish} of a clip of {clip.duration:.2f} s; expected START ≥ 0, 0.2 s before END")
+        raise ModelError(
+            f"--loop {wish}; expected 0 ≤ START, END 0.2 s later or more, and at {clip.duration:.2f} s at most"
+        )
     return round(start * clip.fps), min(round(end * clip.fps), clip.n_frames - 1)
 
 

@@ -101,9 +101,8 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     timed = paced(resampled(captured, FPS))
     cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
     if (lasts := cycle.clip.duration) > _LONGEST:
-        raise ModelError(
-            f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, or --loop START:END of a part"
-        )
+        part = "or a part of it by `hvf prepare --loop START:END`"
+        raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, {part}")
     calm = smoothed(cycle.clip, _CORNER)
     held = on_resting_support(cycle.clip, calm)
     smooth = smoothed(held, _CORNER)

@@ -284,7 +284,9 @@ def test_a_part_of_a_long_file_can_be_prepared(long_walk):
 
 
 def test_the_whole_of_a_long_file_is_refused(long_walk):
-    with pytest.raises(ModelError, match=r"long.bvh: lasts 13\d.* at most 120 s, or --loop START:END of a part"):
+    with pytest.raises(
+        ModelError, match=r"long.bvh: lasts 13\d.* at most 120 s, or a part of it by `hvf prepare --loop START:END`"
+    ):
         prepared(long_walk, "open")
 
 
