@@ -171,10 +171,10 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     if first:
         rotations, positions = rotations[first:], positions[first:]
         lines = body_lines(motion, roles, positions, rotations)
+    check_bones(motion, roles, positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
-    check_bones(motion, roles, positions)
     roles = with_abdomen(roles, lines, positions)
     frame = None if rest is None else rest - first
     unclear = MotionFileError(

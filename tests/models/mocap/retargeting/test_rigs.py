@@ -258,6 +258,16 @@ def test_a_joint_of_the_arm_that_is_not_known_is_no_twist_joint(motions, tmp_pat
         load(tmp_path / "r.bvh")
 
 
+def test_a_limb_that_is_not_a_humans_is_told_before_what_is_up(motions, tmp_path):
+    """Said what is up, the skeleton would be refused all the same."""
+    clip = motions.whole("backflip", 30.0)
+    write_rig(Rig(), Clip(clip.poses[30:45], clip.fps, "flight"), tmp_path / "r.bvh")
+    text = (tmp_path / "r.bvh").read_text()
+    (tmp_path / "r.bvh").write_text(re.sub("(Left|Right)Arm", r"\1Brachium", text))
+    with pytest.raises(ModelError, match="left upper arm bends at LeftBrachium"):
+        load(tmp_path / "r.bvh")
+
+
 def test_a_zero_pose_in_front_is_left_out(motions, compared, tmp_path):
     check(compared(Rig(leading=1), motions.whole("walk")))
     assert load(tmp_path / "r.bvh").report.dropped == 1
