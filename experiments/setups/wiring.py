@@ -50,8 +50,6 @@ from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
 from sim.world.world import World
 
-MOST_PACE = 1.4  # ratio of played to recorded pace, or its inverse, beyond which a remark is made
-
 Ready = Callable[[tuple[Unit, ...]], None]
 """Called before compiled code is needed, with its units (see `experiments.console.compiling`)."""
 
@@ -137,7 +135,7 @@ def assemble(
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
-    return Session(parts, world, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
+    return Session(parts, world, servo, parts.maps.remarks + parts.remarks)
 
 
 def check_rates(settings: Settings) -> None:
@@ -246,14 +244,3 @@ def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:
     return map_derivative(haptic_map, argument)[:, :3] @ begin.velocity
-
-
-def _pace_remark(maps: MapParts[Any]) -> tuple[str, ...]:
-    """Remark, if a lap plays the clips much faster or slower than they were recorded."""
-    lap, clips = maps.curve.duration, maps.lap_seconds
-    if clips is None or 1.0 / MOST_PACE <= clips / lap <= MOST_PACE:
-        return ()
-    return (
-        f"a lap takes {lap:.1f} s and the clips {clips:.1f} s on average, so they are played {clips / lap:.2g} times "
-        f"as fast; --lap {clips:.1f} plays them at their own pace",
-    )

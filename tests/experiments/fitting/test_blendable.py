@@ -12,6 +12,7 @@ from experiments.config.words import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import grounded, keeps_pace, not_blendable
 from experiments.setups.setups import map_parts
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 
@@ -50,6 +51,11 @@ def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace(kind: str, mode:
     flies, paced = map_parts(config, figure_model()).remarks
     assert flies.startswith("jump flies for 0.")
     assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its own pace")
+
+
+def test_one_lap_is_advised_to_a_run() -> None:
+    session = wire(run_config(map="composite", figure="none", clips=("walk", "cheer", "cheer"), lap=1.2, seconds=1.0))
+    assert sum("--lap" in remark for remark in session.remarks) == 1
 
 
 def test_rivers_that_noise_tells_apart_are_named_before_the_run() -> None:
