@@ -15,6 +15,7 @@ LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motio
 UPRIGHT = -0.5  # least vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
 FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same of clips with flights: these need 0.8 to 1.2 of gravity
 SLOWEST, FASTEST = 0.75, 1.33  # played pace over own: inertial forces go with its square, 0.56 to 1.8
+_SAME = 0.02  # laps that differ by less are the same: `natural_lap` takes the shortest of those
 
 
 def longest_flight(clip: Clip) -> float:
@@ -79,4 +80,5 @@ def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[
         return ()
     closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
     best = natural_lap(led_by(grounded(clips), closed))
-    return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; --lap {best:.1f} suits them best",)
+    better = f"--lap {best:.1f} suits them best" if abs(best / lap - 1.0) > _SAME else "no lap suits them all better"
+    return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; {better}",)

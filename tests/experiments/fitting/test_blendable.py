@@ -8,9 +8,10 @@ import pytest
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.motion.loops import checked_clip, closed_loop
+from controllers.motion.strides import in_step, natural_lap
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import grounded, keeps_pace, not_blendable
+from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace
 from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
@@ -51,6 +52,14 @@ def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace(kind: str, mode:
     flies, paced = map_parts(config, figure_model()).remarks
     assert flies.startswith("jump flies for 0.")
     assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its own pace")
+
+
+def test_the_lap_of_a_run_is_not_advised_to_it() -> None:
+    clips = embedded("angry"), embedded("jump")
+    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    lap = natural_lap(loops)
+    assert off_pace(clips, in_step(loops, 1.1 * lap), 1.1 * lap)[0].endswith(f"; --lap {lap:.1f} suits them best")
+    assert off_pace(clips, in_step(loops, lap), lap)[0].endswith("; no lap suits them all better")
 
 
 def test_one_lap_is_advised_to_a_run() -> None:
