@@ -17,13 +17,12 @@ from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
-from models.mocap.preparation.poses import resampled, smoothed
+from models.mocap.preparation.poses import CORNER, resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import rested, stances
 from models.mocap.retargeting.retarget import COARSE, Hints, RetargetReport
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
-_CORNER = 8.0  # low-pass cut-off [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
 _TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which the result counts as another motion
 _LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
@@ -103,9 +102,9 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     if (lasts := cycle.clip.duration) > _LONGEST:
         part = "or a part of it by `hvf prepare --loop START:END`"
         raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, {part}")
-    calm = smoothed(cycle.clip, _CORNER)
+    calm = smoothed(cycle.clip, CORNER)
     held = on_resting_support(cycle.clip, calm)
-    smooth = smoothed(held, _CORNER)
+    smooth = smoothed(held, CORNER)
     schedule = rested(stances(held, smooth), held)
     made = feasible(smooth, schedule, fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED and made.residual < FLYING
