@@ -3,7 +3,7 @@ import pytest
 
 from experiments.cli import main
 from experiments.preparation import prepared_clip
-from experiments.preparation.command import changes, prepare_file, summary
+from experiments.preparation.command import prepare_file, summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
@@ -269,14 +269,6 @@ def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
     assert (tmp_path / "prepare-walk.html").stat().st_size > 10_000
     again = load(tmp_path / "walk.bvh").clip
     np.testing.assert_allclose(pose_difference(again.poses, made.clip.poses), 0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize(("fps", "doubted"), [(2.0, True), (30.0, False)])
-def test_a_file_of_few_frames_a_second_is_doubted(fps, doubted, tmp_path):
-    write_bvh(Clip(embedded("cheer").poses[:5], fps, "cheer"), tmp_path / "cheer.bvh")
-    doubts = [line for line in changes(prepared(tmp_path / "cheer.bvh", "open")) if "a frame lasts" in line]
-    assert bool(doubts) == doubted
-    assert all("0.5 s" in line for line in doubts)
 
 
 @pytest.fixture
