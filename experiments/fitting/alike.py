@@ -62,7 +62,7 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     from models.mocap.preparation.well_formed import ON_FLOOR, stance_slides
 
     clip, points = Clip(poses, fps, "blend"), sole_points(poses)
-    schedule = stances(clip, smoothed(clip, 8.0))
+    schedule = stances(clip, smoothed(clip))
     heights = points[:, :, 2] - CONTACT_RADIUS
     slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR))
     residual = contact_residual(clip, schedule) if dynamics else 0.0

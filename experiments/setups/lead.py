@@ -25,7 +25,7 @@ from experiments.fitting.led_balance import balanced_on_ground, led_gains
 from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.clips import load_clips
+from experiments.setups.clips import BLINK, load_clips
 from experiments.setups.hands import participant
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
@@ -44,7 +44,6 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
-BLINK = 0.05  # [s] shortest flight that counts: half or twice of it changes none of eight captures that are led
 _SWING = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
 _FLYING_LATERAL = 1.2

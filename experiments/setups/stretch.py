@@ -19,6 +19,7 @@ from experiments.results.stretch_measures import editing_summary, performance_su
 from experiments.results.stretch_summary import stretch_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.clips import BLINK
 from experiments.setups.defaults import tube_gains
 from experiments.setups.fixed_curve import with_walls
 from experiments.setups.hands import (
@@ -30,7 +31,6 @@ from experiments.setups.hands import (
     turning_remark,
     user_hand,
 )
-from experiments.setups.lead import BLINK
 from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from models.mocap.dynamics.contacts import contacts

@@ -17,7 +17,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import CLOSES, Clip, PlanarDisplacement, pose_difference
 from models.mocap.preparation.laps import lap_of, likeness
-from models.mocap.preparation.poses import CORNER, inverse, plus, smoothed, sole_points
+from models.mocap.preparation.poses import inverse, plus, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
 # Largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3. Of 17 captures half of the
@@ -292,7 +292,7 @@ def _rested(clip: Clip) -> Looped:
 
 def _calm_velocities(clip: Clip) -> Array:
     """Velocities of the low-passed clip (n, 57): at 120 Hz, 8° of noise in its first frame are 17 rad/s there."""
-    return smoothed(clip, CORNER).velocities()
+    return smoothed(clip).velocities()
 
 
 def _dying(pose: Array, velocity: Array, fps: float) -> Array:

@@ -9,9 +9,7 @@ from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 
-CORNER = 8.0
-"""Cut-off of the low-pass of captures [Hz]; 6 and 15 Hz gave the same residual to 2 points in eight captures."""
-
+_CORNER = 8.0  # cut-off of the low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in eight captures
 # A second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off, (√2 − 1)^¼ (Winter).
 _PASSES = 0.802
 
@@ -36,13 +34,13 @@ def resampled(clip: Clip, fps: float) -> Clip:
     return Clip(CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses)(times), fps, clip.name)
 
 
-def smoothed(clip: Clip, corner: float) -> Clip:
-    """The motion low-passed without phase lag at a cut-off frequency [Hz]; a closed clip is extended periodically."""
-    if clip.n_frames < 8 or corner >= 0.4 * clip.fps:
+def smoothed(clip: Clip) -> Clip:
+    """The motion low-passed at 8 Hz without phase lag; a closed clip is extended periodically."""
+    if clip.n_frames < 8 or 0.4 * clip.fps <= _CORNER:
         return clip
     from scipy.signal import butter, sosfiltfilt  # imported late: loads scipy.stats, slow for a run
 
-    sections = np.asarray(butter(2, corner / (clip.fps / 2.0) / _PASSES, output="sos"))
+    sections = np.asarray(butter(2, _CORNER / (clip.fps / 2.0) / _PASSES, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():
         poses, first = around(clip, pad)

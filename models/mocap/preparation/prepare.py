@@ -17,7 +17,7 @@ from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
-from models.mocap.preparation.poses import CORNER, resampled, smoothed
+from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import rested, stances
 from models.mocap.retargeting.retarget import COARSE, Hints, RetargetReport
@@ -102,9 +102,9 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     if (lasts := cycle.clip.duration) > _LONGEST:
         part = "or a part of it by `hvf prepare --loop START:END`"
         raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, {part}")
-    calm = smoothed(cycle.clip, CORNER)
+    calm = smoothed(cycle.clip)
     held = on_resting_support(cycle.clip, calm)
-    smooth = smoothed(held, CORNER)
+    smooth = smoothed(held)
     schedule = rested(stances(held, smooth), held)
     made = feasible(smooth, schedule, fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED and made.residual < FLYING

@@ -136,7 +136,7 @@ def well_formed(clip: Clip) -> WellFormed:
     """Measure a clip."""
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
     closed = clip.closes(CLOSES)
-    schedule = stances(clip, smoothed(clip, 8.0))
+    schedule = stances(clip, smoothed(clip))
     points = sole_points(clip.poses)
     heights = points[:, :, 2] - CONTACT_RADIUS
     speeds = np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps if clip.n_frames > 1 else 0.0 * heights

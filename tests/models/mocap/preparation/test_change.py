@@ -105,7 +105,7 @@ def test_the_jacobian_of_the_errors(change, monkeypatch):
     """Against central differences along random changes; contacts keep their edges for so small a step."""
     monkeypatch.setattr(feasible, "_STRONG", 0.02)  # so that most torques count, those of standing legs among them
     clip = change.clip
-    problem = _Problem(change, stances(clip, smoothed(clip, 8.0)), FeasibleWeights())
+    problem = _Problem(change, stances(clip, smoothed(clip)), FeasibleWeights())
     rng = np.random.default_rng(3)
     x = 1e-3 * rng.normal(size=change.n_points * N_TANGENT)
     errors = problem.errors(x, True)

@@ -24,7 +24,7 @@ def test_a_body_that_slides_over_the_floor_under_load_is_held_by_its_feet():
     poses = np.repeat(_standing()[None], 130, axis=0)
     poses[:, 0] += 1.0 * _ramp(130)  # 1.2 m/s
     clip = Clip(poses, FPS, "slides")
-    carried = on_resting_support(clip, smoothed(clip, 8.0))
+    carried = on_resting_support(clip, smoothed(clip))
     way = np.ptp(sole_points(carried.poses)[:, :, 0], axis=0)
     assert way.max() < 0.15  # what is slower than a standing foot may move stays
     np.testing.assert_array_equal(carried.poses[:, 2:], clip.poses[:, 2:])
@@ -33,4 +33,4 @@ def test_a_body_that_slides_over_the_floor_under_load_is_held_by_its_feet():
 @pytest.mark.parametrize("name", ["walk", "run", "jump"])
 def test_a_capture_whose_feet_rest_under_load_keeps_its_path(name: str):
     clip = resampled(embedded(name), FPS)
-    assert on_resting_support(clip, smoothed(clip, 8.0)) is clip
+    assert on_resting_support(clip, smoothed(clip)) is clip

@@ -173,7 +173,7 @@ def _gap(ours, plain, clip):
                0.0 if soles or moved else heights)  # fmt: skip
 
 
-def check(gap):
+def assert_same_motion(gap):
     assert not isinstance(gap, str), gap
     assert not gap.large(), gap
 
@@ -181,63 +181,63 @@ def check(gap):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_names_of_every_vendor(family, motions, compared):
     rig = Rig(family=family, fingers=True, twists="{}Twist", reference=True)
-    check(compared(rig, motions.whole("walk", 25.0)))
+    assert_same_motion(compared(rig, motions.whole("walk", 25.0)))
 
 
 @pytest.mark.parametrize("zero", ZERO_POSES)
 def test_any_zero_pose(zero, motions, compared):
-    check(compared(Rig(zero=zero, seed=3), motions.whole("ginga")))
+    assert_same_motion(compared(Rig(zero=zero, seed=3), motions.whole("ginga")))
 
 
 @pytest.mark.parametrize("up", UPS)
 def test_any_axis_up_any_facing_any_unit(up, motions, compared):
-    check(compared(Rig(up=up, turn=0.7, unit=0.0254, order="YXZ"), motions.whole("cheer")))
+    assert_same_motion(compared(Rig(up=up, turn=0.7, unit=0.0254, order="YXZ"), motions.whole("cheer")))
 
 
 @pytest.mark.parametrize("root", ROOTS)
 def test_any_root(root, motions, compared):
-    check(compared(Rig(root=root, positions=True, zero="random", seed=4), motions.whole("run")))
+    assert_same_motion(compared(Rig(root=root, positions=True, zero="random", seed=4), motions.whole("run")))
 
 
 @pytest.mark.parametrize("twists", TWISTS)
 def test_any_twist_joints(twists, motions, compared):
     rig = Rig(twists=twists, beside=True, hips=0.4, necks=2, tips=0.3, seed=5, zero="along X")
-    check(compared(rig, motions.whole("squat_dance")))
+    assert_same_motion(compared(rig, motions.whole("squat_dance")))
 
 
 @pytest.mark.parametrize("shared", ["split", "interpolated"])
 @pytest.mark.parametrize(("below", "between", "over"), [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 1)])
 def test_any_number_of_spine_joints(shared, below, between, over, motions, compared):
-    check(compared(Rig(below=below, between=between, over=over, shared=shared), motions.whole("ginga")))
+    assert_same_motion(compared(Rig(below=below, between=between, over=over, shared=shared), motions.whole("ginga")))
 
 
 @pytest.mark.parametrize("name", embedded_names())
 def test_every_clip_without_an_axis_that_programs_write(name, motions, compared):
-    check(compared(Rig(zero="random", up="-X", turn=2.0, seed=6), motions.whole(name, 25.0)))
+    assert_same_motion(compared(Rig(zero="random", up="-X", turn=2.0, seed=6), motions.whole(name, 25.0)))
 
 
 @pytest.mark.parametrize("arm", [0.6, 1.6])
 @pytest.mark.parametrize("leg", [0.6, 1.6])
 def test_other_arms_and_legs(arm, leg, motions, compared):
     rig = Rig(proportions={"arm": arm, "leg": leg, "hips": 1.5, "trunk": 0.8}, zero="upright A", up="+Z")
-    check(compared(rig, motions.whole("jump", 30.0)))
+    assert_same_motion(compared(rig, motions.whole("jump", 30.0)))
 
 
 @pytest.mark.parametrize("tips", [None, 0.0])
 def test_arms_end_where_their_tips_are_or_it_is_said(tips, motions, compared, tmp_path):
-    check(compared(Rig(without=("hand",), tips=tips), motions.whole("walk")))
+    assert_same_motion(compared(Rig(without=("hand",), tips=tips), motions.whole("walk")))
     said = "nothing tells where left forearm, right forearm end: how they point is a guess"
     assert (said in load(tmp_path / "r.bvh").report.remarks) == (tips is None)
 
 
 def test_legs_end_where_their_tips_are_or_do_not_tell_what_is_up(motions, compared):
-    check(compared(Rig(without=("foot",)), motions.whole("walk")))
+    assert_same_motion(compared(Rig(without=("foot",)), motions.whole("walk")))
     assert "does not tell what is up" in compared(Rig(without=("foot",), tips=None), motions.whole("squat_dance"))
 
 
 def test_a_tip_that_continues_the_shank_is_no_toe(motions, compared, tmp_path):
     """As programs make up tips: neither the foot's heading nor left and right are taken from it."""
-    check(compared(Rig(without=("toe",), tips=0.3), motions.whole("run")))
+    assert_same_motion(compared(Rig(without=("toe",), tips=0.3), motions.whole("run")))
 
 
 def test_a_piece_of_a_somersault_does_not_tell_what_is_up(motions, tmp_path):
@@ -269,7 +269,7 @@ def test_a_limb_that_is_not_a_humans_is_told_before_what_is_up(motions, tmp_path
 
 
 def test_a_zero_pose_in_front_is_left_out(motions, compared, tmp_path):
-    check(compared(Rig(leading=1), motions.whole("walk")))
+    assert_same_motion(compared(Rig(leading=1), motions.whole("walk")))
     assert load(tmp_path / "r.bvh").report.dropped == 1
 
 
