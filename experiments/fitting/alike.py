@@ -64,7 +64,7 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     clip, points = Clip(poses, fps, "blend"), sole_points(poses)
     schedule = stances(clip, smoothed(clip))
     heights = points[:, :, 2] - CONTACT_RADIUS
-    slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR))
+    slides = stance_slides(points, schedule.feet & (heights < ON_FLOOR))
     residual = contact_residual(clip, schedule) if dynamics else 0.0
     return Motion(residual, float(heights.min()), float(np.quantile(slides, 0.95)), float(slides.max()))
 

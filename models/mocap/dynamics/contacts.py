@@ -19,7 +19,7 @@ from models.mocap.motion.clip import Clip
 _CERTAIN = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
 # Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
-_REACH, _HAND_REACH = 0.06, 0.12
+_REACH, HAND_REACH = 0.06, 0.12
 # Speed below which it rests [m/s]: soles slip and roll more slowly in stance, and pass faster in swing. Knees of
 # eight led captures accelerate by up to 1040 rad/s², with half of it 700 (and roots 1 cm lower), with twice 2090; the
 # worst slides 3.0, 3.3 and 4.0 cm.
@@ -101,7 +101,7 @@ def contacts(clip: Clip) -> Contacts:
     speeds = _slower_side(np.linalg.norm(np.diff(places, axis=0), axis=2) * clip.fps)
     heights = places[:, :, 2]
     reach = np.full(heights.shape[1], _REACH)
-    reach[len(FOOT_CONTACTS) : len(spheres)] = _HAND_REACH
+    reach[len(FOOT_CONTACTS) : len(spheres)] = HAND_REACH
     rests = (heights < reach) & (speeds < _SLOW)
     skids = (heights < _LOW) & (slides < _LEVEL)
     return Contacts(heights, (heights < _CERTAIN) | rests | skids, rests)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
-from models.mocap.dynamics.floor_forces import EDGES, Floor
+from models.mocap.dynamics.floor_forces import EDGES, WITH_HANDS, Floor
 from models.mocap.dynamics.spacetime import MARGIN
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
@@ -35,7 +35,7 @@ _TOLERANCE, _LAST = 0.01, 3  # iteration ends when the last 3 steps together low
 _GOOD = 0.25  # ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1)
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
-_N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
+_N, _W = 51, 57  # ends of the first blocks of errors: torques, wrench
 
 
 @dataclass(frozen=True)
@@ -120,13 +120,13 @@ class _Errors(NamedTuple):
 
     Attributes
     ----------
-    weighted : array, shape (m, 140)
+    weighted : array, shape (m, 108 + 4k)
         Weighted errors of the nonlinear terms.
     jacobian : array or None
         Blocks of their Jacobian.
     residual : array, shape (m, 6)
         Residual wrench [N], [N m].
-    grip : array, shape (m, 32)
+    grip : array, shape (m, 4k)
         Contact forces along the edges of the friction pyramids [N].
     share : array, shape (m, 51)
         Joint torques as shares of their limits.
@@ -186,7 +186,8 @@ class _Problem:
 
     def __init__(self, change: Change, schedule: Stances, weights: FeasibleWeights) -> None:
         self.change, self.w = change, weights
-        self.floor = Floor(weights.moment / weights.force)
+        self.contacts = WITH_HANDS[: schedule.standing.shape[1]]
+        self.floor = Floor(weights.moment / weights.force, self.contacts)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
         self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
         self.grounded = (schedule.standing | schedule.sliding)[frames]
@@ -259,12 +260,13 @@ class _Problem:
         return block.transpose(0, 2, 1, 3).reshape(size, size), np.einsum("koa,kon->an", basis, slopes).ravel()
 
     def errors(self, x: Array, with_jacobian: bool, instants: npt.NDArray[np.intp] | slice = _ALL) -> _Errors:
-        """Nonlinear errors of a change: torques (51), wrench (6), slip (24), depth (8), limits (51)."""
-        w = self.w
+        """Nonlinear errors of a change: torques (51), wrench (6), slip (3k), depth (k), limits (51)."""
+        w, k = self.w, len(self.contacts)
+        slips, depths = slice(_W, _W + 3 * k), slice(_W + 3 * k, _W + 4 * k)
         state = self.change.states(x.reshape(-1, N_TANGENT), instants)
         m = len(state.q)
         pushing, grounded, pinned = self.pushing[instants], self.grounded[instants], self.pinned[instants]
-        dynamics = InverseDynamics(state, with_jacobian)
+        dynamics = InverseDynamics(state, with_jacobian, self.contacts)
         demand = dynamics.demand
         grip = self.floor.grip(demand, pushing)
         columns = demand.columns()
@@ -278,24 +280,24 @@ class _Problem:
         excess = vectors - np.clip(vectors, self.low, self.high)
         share = demand.torque_on(grip) / torque_limit()
         strain = share - np.clip(share, -_STRONG, _STRONG)
-        parts = [w.strain * strain, scale * residual, slip.reshape(m, 24), low, w.limit * excess]
+        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), low, w.limit * excess]
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
             return _Errors(weighted, None, residual, grip, share)
         answer = self.floor.answer(demand, grip)
         projection = np.eye(6) - columns @ answer
-        pushes = grip.reshape(m, 8, 4) @ EDGES
+        pushes = grip.reshape(m, k, 4) @ EDGES
         jacobian = np.zeros((m, 3, weighted.shape[1], N_TANGENT))
         moving = dynamics.wrench
         arms = np.zeros((m, 6, N_TANGENT))
-        for sphere in range(8):
+        for sphere in range(k):
             # Moments of the contact forces change with their lever arms.
             arms[:, 3:] -= cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
         moving[:, 0] -= arms
         jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
-        jacobian[:, 0, _W:_S] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 24, N_TANGENT)
-        jacobian[:, 0, _S:_D] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        jacobian[:, 0, _D:][:, :, 6:] = w.limit * (excess != 0)[:, :, None] * np.eye(51)
+        jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
+        jacobian[:, 0, depths] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
+        jacobian[:, 0, depths.stop :][:, :, 6:] = w.limit * (excess != 0)[:, :, None] * np.eye(51)
         hot = np.flatnonzero(np.any(strain != 0, axis=1))
         if len(hot):
             gain = w.strain * (strain[hot] != 0) / torque_limit()
@@ -313,7 +315,7 @@ class Borne(NamedTuple):
     ----------
     residual : float
         RMS residual force [body weights].
-    loads : array, shape (n, 8)
+    loads : array, shape (n, k)
         Vertical force on each contact sphere, frame by frame [body weights].
     strain : float
         Largest torque of a joint, as a share of its limit.
@@ -333,7 +335,7 @@ def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     problem = _Problem(change, schedule, _WEIGHTS)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
     weight = problem.floor.body_weight
-    pushes = (errors.grip.reshape(-1, 8, 4) @ EDGES)[:, :, 2] / weight
+    pushes = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight
     frames = np.arange(clip.n_frames) / clip.fps
     loads = np.column_stack([np.interp(frames, change.times, push) for push in pushes.T])
     shares = np.abs(errors.share).max(axis=0)

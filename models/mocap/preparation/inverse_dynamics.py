@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import Array
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
-from models.mocap.dynamics.floor_forces import Demand
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
+from models.mocap.dynamics.floor_forces import Demand, carriers
 from models.mocap.preparation.change import State
 
 _ANGLE, _RATE = 1e-5, 1e-4  # steps of the finite differences [rad], [rad/s]
-_LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
 
 class InverseDynamics:
@@ -26,6 +25,8 @@ class InverseDynamics:
         The states.
     with_jacobian : bool
         Whether to compute derivatives.
+    contacts : tuple of str
+        The k contact spheres that may bear load: `FOOT_CONTACTS` or `WITH_HANDS`.
 
     Attributes
     ----------
@@ -35,22 +36,22 @@ class InverseDynamics:
         Derivatives of the wrench about the centre of mass by position, velocity, acceleration.
     torque : array, shape (m, 3, 51, 57)
         Derivatives of the joint torques without contact, likewise.
-    spheres, com : arrays, shapes (m, 8, 3, 57), (m, 3, 57)
+    spheres, com : arrays, shapes (m, k, 3, 57), (m, 3, 57)
         Derivatives by position of the contact spheres' centres and of the centre of mass.
     """
 
-    def __init__(self, state: State, with_jacobian: bool) -> None:
+    def __init__(self, state: State, with_jacobian: bool, contacts: tuple[str, ...] = FOOT_CONTACTS) -> None:
         model = figure_model()
         d = mujoco.MjData(model)
-        geoms = [int(model.geom(name).id) for name in FOOT_CONTACTS]
-        m = len(state.q)
-        force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, 8, 3)), np.empty((m, 3))
-        bodies = [1 + body for body in _LEGS]
-        anchors, frames, root = np.empty((m, 6, 3)), np.empty((m, 6, 9)), np.empty((m, 3, 3))
+        geoms = [int(model.geom(name).id) for name in contacts]
+        bodies = [1 + carrier.body for carrier in carriers(len(contacts))]
+        m, c = len(state.q), len(bodies)
+        force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, len(geoms), 3)), np.empty((m, 3))
+        anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 3, 3))
         many = m if with_jacobian else 0
         by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
-        self.spheres, self.com = np.zeros((many, 8, 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
-        self.anchors, self.turns = np.zeros((2, many, 6, 3, N_TANGENT))
+        self.spheres, self.com = np.zeros((many, len(geoms), 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
+        self.anchors, self.turns = np.zeros((2, many, c, 3, N_TANGENT))
         result, moved, full = np.zeros(N_TANGENT), np.zeros(model.nq), np.empty((N_TANGENT, N_TANGENT))
         step = np.zeros(N_TANGENT)
         kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
@@ -93,12 +94,12 @@ class InverseDynamics:
         arm = com - state.q[:, :3]
         moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
         wrench = np.concatenate((force[:, :3], moment), axis=1)
-        self.demand = Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, 6, 3, 3))
+        self.demand = Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
         if with_jacobian:
             self._complete(state, by, force, root, arm)
 
     def _complete(self, state: State, by: Array, force: Array, root: Array, arm: Array) -> None:
-        """Derivatives of the wrench about the centre of mass and of the legs' torques."""
+        """Derivatives of the wrench about the centre of mass and of the joint torques."""
         m = len(arm)
         turning = cross_matrix(state.v[:, 3:].reshape(m, 18, 3))
         spinning = cross_matrix(state.a[:, 3:].reshape(m, 18, 3))
@@ -122,19 +123,18 @@ class InverseDynamics:
         Parameters
         ----------
         pushes : Array
-            Contact forces, shape (m, 8, 3) [N].
+            Contact forces, shape (m, k, 3) [N].
         states : array of int, shape (n,)
             Indices of the states.
         """
         demand, leaning = self.demand, np.zeros((len(states), 51, N_TANGENT))
         soles = demand.spheres[states] - (0.0, 0.0, CONTACT_RADIUS)
-        for leg, body in enumerate(_LEGS):
-            mine = slice(0, 4) if leg < 3 else slice(4, 8)
-            force, anchor = pushes[states, mine], demand.anchors[states, leg]
+        for joint, (body, mine) in enumerate(carriers(soles.shape[1])):
+            force, anchor = pushes[states, mine], demand.anchors[states, joint]
             moment = np.cross(soles[:, mine] - anchor[:, None], force).sum(1)
-            moved = self.spheres[states, mine] - self.anchors[states, leg, None]
-            change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, leg]
-            leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, leg].transpose(0, 2, 1) @ change
+            moved = self.spheres[states, mine] - self.anchors[states, joint, None]
+            change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, joint]
+            leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, joint].transpose(0, 2, 1) @ change
         return leaning
 
 

@@ -215,7 +215,7 @@ def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -
 
 def _stands(clip: Clip) -> bool:
     """Whether one foot stands in every frame."""
-    standing = stances(clip, clip).standing.reshape(clip.n_frames, 2, -1)
+    standing = stances(clip, clip).feet.reshape(clip.n_frames, 2, -1)
     return bool(standing.any(axis=2).all(axis=0).any())
 
 

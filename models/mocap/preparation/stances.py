@@ -5,7 +5,8 @@ at rest beside a standing heel stand as well. Where nothing stands although the 
 load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the stance came before and on
 the lower part of the foot if it comes after. Without such a stance the lowest part of the feet bears load while
 sliding, most of which `root_path` removes before. An open clip with an upright end rests there on both feet, since
-nobody can rest on the toes of one, as captures may be cut.
+nobody can rest on the toes of one, as captures may be cut. Hands are in the schedule of a clip in which they bear load
+(`hand_stances`), and only there.
 """
 
 from typing import NamedTuple
@@ -15,12 +16,14 @@ from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.dynamics.floor_forces import soles
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS
+from models.mocap.dynamics.floor_forces import WITH_HANDS, soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
-from models.mocap.preparation.poses import around, sole_points
+from models.mocap.preparation.hand_stances import bearing_hands
+from models.mocap.preparation.poses import around, contact_points, sole_points
+from models.mocap.preparation.runs import cleaned, runs
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
 _REACH = 0.045  # largest height of a standing part of a sole [m]
@@ -40,20 +43,23 @@ _KEPT = 0.05  # time before and after a stance over which a sphere keeps its pla
 _UPRIGHT = 0.55  # least height of the root there [m]: a crawling or lying body is supported otherwise
 
 
+_N_SOLES = len(FOOT_CONTACTS)
+
+
 class Stances(NamedTuple):
-    """Contact schedule of the feet's 8 contact spheres over n frames.
+    """Contact schedule of k contact spheres over n frames: the feet's 8, and the palms' 2 where a hand bears load.
 
     Attributes
     ----------
-    standing : array of bool, shape (n, 8)
+    standing : array of bool, shape (n, k)
         Whether a sphere rests at its place.
-    pushing : array of bool, shape (n, 8)
+    pushing : array of bool, shape (n, k)
         Whether it may bear load.
-    places : array, shape (n, 8, 3)
-        Target centres of standing spheres [m], level on the floor.
-    sliding : array of bool, shape (n, 8)
+    places : array, shape (n, k, 3)
+        Target centres of standing spheres [m], on the floor.
+    sliding : array of bool, shape (n, k)
         Whether it is on the floor and under load, but not at rest.
-    kept : array, shape (n, 8)
+    kept : array, shape (n, k)
         Share with which a sphere keeps its place over the floor: 1 in stance, falling to 0 before and after it while
         another stands.
     """
@@ -63,6 +69,11 @@ class Stances(NamedTuple):
     places: Array
     sliding: Mask
     kept: Array
+
+    @property
+    def feet(self) -> Mask:
+        """Whether each of the feet's spheres rests at its place, shape (n, 8)."""
+        return self.standing[:, :_N_SOLES]
 
 
 def stances(clip: Clip, smooth: Clip) -> Stances:
@@ -82,14 +93,20 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         calm, _ = around(smooth, clip.n_frames)
     else:
         poses, calm, first = clip.poses, smooth.poses, 0
-    points, fps = sole_points(poses), clip.fps
-    parts, load = _support(poses, points, calm, fps)
+    points, fps = contact_points(poses, WITH_HANDS), clip.fps
+    parts, hands, load = _support(poses, points, calm, fps)
+    if not hands.any():
+        points, hands = points[:, :_N_SOLES], hands[:, :0]
     turned = global_rotations(poses)
-    standing, places = np.repeat(parts, 2, axis=2).reshape(len(points), 8), np.full(points.shape, CONTACT_RADIUS)
+    standing, places = np.column_stack((_of_spheres(parts), hands)), np.full(points.shape, CONTACT_RADIUS)
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
         _place(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], parts[:, foot], places[:, mine])
-    sliding = _slides(points, parts, load, fps)
+    for palm, bears in enumerate(hands.T, start=_N_SOLES):
+        for start, end in runs(bears):
+            places[start:end, palm, :2] = np.median(points[start:end, palm, :2], axis=0)
+    sliding = np.zeros_like(standing)
+    sliding[:, :_N_SOLES] = _slides(points[:, :_N_SOLES], parts, hands, load, fps)
     lag = max(1, round(LAG * fps))
     firm = standing.copy()
     for shift in range(1, lag + 1):
@@ -105,7 +122,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
 
 
 def sliding_support(poses: Array, calm: Array, fps: float) -> Mask:
-    """Which contact spheres bear load without resting, shape (n, 8).
+    """Which contact spheres of the feet bear load without resting, shape (n, 8).
 
     Parameters
     ----------
@@ -114,8 +131,8 @@ def sliding_support(poses: Array, calm: Array, fps: float) -> Mask:
     fps : float
         Frame rate [1/s].
     """
-    points = sole_points(poses)
-    return _slides(points, *_support(poses, points, calm, fps), fps)
+    points = contact_points(poses, WITH_HANDS)
+    return _slides(points[:, :_N_SOLES], *_support(poses, points, calm, fps), fps)
 
 
 def rested(schedule: Stances, clip: Clip) -> Stances:
@@ -151,15 +168,16 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
 
 
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
-    """Least height of each contact sphere in swing phase [m], rising from 0 at stance, shape (n, 8).
+    """Least height of each contact sphere in swing phase [m], rising from 0 at stance, shape (n, k).
 
-    The tracking controller would take a foot that swings a few millimetres over the floor for a standing one.
+    The tracking controller would take a foot that swings a few millimetres over the floor for a standing one. A hand
+    stays above the floor.
     """
     grounded = schedule.standing | schedule.sliding
     n = len(grounded)
     laps = np.tile(grounded, (3, 1)) if closed else grounded
     here = slice(n, 2 * n) if closed else slice(0, n)
-    least = np.zeros((n, 8))
+    least = np.zeros(grounded.shape)
     for foot in range(2):
         mine = slice(4 * foot, 4 * foot + 4)
         swings = ~laps[:, mine].any(axis=1)
@@ -178,25 +196,34 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
     return least
 
 
-def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Array]:
-    """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs, and this load (n,)."""
-    parts = _parts(points, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Mask, Array]:
+    """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs; whether each hand bears
+    load, (n, 2); and the vertical load (n,)."""
+    soles_at = points[:, :_N_SOLES]
+    parts = _parts(soles_at, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+    hands = bearing_hands(points, poses, calm, _of_spheres(parts), fps)
     load = _load(calm, fps)
-    for start, end in _runs(_bare(parts, load, fps)):
-        _bear(points, parts, start, end)
-    return parts, load
+    for start, end in runs(_bare(parts, hands, load, fps)):
+        _bear(soles_at, parts, start, end)
+    return parts, hands, load
 
 
-def _bare(parts: Mask, load: Array, fps: float) -> Mask:
+def _of_spheres(parts: Mask) -> Mask:
+    """Whether each of the feet's spheres stands, as its heel or toes do, (n, 2, 2) → (n, 8)."""
+    return np.repeat(parts, 2, axis=2).reshape(len(parts), _N_SOLES)
+
+
+def _bare(parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
     """Where nothing stands under load, shape (n,)."""
-    return _cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)
+    stands = parts.any(axis=(1, 2)) | hands.any(axis=1)
+    return cleaned(~stands & (load > _LOADED), round(0.03 * fps), 2)
 
 
-def _slides(points: Array, parts: Mask, load: Array, fps: float) -> Mask:
-    """The lowest spheres where nothing stands under load, shape (n, 8)."""
+def _slides(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
+    """The lowest spheres of the feet where nothing stands under load, shape (n, 8)."""
     heights = points[:, :, 2] - CONTACT_RADIUS
     lowest = heights.min(axis=1, keepdims=True)
-    return _bare(parts, load, fps)[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
+    return _bare(parts, hands, load, fps)[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
 
 
 def _parts(points: Array, pace: Array, fps: float) -> Mask:
@@ -208,7 +235,7 @@ def _parts(points: Array, pace: Array, fps: float) -> Mask:
     stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _LOW) & (speeds[:, :, 1] < _REST)
     for foot in range(2):
         for part in range(2):
-            stands[:, foot, part] = _cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
+            stands[:, foot, part] = cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
     return stands
 
 
@@ -231,7 +258,7 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
     """Write the places of one foot's spheres: one flat placement for each stance."""
     heel, toe = parts.T
     yaw = np.unwrap(_heading(turned))
-    for start, end in _runs(heel | toe):
+    for start, end in runs(heel | toe):
         span = np.arange(start, end)
         flat = span[heel[span] & toe[span]]
         if len(flat) >= 4:
@@ -247,7 +274,7 @@ def _kept(standing: Mask, places: Array, width: int) -> Array:
     """Share with which spheres keep their places; `places` are extended over the frames beside stances."""
     share = standing.astype(np.float64)
     for sphere in range(standing.shape[1]):
-        for start, end in _runs(standing[:, sphere]):
+        for start, end in runs(standing[:, sphere]):
             for away in range(1, width + 1):
                 left = 1.0 - away / (width + 1)
                 for at, stance in ((start - away, start), (end - 1 + away, end - 1)):
@@ -280,21 +307,3 @@ def _load(poses: Array, fps: float) -> Array:
     height = momentum(Clip(poses, fps, "load")).com[:, 2]
     rising = np.gradient(np.gradient(height)) * fps**2
     return gaussian_filter1d(rising / GRAVITY + 1.0, _SMOOTHING * fps)
-
-
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Start and end indices of the runs of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _cleaned(mask: Mask, gap: int, short: int) -> Mask:
-    """The mask with gaps shorter than `gap` filled, except at its ends, and runs shorter than `short` dropped."""
-    mask = mask.copy()
-    for start, end in _runs(~mask):
-        if end - start < gap and start > 0 and end < len(mask):
-            mask[start:end] = True
-    for start, end in _runs(mask):
-        if end - start < short:
-            mask[start:end] = False
-    return mask

@@ -9,8 +9,9 @@ import numpy as np
 
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.floor_forces import WITH_HANDS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
@@ -29,7 +30,7 @@ from models.mocap.preparation.bounds import (
     SKATE,
 )
 from models.mocap.preparation.feasible import Borne, borne
-from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
+from models.mocap.preparation.poses import around, contact_points, resampled, smoothed
 from models.mocap.preparation.stances import stances
 
 # Half or twice of either of the next two finds no other frame in the nine embedded clips and 17 captures; of the third,
@@ -54,7 +55,7 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Largest distance of a contact point from its median place in a stance, 95th percentile over stances [m].
+        Largest distance of a contact point, of hands as well, from its median place in a stance, 95th percentile over stances [m].
     slid : float
         The same, of all stances [m].
     outliers : int
@@ -137,18 +138,19 @@ def well_formed(clip: Clip) -> WellFormed:
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
     closed = clip.closes(CLOSES)
     schedule = stances(clip, smoothed(clip))
-    points = sole_points(clip.poses)
+    points = contact_points(clip.poses, WITH_HANDS[: schedule.standing.shape[1]])
     heights = points[:, :, 2] - CONTACT_RADIUS
     speeds = np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps if clip.n_frames > 1 else 0.0 * heights
     standing = schedule.standing & (speeds < _AT_REST)
-    low, high = np.quantile(heights[standing], (0.01, 0.99)) if standing.any() else (0.0, 0.0)
+    soles = standing[:, : len(FOOT_CONTACTS)]
+    low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
     given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     # A sphere that bears nothing and moves is in swing, however low.
     swings = (given.loads < _UNLOADED) & (speeds > _AT_REST)
     slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR) & ~swings)
     flights, falling = _flights(clip)
     return WellFormed(
-        clip.duration, float(low), float(high), _tilt(clip, standing), float(np.quantile(slides, 0.95)),
+        clip.duration, float(low), float(high), _tilt(clip, soles), float(np.quantile(slides, 0.95)),
         float(slides.max()), outliers(clip), closed,
         _seam(clip, closed), flights, falling,
         float(beyond_ranges(clip.poses).max()),

@@ -1,0 +1,70 @@
+r"""Hands that bear load: where a palm rests near the floor, and the motion cannot do without it.
+
+A hand that rests within reach of the floor (`contacts`) need not push: one that ties a shoe does not. So the wrench w
+that the motion needs (`floor_forces`) is met with the standing feet alone, and with the resting hands as well; a hand
+bears load over a whole stance if these make up, in the mean of the stance, for at least `_NEEDED` body weights:
+
+.. math:: \frac1{m g}\,\overline{\lVert S (w - A f^*)\rVert_{feet} - \lVert S (w - A f^*)\rVert_{feet, hands}}
+
+The figure lacks fingers, and a capture's wrist may be fixed: a resting palm is up to 12 cm above the floor or beneath
+it. Its place is on the floor.
+"""
+
+import numpy as np
+
+from models.arrays import Array, Mask
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
+from models.mocap.dynamics.contacts import HAND_REACH, contacts
+from models.mocap.dynamics.floor_forces import WITH_HANDS, Floor, residual
+from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.preparation.runs import cleaned, runs
+
+_GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s], as of feet
+_NEEDED = 0.2  # [body weights]
+_ARM = 2.0  # S: weight of a residual moment relative to a residual force [1/m], as in `FeasibleWeights`
+
+
+def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: float) -> Mask:
+    """Whether each palm bears load, left and right, shape (n, 2).
+
+    Parameters
+    ----------
+    points : Array
+        Centres of the contact spheres of feet and palms, shape (n, 10, 3) [m].
+    poses, calm : Array
+        Poses as captured, and low-passed, shape (n, 75).
+    feet : Mask
+        Which of the feet's spheres stand, shape (n, 8).
+    fps : float
+        Frame rate [1/s].
+    """
+    n = len(points)
+    none = np.zeros((n, len(HAND_CONTACTS)), dtype=bool)
+    if n < 3 or points[:, len(FOOT_CONTACTS) :, 2].min() - CONTACT_RADIUS > HAND_REACH:
+        return none
+    resting = contacts(Clip(poses, fps, "hands")).resting[:, len(FOOT_CONTACTS) : len(WITH_HANDS)]
+    rests = np.stack([cleaned(hand, round(_GAP * fps), round(_SHORT * fps)) for hand in resting.T], axis=1)
+    frames = np.flatnonzero(rests.any(axis=1))
+    if not len(frames):
+        return none
+    gain = np.zeros(n)
+    gain[frames] = _made_up_for(calm, frames, feet[frames], rests[frames], fps)
+    bears = none
+    for hand in range(len(HAND_CONTACTS)):
+        for start, end in runs(rests[:, hand]):
+            bears[start:end, hand] = gain[start:end].mean() > _NEEDED
+    return bears
+
+
+def _made_up_for(calm: Array, frames: Array, feet: Mask, hands: Mask, fps: float) -> Array:
+    """By how much the hands lower the residual ‖S (w − A f*)‖ of some frames [body weights]."""
+    floor = Floor(_ARM, WITH_HANDS)
+    steps = pose_difference(calm[:-1], calm[1:]) * fps
+    inner = np.clip(frames, 1, len(calm) - 2)
+    v, a = 0.5 * (steps[inner - 1] + steps[inner]), (steps[inner] - steps[inner - 1]) * fps
+    demand = floor.demand(calm[inner], v, a)
+    lacks: list[Array] = []
+    for palms in (np.zeros_like(hands), hands):
+        missing = residual(demand, floor.grip(demand, np.concatenate((feet, palms), axis=1)))
+        lacks.append(np.linalg.norm(missing * np.repeat((1.0, _ARM), 3), axis=1) / floor.body_weight)
+    return lacks[0] - lacks[1]
