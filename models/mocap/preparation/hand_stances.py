@@ -56,6 +56,23 @@ def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: flo
     return bears
 
 
+def bear_longer(palms: Array, hands: Mask, start: int, end: int, far: float) -> None:
+    """Extend the stances of hands over frames start to end, in which nothing stands under load.
+
+    A stance before or after lasts for as long as its palm (n, 2, 3) is within reach, and within `far` [m] of where the
+    stance ended or began.
+    """
+    within = palms[:, :, 2] - CONTACT_RADIUS < HAND_REACH
+    for edge, frames in ((start - 1, range(start, end)), (end, range(end - 1, start - 1, -1))):
+        for hand in range(len(HAND_CONTACTS)):
+            if not (0 <= edge < len(hands) and hands[edge, hand]):
+                continue
+            for k in frames:
+                if not within[k, hand] or np.linalg.norm(palms[k, hand, :2] - palms[edge, hand, :2]) > far:
+                    break
+                hands[k, hand] = True
+
+
 def _made_up_for(calm: Array, frames: Array, feet: Mask, hands: Mask, fps: float) -> Array:
     """By how much the hands lower the residual ‖S (w − A f*)‖ of some frames [body weights]."""
     floor = Floor(_ARM, WITH_HANDS)

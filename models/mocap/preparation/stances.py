@@ -21,7 +21,7 @@ from models.mocap.dynamics.floor_forces import WITH_HANDS, soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
-from models.mocap.preparation.hand_stances import bearing_hands
+from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
 from models.mocap.preparation.runs import cleaned, runs
 
@@ -31,7 +31,7 @@ _SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's spe
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
 # the frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
 _LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
-_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot whose stance is extended [m]
+_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot or hand whose stance is extended [m]
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
 _LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
@@ -203,6 +203,9 @@ def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask
     parts = _parts(soles_at, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
     hands = bearing_hands(points, poses, calm, _of_spheres(parts), fps)
     load = _load(calm, fps)
+    if hands.any():
+        for start, end in runs(_bare(parts, hands, load, fps)):
+            bear_longer(points[:, _N_SOLES:], hands, start, end, _FAR)
     for start, end in runs(_bare(parts, hands, load, fps)):
         _bear(soles_at, parts, start, end)
     return parts, hands, load
