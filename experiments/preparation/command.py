@@ -120,6 +120,11 @@ def changes(made: Prepared) -> tuple[str, ...]:
         )
     if not made.near:
         return (*lines, "dynamics and feet as captured")
+    if made.hands.seconds > 0.0:
+        lines.append(
+            f"hands bear load for {made.hands.seconds:.2f} s, on places up to {100 * made.hands.moved:.0f} cm from "
+            "where their palms were captured"
+        )
     lines.append(
         f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.moved:.1f} cm RMS; "
         + made.fidelity.line()
@@ -136,7 +141,7 @@ def advice(made: Prepared) -> tuple[str, ...]:
         f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and moves the "
         f"root {100 * change.moved:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
         "try --loop START:END for a part without what is not feasible, --loop open if it "
-        "does not repeat, or a capture whose support is feet alone",
+        "does not repeat, or a capture whose support is feet and hands alone",
     )
 
 

@@ -151,6 +151,11 @@ class Floor:
                 grip[k, edges] = nnls(system, np.concatenate([self._scale * demand.wrench[k], np.zeros(len(edges))]))[0]
         return grip
 
+    def lacking(self, demand: Demand, standing: Mask) -> Array:
+        """‖S (w − A f*)‖: what contact forces of the spheres in `standing` (m, k) leave, shape (m,) [body weights]."""
+        missing = self._scale * residual(demand, self.grip(demand, standing))
+        return np.linalg.norm(missing, axis=1) / self.body_weight
+
     def answer(self, demand: Demand, grip: Array) -> Array:
         """K: derivative of f* by the wrench with a fixed set of loaded edges, df* = K dw, shape (m, 4k, 6)."""
         columns = (self._scale[:, None] * demand.columns()) * (grip > 0)[:, None]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.errors import ModelError
+from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import FLYING
@@ -17,14 +18,29 @@ from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
-from models.mocap.preparation.poses import resampled, smoothed
+from models.mocap.preparation.poses import contact_points, resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
-from models.mocap.preparation.stances import rested, stances
+from models.mocap.preparation.stances import Stances, rested, stances
 from models.mocap.retargeting.retarget import COARSE, Hints, RetargetReport
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 _TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which the result counts as another motion
 _LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
+
+
+class HandLoad(NamedTuple):
+    """Hands that bear load in a prepared clip.
+
+    Attributes
+    ----------
+    seconds : float
+        Time in which a hand bears load [s].
+    moved : float
+        Largest distance of a bearing palm in the capture from its place on the floor [m].
+    """
+
+    seconds: float
+    moved: float
 
 
 class Prepared(NamedTuple):
@@ -44,6 +60,8 @@ class Prepared(NamedTuple):
         Result of looping, before optimisation.
     carried : float
         Largest displacement over the floor by which a supporting foot was kept from sliding (`root_path`) [m].
+    hands : HandLoad
+        How long hands bear load, and how far their palms were moved to the floor; zeros where dynamics are as captured.
     feasible : Feasible
         Result of the optimisation.
     fidelity : Fidelity
@@ -61,6 +79,7 @@ class Prepared(NamedTuple):
     paced: Paced
     looped: Looped
     carried: float
+    hands: HandLoad
     feasible: Feasible
     fidelity: Fidelity
     seconds: float
@@ -112,4 +131,14 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     taken = made.clip if near else calm
     clip = Clip(taken.poses, taken.fps, captured.name)
     kept = fidelity(clip, captured, cycle, timed.pace)
-    return Prepared(clip, captured, loaded.report, timed, cycle, carried, made, kept, process_time() - began, near)
+    hands = _hand_load(held, schedule) if near and schedule.hands.any() else HandLoad(0.0, 0.0)
+    return Prepared(
+        clip, captured, loaded.report, timed, cycle, carried, hands, made, kept, process_time() - began, near
+    )
+
+
+def _hand_load(clip: Clip, schedule: Stances) -> HandLoad:
+    """Hands that bear load in a clip by its contact schedule."""
+    bears = schedule.hands
+    away = contact_points(clip.poses, HAND_CONTACTS) - schedule.places[:, -bears.shape[1] :]
+    return HandLoad(float(bears.any(axis=1).sum()) / clip.fps, float(np.linalg.norm(away, axis=2)[bears].max()))

@@ -4,6 +4,8 @@ import numpy as np
 
 from models.arrays import Mask
 
+GAP, SHORT = 0.05, 0.06  # of stances: gaps shorter than this are filled, stances shorter than this dropped [s]
+
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
     """Start and end indices of the runs of True."""

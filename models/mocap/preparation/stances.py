@@ -23,7 +23,7 @@ from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
-from models.mocap.preparation.runs import cleaned, runs
+from models.mocap.preparation.runs import GAP, SHORT, cleaned, runs
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
 _REACH = 0.045  # largest height of a standing part of a sole [m]
@@ -31,8 +31,7 @@ _SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's spe
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
 # the frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
 _LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
-_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot or hand whose stance is extended [m]
-_GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
+_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of what stands longer [m]
 _LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
 _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
@@ -41,8 +40,6 @@ _RISE = 0.08  # time before and after stance in which this height is reached [s]
 _RESTS = 0.1  # time at both ends of an open clip in which both feet stand [s]
 _KEPT = 0.05  # time before and after a stance over which a sphere keeps its place ever less [s]: one knot of `Change`
 _UPRIGHT = 0.55  # least height of the root there [m]: a crawling or lying body is supported otherwise
-
-
 _N_SOLES = len(FOOT_CONTACTS)
 
 
@@ -74,6 +71,11 @@ class Stances(NamedTuple):
     def feet(self) -> Mask:
         """Whether each of the feet's spheres rests at its place, shape (n, 8)."""
         return self.standing[:, :_N_SOLES]
+
+    @property
+    def hands(self) -> Mask:
+        """Whether each palm bears load, shape (n, 2); (n, 0) in the schedule of the feet alone."""
+        return self.standing[:, _N_SOLES:]
 
 
 def stances(clip: Clip, smooth: Clip) -> Stances:
@@ -197,8 +199,11 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
 
 
 def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Mask, Array]:
-    """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs; whether each hand bears
-    load, (n, 2); and the vertical load (n,)."""
+    """Stances, extended as the load needs.
+
+    Returns whether heel and toes of each foot stand, (n, 2, 2), whether each hand bears load, (n, 2), and the vertical
+    load, (n,).
+    """
     soles_at = points[:, :_N_SOLES]
     parts = _parts(soles_at, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
     hands = bearing_hands(points, poses, calm, _of_spheres(parts), fps)
@@ -238,7 +243,7 @@ def _parts(points: Array, pace: Array, fps: float) -> Mask:
     stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _LOW) & (speeds[:, :, 1] < _REST)
     for foot in range(2):
         for part in range(2):
-            stands[:, foot, part] = cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
+            stands[:, foot, part] = cleaned(stands[:, foot, part], round(GAP * fps), round(SHORT * fps))
     return stands
 
 

@@ -55,7 +55,8 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Largest distance of a contact point, of hands as well, from its median place in a stance, 95th percentile over stances [m].
+        Largest distance of a contact point, hands included, from its median place in a stance, 95th percentile over
+        stances [m].
     slid : float
         The same, of all stances [m].
     outliers : int

@@ -8,6 +8,7 @@ from sim.body.figure import FigureGains
 from sim.body.figure_state import REPORT_FLIES, REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, report, track, tracked_motion
 from sim.errors import SimError
+from tests.models.mocap.preparation.push_up import held
 
 
 def _squats() -> Clip:
@@ -44,6 +45,14 @@ def test_the_residual_of_a_clip_that_is_not_repeated_is_not_diluted_by_the_time_
     assert short.residual_force > 0.005
     assert long.residual_force == pytest.approx(short.residual_force, rel=1e-2)
     assert long.seconds == pytest.approx(short.seconds + 3.0, abs=0.01)
+
+
+def test_the_figure_holds_a_push_up():
+    """Its palms are where load is planned for: fingers that touched the floor held them 2 to 3 cm above it."""
+    result = track(held(61), 1.0)
+    assert result.falls == ()
+    assert result.residual_force < 0.02
+    assert result.root_error_max < 0.01
 
 
 def test_light_and_tall_figures_squat_too():
