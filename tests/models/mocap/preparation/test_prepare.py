@@ -271,6 +271,17 @@ def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
     np.testing.assert_allclose(pose_difference(again.poses, made.clip.poses), 0.0, atol=1e-7)
 
 
+@pytest.mark.slow
+def test_a_captured_cartwheel_is_made_feasible_on_feet_and_hands(mocap, tmp_path):
+    outcome = prepare_file(mocap / "snu/cart.bvh", tmp_path / "cart.bvh")
+    assert outcome.made.near
+    assert outcome.made.hands.seconds > 0.5
+    assert outcome.made.hands.moved < 0.12
+    assert outcome.measures.residual < 0.05
+    assert outcome.followed.stands
+    assert "hands bear load for" in summary(outcome)
+
+
 @pytest.fixture
 def long_walk(tmp_path):
     """More than two minutes of walking, open at its ends."""
