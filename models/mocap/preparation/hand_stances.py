@@ -20,8 +20,8 @@ from models.mocap.dynamics.floor_forces import WITH_HANDS, Floor
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.runs import GAP, SHORT, cleaned, runs
 
-# [body weights]: of 38 times that a palm rests near the floor in falls of LAFAN and in a crawl, a roll and two gettings
-# up of DeepMimic, 31 make up for 0.27 or more, 7 for 0.17 or less; with half of it five more bear load, with twice
+# [body weights]: of 39 times that a palm rests near the floor in falls of LAFAN and in a crawl, a roll and two gettings
+# up of DeepMimic, 32 make up for 0.27 or more, 7 for 0.17 or less; with half of it five more bear load, with twice
 # three fewer. No hand bears load in the other captures of ../shared/mocap but two cartwheels (0.64 and more).
 _NEEDED = 0.2
 
