@@ -82,6 +82,7 @@ class FigureGains(NamedTuple):
     swing_speed: float = 1.0
     flight_height: float = 0.02
     lift_time: float = 0.02
+    unload_time: float = 0.06
     placement_reach: float = 0.08
 
 

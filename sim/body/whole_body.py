@@ -1,6 +1,5 @@
 """Whole-body control of the physical figure, compiled; see `sim.body.figure` for the equations."""
 
-import numpy as np
 from numba import njit
 
 from controllers.work_array import work_array
@@ -20,7 +19,7 @@ from sim.body.figure_state import (
 from sim.body.foot_placement import place_feet
 from sim.body.mass_matrix import inertia, inertial_force
 from sim.body.stance import N_LEG, factor, stance_response, substitute
-from sim.compilation.native import mj_integrate_pos, mj_kinematics
+from sim.body.support import find_support
 
 # [m] lever arm that converts moment to force in the cost of the residual, which trades one for the other: the RMS
 # force of walk, run and jump is 1.2, 2.8 and 2.6 % of weight; with twice as much 0.7, 2.0 and 1.7 and the moment 1.6
@@ -46,7 +45,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
-    support = _find_support(s, q_r, v_r)
+    support = find_support(s, q_r, v_r, a_r)
     if s.report[REPORT_FLIES] == 1.0 and s.loaded.max() == 0.0:
         place_feet(s, q_r, v_r)
     mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
@@ -111,53 +110,6 @@ def _stand(s: FigureState, support: float) -> None:
         if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
             break
     _make_up_for_legs(s, support)
-
-
-@njit
-def _nearness(height: float, reach: float) -> float:
-    """1 at height 0 or below, 0 from a height `reach` on, C¹ between."""
-    x = min(max(height / reach, 0.0), 1.0)
-    return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
-
-
-@njit
-def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
-    """Set the share of load of each contact point, and return the support.
-
-    A point bears load if it touches the floor and the reference has it near the floor both now and `lift_time` ahead:
-    a point about to be lifted is thus unloaded before, so that its leg need not catch up. A point of the reference that
-    swings low over the floor is not in stance. The support is the largest contact of a point that the reference has
-    below `flight_height`, 0 to 1.
-    """
-    s.twin_qpos[:] = q_r
-    mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.gains.lift_time)
-    mj_kinematics(s.twin_model, s.twin_data)
-    for c in range(s.share.shape[0]):
-        s.points[c] = s.twin_contact_pos[s.twin_contact[c]]
-    s.twin_qpos[:] = q_r
-    mj_kinematics(s.twin_model, s.twin_data)
-    support, lowest = 0.0, np.inf
-    for leg in range(2):
-        s.loaded[leg] = 0.0
-        for c in range(N_FOOT * leg, N_FOOT * leg + N_FOOT):
-            height = s.contact_pos[s.contact[c], 2] - s.radius
-            s.loaded[leg] = max(s.loaded[leg], _nearness(height, s.gains.contact_reach))
-    for c in range(s.share.shape[0]):
-        now = s.twin_contact_pos[s.twin_contact[c]]
-        way = np.sqrt((s.points[c, 0] - now[0]) ** 2 + (s.points[c, 1] - now[1]) ** 2)
-        height = max(s.points[c, 2], now[2]) - s.radius
-        lowest = min(lowest, now[2] - s.radius)
-        s.points[c] = s.contact_pos[s.contact[c]]
-        s.points[c, 2] -= s.radius
-        touch = _nearness(s.points[c, 2], s.gains.contact_reach)
-        if c < 2 * N_FOOT:
-            touch = max(touch, s.loaded[c // N_FOOT] * _nearness(s.points[c, 2], s.gains.settling_reach))
-        rests = _nearness(way, s.gains.lift_time * s.gains.swing_speed)
-        s.near[c] = rests * _nearness(height, s.gains.stance_height)
-        s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)
-        support = max(support, touch * _nearness(height, s.gains.flight_height))
-    s.report[REPORT_FLIES] = 1.0 if lowest > s.gains.flight_height else 0.0
-    return support
 
 
 @njit

@@ -1,0 +1,97 @@
+r"""Support of the physical figure: which contact points bear load, by the reference now and ahead of now.
+
+A contact point of the figure bears load if it touches the floor and the reference has it near the floor and at rest,
+now and at a time T ahead, predicted with constant acceleration,
+
+.. math:: q_r(t + T) \approx q_r \oplus \left(v_r T + \tfrac12 a_r T^2\right) .
+
+There are two such times. A point that leaves the floor within `unload_time` is released, and unloaded in favour of
+the others before, so that its leg need not catch up; where no other bears the load, before a flight, it bears load
+until `lift_time` before it leaves. With the longer time alone the legs would stop pushing too soon: with 0.05 s a
+run has 12.0 % of weight instead of 6, and jumping falls. With the shorter time alone a foot that leaves while the other
+stands is held too long: a dance has 4.1 % instead of 1.9, a spin falls (docs/validation/prepared-captures.md).
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.state import Array
+from controllers.work_array import work_array
+from models.humanoid.skeleton import N_TANGENT
+from sim.body.figure_state import N_FOOT, REPORT_FLIES, FigureState
+from sim.compilation.native import mj_integrate_pos, mj_kinematics
+
+
+@njit
+def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
+    """Set the share of load of each contact point, and return the support.
+
+    A point of the reference that swings low over the floor is not in stance. The support is the largest contact of a
+    point that the reference has below `flight_height` until `lift_time` ahead, 0 to 1.
+
+    Parameters
+    ----------
+    s : FigureState
+        The figure's contact points are read; `share`, `near`, `loaded`, `points` and the report of flight are written.
+    q_r, v_r, a_r : Array
+        Reference pose (75), velocity (57) and acceleration (57).
+    """
+    n, gains = s.share.shape[0], s.gains
+    later, soon, brief = work_array((10, 3)), work_array((10, 3)), work_array(10)
+    _predict(s, q_r, v_r, a_r, gains.unload_time, later)
+    _predict(s, q_r, v_r, a_r, gains.lift_time, soon)
+    s.twin_qpos[:] = q_r
+    mj_kinematics(s.twin_model, s.twin_data)
+    for c in range(n):
+        s.points[c] = s.contact_pos[s.contact[c]]
+        s.points[c, 2] -= s.radius
+    for leg in range(2):
+        s.loaded[leg] = 0.0
+        for c in range(N_FOOT * leg, N_FOOT * leg + N_FOOT):
+            s.loaded[leg] = max(s.loaded[leg], _nearness(s.points[c, 2], gains.contact_reach))
+    support, lowest = 0.0, np.inf
+    for c in range(n):
+        now = s.twin_contact_pos[s.twin_contact[c]]
+        touch = _nearness(s.points[c, 2], gains.contact_reach)
+        if c < 2 * N_FOOT:
+            touch = max(touch, s.loaded[c // N_FOOT] * _nearness(s.points[c, 2], gains.settling_reach))
+        rests = _rest(now, later[c], gains.unload_time * gains.swing_speed)
+        height = max(now[2], later[c, 2]) - s.radius
+        s.near[c] = rests * _nearness(height, gains.stance_height)
+        s.share[c] = touch * rests * _nearness(height, gains.reference_reach)
+        rests = _rest(now, soon[c], gains.lift_time * gains.swing_speed)
+        height = max(now[2], soon[c, 2]) - s.radius
+        brief[c] = touch * rests * _nearness(height, gains.reference_reach)
+        support = max(support, touch * _nearness(height, gains.flight_height))
+        lowest = min(lowest, now[2] - s.radius)
+    lacking = 1.0 - s.share.max()
+    for c in range(n):
+        s.share[c] += lacking * max(brief[c] - s.share[c], 0.0)
+    s.report[REPORT_FLIES] = 1.0 if lowest > gains.flight_height else 0.0
+    return support
+
+
+@njit
+def _predict(s: FigureState, q_r: Array, v_r: Array, a_r: Array, ahead: float, places: Array) -> None:
+    """Write the contact points of the reference at a time ahead, with constant acceleration, shape (10, 3) [m]."""
+    mean = work_array(N_TANGENT)
+    for i in range(N_TANGENT):
+        mean[i] = v_r[i] + 0.5 * ahead * a_r[i]
+    s.twin_qpos[:] = q_r
+    mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, mean.ctypes, ahead)
+    mj_kinematics(s.twin_model, s.twin_data)
+    for c in range(places.shape[0]):
+        places[c] = s.twin_contact_pos[s.twin_contact[c]]
+
+
+@njit
+def _rest(now: Array, then: Array, reach: float) -> float:
+    """1 for a point that does not move over the floor, 0 for one that moves by `reach` or more."""
+    return _nearness(np.sqrt((then[0] - now[0]) ** 2 + (then[1] - now[1]) ** 2), reach)
+
+
+@njit
+def _nearness(height: float, reach: float) -> float:
+    """1 at height 0 or below, 0 from a height `reach` on, C¹ between."""
+    x = min(max(height / reach, 0.0), 1.0)
+    return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
