@@ -16,6 +16,7 @@ from models.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import CLOSES, Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, smoothed, sole_points
 from models.mocap.preparation.stances import stances
@@ -50,6 +51,8 @@ _STEP, _YAW = 0.10, np.deg2rad(15.0)
 # each m/s of its speed, up to the last number.
 _REST = 0.35
 _REST_LONGER, _REST_LONGEST = 0.2, 0.8
+# How far a joint may leave its range as it comes to rest [rad], and how often its time is halved, down to 0.01 s.
+_SLACK, _HALVINGS = np.deg2rad(1.0), 6
 _FRAMES = 500  # frames compared with each other, about: a matrix takes 2 MB; half or twice loops 17 captures alike
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
@@ -77,7 +80,9 @@ class Looped(NamedTuple):
     gap: float
 
 
-def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False) -> Looped:
+def looped(
+    clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False, within: bool = False
+) -> Looped:
     """Close a clip, or bring it to rest at both ends.
 
     Parameters
@@ -90,6 +95,8 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
         Whether the file declares itself to be cyclic; None if it says nothing.
     mirror : bool
         Whether half a stride, or START:END, is to be continued by its mirror image.
+    within : bool
+        Whether joints of an open clip that would leave their ranges as they come to rest do so in less time.
 
     Raises
     ------
@@ -105,7 +112,7 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
             )
         return _closed(clip, *half, half=True)
     if clip.n_frames < 8 or wish == "open":
-        return _rested(clip)
+        return _rested(clip, within)
     if wish != "auto":
         start, end = _wished(clip, wish)
         return _closed(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
@@ -122,7 +129,7 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
         return _with_way_back(clip, gap)
     if _fast(clip) and (half := _half_stride(clip)) is not None:
         return _closed(clip, *half, half=True)
-    return _rested(clip)
+    return _rested(clip, within)
 
 
 def _wished(clip: Clip, wish: str) -> tuple[int, int]:
@@ -278,13 +285,13 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
     return Looped(Clip(np.vstack((clip.poses, way)), clip.fps, clip.name), "way back", 0.0, clip.duration, gap)
 
 
-def _rested(clip: Clip) -> Looped:
+def _rested(clip: Clip, within: bool) -> Looped:
     """The clip with frames added at both ends in which its velocities decay to rest, with the soles on the floor."""
     if clip.n_frames < 2 or clip.fps * _REST < 2.0:
         return Looped(clip, "open", 0.0, clip.duration, 0.0)
     velocities = _calm_velocities(clip)
-    before = _dying(clip.poses[0], -velocities[0], clip.fps)[::-1]
-    after = _dying(clip.poses[-1], velocities[-1], clip.fps)
+    before = _dying(clip.poses[0], -velocities[0], clip.fps, within)[::-1]
+    after = _dying(clip.poses[-1], velocities[-1], clip.fps, within)
     poses = np.vstack((before, clip.poses, after))
     start = -len(before) / clip.fps
     return Looped(Clip(poses, clip.fps, clip.name), "open", start, clip.duration, 0.0)
@@ -295,16 +302,23 @@ def _calm_velocities(clip: Clip) -> Array:
     return smoothed(clip).velocities()
 
 
-def _dying(pose: Array, velocity: Array, fps: float) -> Array:
+def _dying(pose: Array, velocity: Array, fps: float, within: bool) -> Array:
     """Poses in which a velocity decays as (1 − x)² (1 + 2x), x = t/T, while the soles come down to the floor.
 
-    T grows with the root's speed for the root only: with a longer T limbs would pass their joint limits.
+    T grows with the root's speed for the root only: with a longer T limbs would pass their joint limits. With `within`,
+    a joint that would leave its range nevertheless, as by the noise of a first frame, has half of T, or a quarter, ….
     """
-    times = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST), _REST
-    n = round(times[0] * fps)
-    x = np.minimum(np.arange(1, n + 1)[:, None] / (fps * np.array(times)), 1.0)
-    path = (x - x**3 + x**4 / 2.0) * times
-    poses = plus(np.repeat(pose[None], n, axis=0), path[:, np.repeat((0, 1), (3, len(velocity) - 3))] * velocity)
+    longest = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST)
+    times = np.repeat((longest, _REST), (3, len(velocity) - 3))
+    n = round(longest * fps)
+    allowed = np.maximum(beyond_ranges(pose[None])[0], 0.0) + _SLACK
+    for _ in range(_HALVINGS):
+        x = np.minimum(np.arange(1, n + 1)[:, None] / (fps * times), 1.0)
+        poses = plus(np.repeat(pose[None], n, axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
+        leaves = beyond_ranges(poses).max(axis=0) > allowed
+        if not within or not leaves.any():
+            break
+        times[6:] /= 1.0 + np.repeat(leaves, 3)
     low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     poses[:, 2] -= _smooth(x[:, 0]) * low
     return poses

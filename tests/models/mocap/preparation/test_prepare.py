@@ -8,6 +8,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.feasible import borne
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import plus, resampled, sole_points
@@ -94,6 +95,24 @@ def test_noise_in_the_first_frame_does_not_throw_a_limb(walks):
     elbow = slice(6 + 3 * JOINTS.index("left_elbow"), 9 + 3 * JOINTS.index("left_elbow"))
     thrown = pose_difference(plain.poses[:1], noisy.poses[:1])[0, elbow]
     assert np.linalg.norm(thrown) < np.deg2rad(75.0)
+
+
+def test_a_knee_that_would_pass_its_range_stops_within_it_if_that_is_asked_for(walks):
+    """The shank of the first half of a stride, thrown forward at 15 rad/s in its last frames."""
+    opened = Clip(walks[1].poses[: walks[0].n_frames // 2], walks[1].fps, "opened")
+    n, knee = opened.n_frames, 6 + 3 * JOINTS.index("left_knee")
+    poses = opened.poses.copy()
+    for k in range(12):
+        thrown = np.zeros((1, 57))
+        thrown[0, knee + 1] = -15.0 * (12 - k) / opened.fps
+        poses[n - 1 - k] = plus(poses[n - 1 - k : n - k], -thrown)[0]
+    worst = [
+        beyond_ranges(looped(Clip(poses, opened.fps, "thrown"), "open", within=within).clip.poses[n:]).max()
+        for within in (False, True)
+    ]
+    captured = max(beyond_ranges(poses).max(), 0.0)
+    assert worst[0] > captured + np.deg2rad(20.0)
+    assert worst[1] < captured + np.deg2rad(1.01)
 
 
 def test_what_ends_in_the_air_comes_down_to_rest():
