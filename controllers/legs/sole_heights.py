@@ -13,4 +13,4 @@ low swing of walk and run counts as skate, 7.8 cm instead of 0.4; up to half of 
 
 SWINGS = 0.008
 """Height from which a sole swings: the tracking figure no longer holds its foot on the floor [m]. With half or
-twice of it in tracking alone the residual of a jump is 3.5 or 20 % of weight instead of 2.8."""
+twice of it in tracking alone the residual of a jump is 2.9 or 6.3 % of weight instead of 2.8."""

@@ -23,43 +23,44 @@ class FigureGains(NamedTuple):
     joint_rate, root_rate : float
         ω of the critically damped feedback on joints and root [1/s]. They must be equal: both determine where a foot in
         stance is to be, and if they differ, the feedback moves a foot that the floor holds. The residual of `hvf track
-        walk` is 1.2 % with 40 and 40, 12 % with 25 and 40. With 25 and 25 landings of the run are softer, and a figure
+        walk` is 0.6 % with 40 and 40, 2.7 % with 20 and 40. With 25 and 25 landings of the run are softer, and a figure
         that is led retraces its path less exactly.
     joint_reach : float
         Joint error at which the feedback saturates [rad]: a larger error decays at a constant speed, ω/2 times this, so
-        that the motors have torque left to stop the joint. With half of it the residual of the jump is 5.2 % of weight
-        instead of 2.8, with twice the same.
+        that the motors have torque left to stop the joint. Half or twice changes the residual of walk, run
+        and jump by 0.1 % of weight at most.
     root_pull, root_turn : float
         Largest linear and angular acceleration that feedback may ask of the root [m/s²], [rad/s²], so that a late
-        landing is absorbed. Half or twice changes the residual of walk, run and jump by 0.3 % of weight at most.
+        landing is absorbed. Half or twice leaves the residual of walk, run and jump.
     linear_limit, angular_limit : float
         Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is rough. Half or twice of the
-        first leaves the residual of walk, run and jump; half of the second raises the last two by 0.3 and 0.4 %.
+        first leaves the residual of walk, run and jump; half of the second raises the last two by 0.8 and 1.8 %.
     force_bound, moment_bound : float
         Largest residual force as a share of body weight, and moment as a share of body weight × stature: the least
         values tried with which every motion that should stand does (docs/validation/residual-bounds.md).
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
-        With half or twice of the first the residual of the jump is 3.3 or 19.1 % of weight instead of 2.8; of the
-        second, the run's 2.7 or 3.1 instead of 2.8.
+        Half or twice of the first changes the residual of walk, run and jump by 0.1 % of weight at most; of the second,
+        that of the jump by 0.5 and 0.3 %.
     settling_reach : float
         As `contact_reach`, for a point of a foot that bears load on another point [m]: a point about to be set down is
-        planned with, since otherwise the ankle would hold it up. Twice of it lowers the walk's residual from 1.2 to
-        0.9 % of weight, half leaves it.
+        planned with, since otherwise the ankle would hold it up. Half or twice changes the residual of walk, run
+        and jump by 0.1 % of weight at most.
     stance_height : float
         Height of a contact point of the reference from which it is no longer in stance [m]. With half of it the
-        residual of walk, run and jump is 1.0, 2.7 and 3.5 % of weight, with twice 1.4, 3.9 and 20.0 (here 1.2, 2.8 and
+        residual of walk, run and jump is 0.6, 1.8 and 2.9 % of weight, with twice 0.8, 2.2 and 6.3 (here 0.6, 1.7 and
         2.8).
     swing_speed : float
         Horizontal speed of a low contact point of the reference from which it is in swing, not in stance [m/s]. Half
         or twice changes the residual of walk, run and jump by 0.1 % of weight at most.
     flight_height : float
         The reference flies, and no residual is applied, while all its contact points are higher than this [m]. With
-        half or twice of it the residual of the jump is 5.7 or 4.9 % of weight instead of 2.8.
-    lift_time : float
-        Prediction time for contact points of the reference that are about to be lifted [s]. With half of it the
-        residual of walk, run and jump is 1.3, 4.0 and 17.5 % of weight, and the jump falls; with twice 0.9, 1.0 and
-        2.9.
+        half or twice of it the residual of the jump is 3.2 or 2.4 % of weight instead of 2.8.
+    lift_time, unload_time : float
+        Prediction times for contact points of the reference that are about to leave the floor: into a flight, and while
+        others bear the load (`sim.body.support`) [s]. Half or twice of the first changes the residual of walk, run and
+        jump by 0.2 % of weight at most; with half of the second they are 0.9, 2.9 and 5.3 %, with twice 0.8, 1.8 and
+        3.1. Of twelve captures 0.04 to 0.07 s hardly differ.
     placement_reach : float
         Largest horizontal displacement of a foot in flight from its place relative to the root towards its place in the
         world (`sim.body.foot_placement`) [m]. Without it the residual of cmu 01_01 (jumps and turns) is 12.9 % of
