@@ -1,11 +1,11 @@
 r"""Contact detection: the contact schedule of a capture, from motion of its soles and from its vertical load.
 
-Heel and toes of a foot stand while they are near the floor and slow; each stance has one flat place on the floor. Toes
-at rest beside a standing heel stand as well. Where nothing stands although the centre of mass accelerates as if under
-load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the stance came before and on
-the lower part of the foot if it comes after. Without such a stance the lowest part of the feet bears load while
-sliding, most of which `root_path` removes before. An open clip with an upright end rests there on both feet, since
-nobody can rest on the toes of one, as captures may be cut.
+Heel and toes of a foot stand while they rest (`contacts.resting_parts`), up to a share of the root's speed, as errors
+of leg length make feet skate; each stance has one flat place on the floor. Where nothing stands although the centre of
+mass accelerates as if under load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if
+the stance came before and on the lower part of the foot if it comes after. Without such a stance the lowest part of the
+feet bears load while sliding, most of which `root_path` removes before. An open clip with an upright end rests there on
+both feet, since nobody can rest on the toes of one, as captures may be cut.
 """
 
 from typing import NamedTuple
@@ -16,20 +16,17 @@ from scipy.ndimage import gaussian_filter1d
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
+from models.mocap.dynamics.contacts import resting_parts
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.spans import cleaned, spans
 from models.mocap.preparation.poses import around, sole_points
 
-# Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
-_REACH = 0.045  # largest height of a standing part of a sole [m]
-_SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's speed: errors of leg length make feet skate
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
-# the frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
-_LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
-_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot whose stance is extended [m]
-_GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
+# the frames of 19 captures.
+_LOW, _FAR = 0.10, 0.15  # largest height and travel of a foot whose stance is extended [m]
 _LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
 _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
@@ -180,16 +177,17 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
 
 def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Array]:
     """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs, and this load (n,)."""
-    parts = _parts(points, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+    pace = np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps
+    parts = resting_parts(points, fps, pace)
     load = _load(calm, fps)
-    for start, end in _runs(_bare(parts, load, fps)):
+    for start, end in spans(_bare(parts, load, fps)):
         _bear(points, parts, start, end)
     return parts, load
 
 
 def _bare(parts: Mask, load: Array, fps: float) -> Mask:
     """Where nothing stands under load, shape (n,)."""
-    return _cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)
+    return cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)
 
 
 def _slides(points: Array, parts: Mask, load: Array, fps: float) -> Mask:
@@ -197,19 +195,6 @@ def _slides(points: Array, parts: Mask, load: Array, fps: float) -> Mask:
     heights = points[:, :, 2] - CONTACT_RADIUS
     lowest = heights.min(axis=1, keepdims=True)
     return _bare(parts, load, fps)[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
-
-
-def _parts(points: Array, pace: Array, fps: float) -> Mask:
-    """Whether heel and toes of each foot stand, shape (n, 2 feet, 2 parts)."""
-    middles = points.reshape(len(points), 2, 2, 2, 3).mean(axis=3)
-    heights = middles[..., 2] - CONTACT_RADIUS
-    speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
-    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
-    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _LOW) & (speeds[:, :, 1] < _REST)
-    for foot in range(2):
-        for part in range(2):
-            stands[:, foot, part] = _cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
-    return stands
 
 
 def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
@@ -231,7 +216,7 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
     """Write the places of one foot's spheres: one flat placement for each stance."""
     heel, toe = parts.T
     yaw = np.unwrap(_heading(turned))
-    for start, end in _runs(heel | toe):
+    for start, end in spans(heel | toe):
         span = np.arange(start, end)
         flat = span[heel[span] & toe[span]]
         if len(flat) >= 4:
@@ -247,7 +232,7 @@ def _kept(standing: Mask, places: Array, width: int) -> Array:
     """Share with which spheres keep their places; `places` are extended over the frames beside stances."""
     share = standing.astype(np.float64)
     for sphere in range(standing.shape[1]):
-        for start, end in _runs(standing[:, sphere]):
+        for start, end in spans(standing[:, sphere]):
             for away in range(1, width + 1):
                 left = 1.0 - away / (width + 1)
                 for at, stance in ((start - away, start), (end - 1 + away, end - 1)):
@@ -280,21 +265,3 @@ def _load(poses: Array, fps: float) -> Array:
     height = momentum(Clip(poses, fps, "load")).com[:, 2]
     rising = np.gradient(np.gradient(height)) * fps**2
     return gaussian_filter1d(rising / GRAVITY + 1.0, _SMOOTHING * fps)
-
-
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Start and end indices of the runs of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _cleaned(mask: Mask, gap: int, short: int) -> Mask:
-    """The mask with gaps shorter than `gap` filled, except at its ends, and runs shorter than `short` dropped."""
-    mask = mask.copy()
-    for start, end in _runs(~mask):
-        if end - start < gap and start > 0 and end < len(mask):
-            mask[start:end] = True
-    for start, end in _runs(mask):
-        if end - start < short:
-            mask[start:end] = False
-    return mask
