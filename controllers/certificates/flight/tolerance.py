@@ -56,7 +56,7 @@ class ContactTolerance:
     """Tolerances of contacts between flights.
 
     Chosen on 22 retargeted captures: in the six with real jumps, soles stand within 5 mm of the floor and stay within
-    17 mm of that height, a foot slides by up to 8 cm, and no contact is at rest for up to 0.19 s.
+    17 mm of that height, a foot slides by up to 7 cm, and no contact is at rest for up to 0.19 s.
 
     Parameters
     ----------

@@ -4,8 +4,9 @@ A part of the body that bears load is near the floor *and* at rest. Height alone
 clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which the
 figure lacks, so their height threshold is larger.
 
-Which feet of a motion stand is decided by one rule, here and in `preparation`: heel and toes rest, each as a whole and
-for some time (`resting_parts`). What touches is more than what rests, lest a flight be found where something may bear.
+Which feet of a motion stand is decided by one rule, here and in `preparation`: that of `standing_parts`. A foot that
+stands rests as well while it is slow; in captures it may slide meanwhile, since feet of runners do for errors of leg
+length. What touches is more than what stands, lest a flight be found where something may bear load.
 """
 
 from typing import NamedTuple
@@ -24,15 +25,15 @@ _CERTAIN = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
 # Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
 _NEAR, _HAND_NEAR = 0.06, 0.12
-# Height [m] and speed [m/s] below which heel or toes rest. Chosen on eight captures (../shared/prepare-prototype.md):
+# Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures (../shared/prepare-prototype.md):
 # ±1 cm and ±0.1 m/s move the residual of what is prepared by less than 1 point.
 _REACH, _SLOW = 0.045, 0.55
-# Share of the root's speed at which they still rest where preparation holds them afterwards. Elsewhere they do not: led
-# with it, SNU's run has a residual of 15 % of weight instead of 8, and the embedded run slides 3.8 cm instead of 2.4.
+# Share of the root's speed below which they stand, too, but do not rest: if they did, SNU's run, led, would have a
+# residual of 15 % of weight instead of 8, and the embedded run's soles would slide by 3.8 cm instead of 2.4.
 _SHARE = 0.3
 # Half or twice of each of the next numbers changes whether a sphere stands in 0.9 % or less of the frames of 19
 # captures (in one of them 9 %, with stances of up to 0.12 s dropped).
-_TOES, _STILL = 0.10, 0.15  # largest height [m] and speed [m/s] of toes that rest beside a resting heel
+_TOES, _STILL = 0.10, 0.15  # largest height [m] and speed [m/s] of toes that stand beside a standing heel
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
 # Largest height of a settled foot over the median of its stance [m]: half or twice of it moves led slides by 0.7 cm.
 _HIGHER = 0.005
@@ -51,7 +52,7 @@ class Contacts(NamedTuple):
     touching : array of bool, shape (n, m)
         Whether a part is taken to bear load.
     resting : array of bool, shape (n, m)
-        Whether it does so at rest, of a foot by `resting_parts`; one that slides over the floor does not rest.
+        Whether it does so at rest; a foot rests where it stands (`standing_parts`) and is slow.
     """
 
     heights: Array
@@ -113,38 +114,40 @@ def contacts(clip: Clip) -> Contacts:
     near = np.full(heights.shape[1], _NEAR)
     near[feet : len(spheres)] = _HAND_NEAR
     slow = (heights < near) & (speeds < _SLOW)
-    rests = slow.copy()
-    rests[:, :feet] = np.repeat(resting_parts(places[:, :feet], clip.fps), 2, axis=2).reshape(-1, feet)
     skids = (heights < _LOW) & (slides < _LEVEL)
-    return Contacts(heights, (heights < _CERTAIN) | slow | skids | rests, rests)
+    rests = slow.copy()
+    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps)
+    rests[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
+    return Contacts(heights, (heights < _CERTAIN) | slow | skids, rests)
 
 
-def resting_parts(soles: Array, fps: float, pace: Array | float = 0.0) -> Mask:
-    """Whether heel and toes of each foot rest on the floor z = 0, shape (n, 2 feet, 2 parts).
+def standing_parts(soles: Array, root: Array, fps: float) -> Mask:
+    """Whether heel and toes of each foot stand on the floor z = 0, shape (n, 2 feet, 2 parts).
 
-    A part rests while its middle is lower than `_REACH` and slower than `_SLOW`; toes rest beside a resting heel up to
-    `_TOES`, if they are slower than `_STILL`. Gaps shorter than `_GAP` are filled, stances shorter than `_SHORT`
-    dropped.
+    A part stands while its middle is lower than `_REACH` and slower than `_SLOW`, or than `_SHARE` of the root's speed;
+    toes stand beside a standing heel up to `_TOES`, if they are slower than `_STILL`. Gaps shorter than `_GAP` are
+    filled, stances shorter than `_SHORT` dropped.
 
     Parameters
     ----------
     soles : array, shape (n, 8, 3)
         Centres of the contact spheres [m], in the order of `FOOT_CONTACTS`.
+    root : array, shape (n, 2)
+        Positions of the root over the floor [m].
     fps : float
         Frame rate [1/s].
-    pace : array, shape (n,), or float
-        Speed of the root over the floor [m/s]; a part rests up to `_SHARE` of it.
     """
     middles = soles.reshape(len(soles), 2, 2, 2, 3).mean(axis=3)
-    heights, speeds = middles[..., 2] - CONTACT_RADIUS, np.zeros(middles.shape[:3])
-    if len(middles) > 1:
+    heights, speeds, pace = middles[..., 2] - CONTACT_RADIUS, np.zeros(middles.shape[:3]), np.zeros(len(soles))
+    if len(soles) > 1:
         speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
-    rests = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * np.reshape(pace, (-1, 1, 1))))
-    rests[:, :, 1] |= rests[:, :, 0] & (heights[:, :, 1] < _TOES) & (speeds[:, :, 1] < _STILL)
+        pace = np.linalg.norm(np.gradient(root, axis=0), axis=1) * fps
+    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
+    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _TOES) & (speeds[:, :, 1] < _STILL)
     for foot in range(2):
         for part in range(2):
-            rests[:, foot, part] = cleaned(rests[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
-    return rests
+            stands[:, foot, part] = cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
+    return stands
 
 
 def _slower_side(speeds: Array) -> Array:

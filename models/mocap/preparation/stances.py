@@ -1,11 +1,11 @@
 r"""Contact detection: the contact schedule of a capture, from motion of its soles and from its vertical load.
 
-Heel and toes of a foot stand while they rest (`contacts.resting_parts`), up to a share of the root's speed, as errors
-of leg length make feet skate; each stance has one flat place on the floor. Where nothing stands although the centre of
-mass accelerates as if under load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if
-the stance came before and on the lower part of the foot if it comes after. Without such a stance the lowest part of the
-feet bears load while sliding, most of which `root_path` removes before. An open clip with an upright end rests there on
-both feet, since nobody can rest on the toes of one, as captures may be cut.
+Heel and toes of a foot stand by the rule of all contacts (`standing_parts`); each stance has one flat place on the
+floor. Where nothing stands although the centre of mass accelerates as if under load, the capture skates or hovers: a
+neighbouring stance is then extended, on the toes if the stance came before and on the lower part of the foot if it
+comes after. Without such a stance the lowest part of the feet bears load while sliding, most of which `root_path`
+removes before. An open clip with an upright end rests there on both feet, since nobody can rest on the toes of one, as
+captures may be cut.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.dynamics.contacts import resting_parts
+from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
@@ -177,8 +177,7 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
 
 def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask, Array]:
     """Whether heel and toes of each foot stand, (n, 2, 2), stances extended as the load needs, and this load (n,)."""
-    pace = np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps
-    parts = resting_parts(points, fps, pace)
+    parts = standing_parts(points, poses[:, :2], fps)
     load = _load(calm, fps)
     for start, end in spans(_bare(parts, load, fps)):
         _bear(points, parts, start, end)
