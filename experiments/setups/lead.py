@@ -85,8 +85,11 @@ def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    clip, closes = lap_of(clip).clip, clip.closes(CLOSES)
-    marks = contacts(clip)
+    lap, closes = lap_of(clip), clip.closes(CLOSES)
+    # Of the whole clip: stances go on over the ends of the lap.
+    first = round(lap.start * clip.fps)
+    marks = Contacts(*(of_parts[first : first + lap.clip.n_frames] for of_parts in contacts(clip)))
+    clip = lap.clip
     if not closes:
         return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
     made = _led(clip, legs, marks.planted[:-1], None)

@@ -4,9 +4,9 @@ A part of the body that bears load is near the floor *and* at rest. Height alone
 clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which the
 figure lacks, so their height threshold is larger.
 
-Which feet of a motion stand is decided by one rule, here and in `preparation`: that of `standing_parts`. A foot that
-stands rests as well while it is slow; in captures it may slide meanwhile, since feet of runners do for errors of leg
-length. What touches is more than what stands, lest a flight be found where something may bear load.
+Which feet of a motion stand is decided by one rule, here and in `preparation`: that of `standing_parts`. By errors of
+leg length the feet of captured runners slide while they stand; a foot rests where it stands and is slow. What touches
+is decided more leniently, lest a flight be found where something may bear load.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ import numpy as np
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
 from models.mocap.motion.spans import cleaned, spans
 
 # Height below which a part touches at any speed [m]: half or twice changes whether a body is supported in 0.8 % of the
@@ -70,7 +70,7 @@ class Contacts(NamedTuple):
         return np.any(self.touching, axis=1)
 
     @property
-    def standing(self) -> Mask:
+    def loaded(self) -> Mask:
         """Whether each foot bears load, left and right, shape (n, 2)."""
         return np.stack([self.touching[:, :4].any(axis=1), self.touching[:, 4:8].any(axis=1)], axis=1)
 
@@ -116,12 +116,12 @@ def contacts(clip: Clip) -> Contacts:
     slow = (heights < near) & (speeds < _SLOW)
     skids = (heights < _LOW) & (slides < _LEVEL)
     rests = slow.copy()
-    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps)
+    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSES))
     rests[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
     return Contacts(heights, (heights < _CERTAIN) | slow | skids, rests)
 
 
-def standing_parts(soles: Array, root: Array, fps: float) -> Mask:
+def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) -> Mask:
     """Whether heel and toes of each foot stand on the floor z = 0, shape (n, 2 feet, 2 parts).
 
     A part stands while its middle is lower than `_REACH` and slower than `_SLOW`, or than `_SHARE` of the root's speed;
@@ -136,6 +136,8 @@ def standing_parts(soles: Array, root: Array, fps: float) -> Mask:
         Positions of the root over the floor [m].
     fps : float
         Frame rate [1/s].
+    closed : bool
+        Whether the last frame is the first of the next lap, so that a stance may go on over the seam.
     """
     middles = soles.reshape(len(soles), 2, 2, 2, 3).mean(axis=3)
     heights, speeds, pace = middles[..., 2] - CONTACT_RADIUS, np.zeros(middles.shape[:3]), np.zeros(len(soles))
@@ -146,7 +148,7 @@ def standing_parts(soles: Array, root: Array, fps: float) -> Mask:
     stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _TOES) & (speeds[:, :, 1] < _STILL)
     for foot in range(2):
         for part in range(2):
-            stands[:, foot, part] = cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
+            stands[:, foot, part] = cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps), closed)
     return stands
 
 

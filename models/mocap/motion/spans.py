@@ -11,11 +11,16 @@ def spans(mask: Mask) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def cleaned(mask: Mask, gap: int, short: int) -> Mask:
+def cleaned(mask: Mask, gap: int, short: int, closed: bool = False) -> Mask:
     """The mask with gaps shorter than `gap` filled, except at its ends, and runs shorter than `short` dropped.
 
-    A mask that is True throughout keeps its run, however short: what is before and after it is unknown.
+    A mask that is True throughout keeps its run, however short: what is before and after it is unknown. A closed one,
+    whose last frame repeats the first, has no ends.
     """
+    if closed and len(mask) > 1:
+        lap = mask[:-1]
+        lap = cleaned(np.tile(lap, 3), gap, short)[len(lap) : 2 * len(lap)]
+        return np.append(lap, lap[0])
     mask = mask.copy()
     for start, end in spans(~mask):
         if end - start < gap and start > 0 and end < len(mask):

@@ -29,3 +29,15 @@ def test_short_gaps_within_are_filled_then_short_runs_dropped_but_not_a_whole_ma
     given = mask(marks)
     np.testing.assert_array_equal(cleaned(given, 3, 4), mask(expected))
     np.testing.assert_array_equal(given, mask(marks))
+
+
+@pytest.mark.parametrize(
+    ("marks", "expected"),
+    [
+        ("##.....###", "##.....###"), ("##........", ".........."), (".#####..#.", "##########"), ("#", "#"),
+        ("#####.#####", "###########"), (".####.....", ".####....."), ("....####..", "....####.."),
+    ],
+)  # fmt: skip
+def test_runs_and_gaps_go_on_over_the_seam_of_a_closed_mask(marks, expected):
+    given = mask(marks)
+    np.testing.assert_array_equal(cleaned(given, 3, 4, closed=True), mask(expected))
