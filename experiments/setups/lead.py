@@ -86,9 +86,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
         If the clip does not travel, or has no frame in which a foot stands.
     """
     lap, closes = lap_of(clip), clip.closes(CLOSES)
-    # Of the whole clip: stances go on over the ends of the lap.
-    first = round(lap.start * clip.fps)
-    marks = Contacts(*(of_parts[first : first + lap.clip.n_frames] for of_parts in contacts(clip)))
+    marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
     clip = lap.clip
     if not closes:
         return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))

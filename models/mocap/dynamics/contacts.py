@@ -59,6 +59,11 @@ class Contacts(NamedTuple):
     touching: Mask
     resting: Mask
 
+    def within(self, first: int, count: int) -> "Contacts":
+        """The contacts of `count` frames from the first on: of a part of a clip, with stances that began before it."""
+        frames = slice(first, first + count)
+        return Contacts(self.heights[frames], self.touching[frames], self.resting[frames])
+
     @property
     def clearance(self) -> Array:
         """Height of the lowest point of the body [m], shape (n,)."""

@@ -6,6 +6,7 @@ import pytest
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.contacts import contacts, standing_parts
 from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
@@ -95,3 +96,19 @@ def test_a_foot_of_a_runner_that_stands_rests_unless_it_moves_before_and_after()
     assert rolls.any()
     assert not (rolls & ~moves).any()
     assert not (rests[1:-1] & moves).any()
+
+
+def test_a_stance_goes_on_over_the_ends_of_a_lap_and_the_seam_of_a_closed_clip():
+    walk = embedded("walk")
+    lap, whole = walk.n_frames - 1, contacts(walk)
+    lands = int(np.flatnonzero(np.diff(whole.planted[:, 0].astype(int)) > 0)[0]) + 1
+    # A lap that begins 3 frames after the foot lands, and so ends with the first 25 ms of its next stance.
+    turned = (np.arange(lap) + lands + 3) % lap
+    laps = np.vstack([walk.poses[:-1], walk.displacement.moved(walk.poses)])
+    moved = Clip(laps[lands + 3 : lands + 3 + lap + 1], walk.fps, "later")
+    found = contacts(moved).planted[:-1, 0]
+    assert found[-3:].all()
+    np.testing.assert_array_equal(found[10:-10], whole.planted[turned, 0][10:-10])
+    part = contacts(walk).within(lands, 4)
+    assert part.planted[:, 0].all()
+    assert part.planted.shape == (4, 2)
