@@ -39,7 +39,7 @@ hand races its clip. Half or twice for feet moves joints by 1 rad/s in 8 ms at m
 _LIFT = 0.2
 _TURN_ARM = 0.1  # [m] lever that converts the turn of a foot to a length of its step: half the length of its sole
 _ROUND = 3e-3  # [m] length of a step below which it is hardly lifted
-_LEVEL = 0.01  # [m] feet that differ by less in height count as equally high
+_LEVEL = 0.01  # [m] feet that differ by less in height count as equally high: of single poses, which have no speed
 _FIRST = 1e3  # urgency of a stance foot's step; that of any other foot is below it: 1 m high it has 100
 # [m] largest stopping distance of a foot, unless it is too fast for that. With half of it the worst of these changes
 # slides 1.3 cm instead of 2.9, and the worst stop is 9 cm in the air instead of 12; with twice 17.

@@ -11,7 +11,7 @@ from sim.reference.reference import poses_along
 
 # A foot that is planned to bear load but is not held in place twists on the spot. A led figure may stop anywhere, so
 # its contact points are unloaded at half the height (reference_reach) at which they are released (stance_height).
-_WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005)
+_WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005, unload_time=0.005)
 # A gait with flights changes feet within a hundredth of a second, and with the low reach would stand on neither; a gait
 # kept on the ground takes a little longer.
 _FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace(reference_reach=0.01)

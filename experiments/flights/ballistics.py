@@ -26,6 +26,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import sole_points
 from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL
@@ -117,8 +118,7 @@ def body_contact(clip: Clip) -> BodyContact:
     touched, points = contacts(clip), sole_points(clip.poses)
     travelled = [0.0]
     for part in range(points.shape[1]):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], touched.resting[:, part].astype(np.int8), [0]])))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for start, end in spans(touched.resting[:, part]):
             stance = points[start:end, part, :2]
             travelled.append(float(np.linalg.norm(stance - np.median(stance, axis=0), axis=1).max()))
     turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)

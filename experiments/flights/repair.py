@@ -112,10 +112,10 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
         RepairTask(
             fps=clip.fps, com=moved.com[window], angular=moved.angular[window], clearance=touching.clearance[window],
             flights=[(a - first, b - first) for a, b in touched], legs=lines[window],
-            standing=touching.standing[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
+            standing=touching.loaded[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
         )
     )  # fmt: skip
-    done = over_the_floor(_carried_out(clip, plan, first, touched, touching.standing))
+    done = over_the_floor(_carried_out(clip, plan, first, touched, touching.loaded))
     return Repaired(done, before, clip_ballistics(done, judging), plan)
 
 

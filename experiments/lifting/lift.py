@@ -279,7 +279,7 @@ def _labels(names: Sequence[str]) -> tuple[str, ...]:
 
 def _motion(clip: Clip, name: str, must_close: bool) -> Motion:
     closed = must_close or (clip.n_frames > 1 and closes(checked_clip(clip.poses, clip.fps, name)))
-    return Motion(clip.poses, clip.fps, name, closed, contacts(clip).standing)
+    return Motion(clip.poses, clip.fps, name, closed, contacts(clip).loaded)
 
 
 def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:

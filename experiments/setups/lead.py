@@ -85,8 +85,9 @@ def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    clip, closes = lap_of(clip).clip, clip.closes(CLOSES)
-    marks = contacts(clip)
+    lap, closes = lap_of(clip), clip.closes(CLOSES)
+    marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
+    clip = lap.clip
     if not closes:
         return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
     made = _led(clip, legs, marks.planted[:-1], None)

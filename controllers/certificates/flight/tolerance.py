@@ -56,7 +56,7 @@ class ContactTolerance:
     """Tolerances of contacts between flights.
 
     Chosen on 22 retargeted captures: in the six with real jumps, soles stand within 5 mm of the floor and stay within
-    17 mm of that height, a foot slides by up to 9 cm, and no contact is at rest for up to 0.12 s.
+    17 mm of that height, a foot slides by up to 7 cm, and no contact is at rest for up to 0.19 s.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class ContactTolerance:
 
     floor: float = 0.008
     spread: float = 0.02
-    unheld: float = 0.15
+    unheld: float = 0.24
     skate: float = 0.12
     push: float = 150.0
     leap: float = 0.5

@@ -20,7 +20,8 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.motion.clip import Clip
 
-_SUPPORT_HEIGHT = 0.006  # height below which a contact sphere counts as support [m]
+# Height below which a contact sphere is support [m], at any speed, unlike in `contacts`: authored soles are exact.
+_SUPPORT_HEIGHT = 0.006
 
 
 class Dynamics(NamedTuple):

@@ -3,6 +3,10 @@
 A part of the body that bears load is near the floor *and* at rest. Height alone does not suffice: the soles of runners
 clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which the
 figure lacks, so their height threshold is larger.
+
+Which feet of a motion stand is decided by one rule, here and in `preparation`: that of `standing_parts`. By errors of
+leg length the feet of captured runners slide while they stand; a foot rests where it stands and is slow. What touches
+is decided more leniently, lest a flight be found where something may bear load.
 """
 
 from typing import NamedTuple
@@ -12,18 +16,25 @@ import numpy as np
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.spans import cleaned, spans
 
 # Height below which a part touches at any speed [m]: half or twice changes whether a body is supported in 0.8 % of the
 # frames of 17 captures.
 _CERTAIN = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
 # Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
-_REACH, HAND_REACH = 0.06, 0.12
-# Speed below which it rests [m/s]: soles slip and roll more slowly in stance, and pass faster in swing. Knees of
-# eight led captures accelerate by up to 1040 rad/s², with half of it 700 (and roots 1 cm lower), with twice 2090; the
-# worst slides 3.0, 3.3 and 4.0 cm.
-_SLOW = 0.6
+_NEAR, HAND_REACH = 0.06, 0.12
+# Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures (../shared/prepare-prototype.md):
+# ±1 cm and ±0.1 m/s move the residual of what is prepared by less than 1 point.
+_REACH, _SLOW = 0.045, 0.55
+# Share of the root's speed below which they stand, too, but do not rest: if they did, SNU's run, led, would have a
+# residual of 15 % of weight instead of 8, and the embedded run's soles would slide by 3.8 cm instead of 2.4.
+_SHARE = 0.3
+# Half or twice of each of the next numbers changes whether a sphere stands in 0.9 % or less of the frames of 19
+# captures (in one of them 9 %, with stances of up to 0.12 s dropped).
+_TOES, _STILL = 0.10, 0.15  # largest height [m] and speed [m/s] of toes that stand beside a standing heel
+GAP, SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
 # Largest height of a settled foot over the median of its stance [m]: half or twice of it moves led slides by 0.7 cm.
 _HIGHER = 0.005
 # A part below this height [m] and vertical speed [m/s] slides over the floor. Half of the first changes whether a body
@@ -41,12 +52,17 @@ class Contacts(NamedTuple):
     touching : array of bool, shape (n, m)
         Whether a part is taken to bear load.
     resting : array of bool, shape (n, m)
-        Whether it does so at rest; a foot that slides over the floor in mid-swing does not rest.
+        Whether it does so at rest; a foot rests where it stands (`standing_parts`) and is slow.
     """
 
     heights: Array
     touching: Mask
     resting: Mask
+
+    def within(self, first: int, count: int) -> "Contacts":
+        """The contacts of `count` frames from the first on: of a part of a clip, with stances that began before it."""
+        frames = slice(first, first + count)
+        return Contacts(self.heights[frames], self.touching[frames], self.resting[frames])
 
     @property
     def clearance(self) -> Array:
@@ -59,7 +75,7 @@ class Contacts(NamedTuple):
         return np.any(self.touching, axis=1)
 
     @property
-    def standing(self) -> Mask:
+    def loaded(self) -> Mask:
         """Whether each foot bears load, left and right, shape (n, 2)."""
         return np.stack([self.touching[:, :4].any(axis=1), self.touching[:, 4:8].any(axis=1)], axis=1)
 
@@ -74,8 +90,7 @@ class Contacts(NamedTuple):
         settled = self.planted
         for foot, stands in enumerate(settled.T):
             lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
-            edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(int), [0]))))
-            for start, end in zip(edges[::2], edges[1::2], strict=True):
+            for start, end in spans(stands):
                 level = float(np.median(lowest[start:end]))
                 settled[start:end, foot] = lowest[start:end] < level + _HIGHER
         return settled
@@ -94,17 +109,52 @@ def contacts(clip: Clip) -> Contacts:
         data.qpos = pose
         mujoco.mj_kinematics(model, data)
         R = data.geom_xmat[others].reshape(-1, 3, 3)
-        places[k, : len(spheres)] = data.geom_xpos[spheres] - (0.0, 0.0, CONTACT_RADIUS)
+        places[k, : len(spheres)] = data.geom_xpos[spheres]
         places[k, len(spheres) :] = data.geom_xpos[others] + np.einsum("gij,gj->gi", R, middle)
         places[k, len(spheres) :, 2] -= np.einsum("gj,gj->g", np.abs(R[:, 2]), half)
-    slides = _slower_side(np.abs(np.diff(places[:, :, 2], axis=0)) * clip.fps)
+    heights, feet = places[:, :, 2].copy(), len(FOOT_CONTACTS)
+    heights[:, : len(spheres)] -= CONTACT_RADIUS
     speeds = _slower_side(np.linalg.norm(np.diff(places, axis=0), axis=2) * clip.fps)
-    heights = places[:, :, 2]
-    reach = np.full(heights.shape[1], _REACH)
-    reach[len(FOOT_CONTACTS) : len(spheres)] = HAND_REACH
-    rests = (heights < reach) & (speeds < _SLOW)
+    slides = _slower_side(np.abs(np.diff(heights, axis=0)) * clip.fps)
+    near = np.full(heights.shape[1], _NEAR)
+    near[feet : len(spheres)] = HAND_REACH
+    slow = (heights < near) & (speeds < _SLOW)
     skids = (heights < _LOW) & (slides < _LEVEL)
-    return Contacts(heights, (heights < _CERTAIN) | rests | skids, rests)
+    rests = slow.copy()
+    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSES))
+    rests[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
+    return Contacts(heights, (heights < _CERTAIN) | slow | skids, rests)
+
+
+def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) -> Mask:
+    """Whether heel and toes of each foot stand on the floor z = 0, shape (n, 2 feet, 2 parts).
+
+    A part stands while its middle is lower than `_REACH` and slower than `_SLOW`, or than `_SHARE` of the root's speed;
+    toes stand beside a standing heel up to `_TOES`, if they are slower than `_STILL`. Gaps shorter than `GAP` are
+    filled, stances shorter than `SHORT` dropped.
+
+    Parameters
+    ----------
+    soles : array, shape (n, 8, 3)
+        Centres of the contact spheres [m], in the order of `FOOT_CONTACTS`.
+    root : array, shape (n, 2)
+        Positions of the root over the floor [m].
+    fps : float
+        Frame rate [1/s].
+    closed : bool
+        Whether the last frame is the first of the next lap, so that a stance may go on over the seam.
+    """
+    middles = soles.reshape(len(soles), 2, 2, 2, 3).mean(axis=3)
+    heights, speeds, pace = middles[..., 2] - CONTACT_RADIUS, np.zeros(middles.shape[:3]), np.zeros(len(soles))
+    if len(soles) > 1:
+        speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
+        pace = np.linalg.norm(np.gradient(root, axis=0), axis=1) * fps
+    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
+    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _TOES) & (speeds[:, :, 1] < _STILL)
+    for foot in range(2):
+        for part in range(2):
+            stands[:, foot, part] = cleaned(stands[:, foot, part], round(GAP * fps), round(SHORT * fps), closed)
+    return stands
 
 
 def _slower_side(speeds: Array) -> Array:

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
-from models.mocap.dynamics.contacts import HAND_REACH, contacts
+from models.mocap.dynamics.contacts import GAP, HAND_REACH, SHORT, contacts
 from models.mocap.dynamics.floor_forces import WITH_HANDS, Floor
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.runs import GAP, SHORT, cleaned, runs
+from models.mocap.motion.spans import cleaned, spans
 
 # [body weights]: of 39 times that a palm rests near the floor in falls of LAFAN and in a crawl, a roll and two gettings
 # up of DeepMimic, 32 make up for 0.27 or more, 7 for 0.17 or less; with half of it five more bear load, with twice
@@ -53,7 +53,7 @@ def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: flo
     gain[frames] = _made_up_for(calm, frames, feet[frames], rests[frames], fps)
     bears = none
     for hand in range(len(HAND_CONTACTS)):
-        for start, end in runs(rests[:, hand]):
+        for start, end in spans(rests[:, hand]):
             bears[start:end, hand] = gain[start:end].mean() > _NEEDED
     return bears
 

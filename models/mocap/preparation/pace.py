@@ -63,7 +63,10 @@ def paced(clip: Clip) -> Paced:
 
 
 def falling(clip: Clip) -> float | None:
-    """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None."""
+    """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None.
+
+    By heights alone, unlike `contacts`, since the rate in doubt is that of all speeds.
+    """
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     edges = np.flatnonzero(np.diff(np.concatenate(([0], (heights > _HIGH).astype(int), [0]))))
     spans = [

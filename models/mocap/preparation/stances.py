@@ -1,12 +1,11 @@
 r"""Contact detection: the contact schedule of a capture, from motion of its soles and from its vertical load.
 
-Heel and toes of a foot stand while they are near the floor and slow; each stance has one flat place on the floor. Toes
-at rest beside a standing heel stand as well. Where nothing stands although the centre of mass accelerates as if under
-load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the stance came before and on
-the lower part of the foot if it comes after. Without such a stance the lowest part of the feet bears load while
-sliding, most of which `root_path` removes before. An open clip with an upright end rests there on both feet, since
-nobody can rest on the toes of one, as captures may be cut. Hands are in the schedule of a clip in which they bear load
-(`hand_stances`), and only there.
+Heel and toes of a foot stand by the rule of all contacts (`standing_parts`); each stance has one flat place on the
+floor. Where nothing stands although the centre of mass accelerates as if under load, the capture skates or hovers: a
+neighbouring stance is then extended, on the toes if the stance came before and on the lower part of the foot if it
+comes after. Without such a stance the lowest part of the feet bears load while sliding, most of which `root_path`
+removes before. An open clip with an upright end rests there on both feet, since nobody can rest on the toes of one, as
+captures may be cut. Hands are in the schedule of a clip in which they bear load (`hand_stances`), and only there.
 """
 
 from typing import NamedTuple
@@ -17,21 +16,18 @@ from scipy.ndimage import gaussian_filter1d
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS
+from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import WITH_HANDS, soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.spans import cleaned, spans
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
-from models.mocap.preparation.runs import GAP, SHORT, cleaned, runs
 
-# Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
-_REACH = 0.045  # largest height of a standing part of a sole [m]
-_SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's speed: errors of leg length make feet skate
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
-# the frames of 19 captures (in one of them 9 %, with stances of up to 0.12 s dropped).
-_LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
-_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of what stands longer [m]
+# the frames of 19 captures.
+_LOW, _FAR = 0.10, 0.15  # largest height of a foot, and travel of what stands longer, where a stance is extended [m]
 _LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
 _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
@@ -105,7 +101,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         mine = slice(4 * foot, 4 * foot + 4)
         _place(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], parts[:, foot], places[:, mine])
     for palm, bears in enumerate(hands.T, start=_N_SOLES):
-        for start, end in runs(bears):
+        for start, end in spans(bears):
             places[start:end, palm, :2] = np.median(points[start:end, palm, :2], axis=0)
     sliding = np.zeros_like(standing)
     sliding[:, :_N_SOLES] = _slides(points[:, :_N_SOLES], parts, hands, load, fps)
@@ -205,13 +201,13 @@ def _support(poses: Array, points: Array, calm: Array, fps: float) -> tuple[Mask
     load, (n,).
     """
     soles_at = points[:, :_N_SOLES]
-    parts = _parts(soles_at, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+    parts = standing_parts(soles_at, poses[:, :2], fps)
     hands = bearing_hands(points, poses, calm, _of_spheres(parts), fps)
     load = _load(calm, fps)
     if hands.any():
-        for start, end in runs(_bare(parts, hands, load, fps)):
+        for start, end in spans(_bare(parts, hands, load, fps)):
             bear_longer(points[:, _N_SOLES:], hands, start, end, _FAR)
-    for start, end in runs(_bare(parts, hands, load, fps)):
+    for start, end in spans(_bare(parts, hands, load, fps)):
         _bear(soles_at, parts, start, end)
     return parts, hands, load
 
@@ -234,19 +230,6 @@ def _slides(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) ->
     return _bare(parts, hands, load, fps)[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
 
 
-def _parts(points: Array, pace: Array, fps: float) -> Mask:
-    """Whether heel and toes of each foot stand, shape (n, 2 feet, 2 parts)."""
-    middles = points.reshape(len(points), 2, 2, 2, 3).mean(axis=3)
-    heights = middles[..., 2] - CONTACT_RADIUS
-    speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
-    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
-    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _LOW) & (speeds[:, :, 1] < _REST)
-    for foot in range(2):
-        for part in range(2):
-            stands[:, foot, part] = cleaned(stands[:, foot, part], round(GAP * fps), round(SHORT * fps))
-    return stands
-
-
 def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
     """Extend a neighbouring stance over frames start to end, in which nothing stands under load, if there is one."""
     span = slice(start, end)
@@ -266,7 +249,7 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
     """Write the places of one foot's spheres: one flat placement for each stance."""
     heel, toe = parts.T
     yaw = np.unwrap(_heading(turned))
-    for start, end in runs(heel | toe):
+    for start, end in spans(heel | toe):
         span = np.arange(start, end)
         flat = span[heel[span] & toe[span]]
         if len(flat) >= 4:
@@ -282,7 +265,7 @@ def _kept(standing: Mask, places: Array, width: int) -> Array:
     """Share with which spheres keep their places; `places` are extended over the frames beside stances."""
     share = standing.astype(np.float64)
     for sphere in range(standing.shape[1]):
-        for start, end in runs(standing[:, sphere]):
+        for start, end in spans(standing[:, sphere]):
             for away in range(1, width + 1):
                 left = 1.0 - away / (width + 1)
                 for at, stance in ((start - away, start), (end - 1 + away, end - 1)):

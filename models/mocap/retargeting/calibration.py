@@ -274,7 +274,10 @@ def _limb(
 
 
 def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
-    """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion."""
+    """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
+
+    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames.
+    """
     n = len(source)
     if n == 1:
         return np.array([0])

@@ -102,6 +102,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     if len(soles) < 4:
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
+    # Not `contacts.standing_parts`: there is no floor yet over which a sole could be low.
     stands = (np.ptp(soles[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
     stances = int(np.sum(np.diff(np.concatenate(([0], np.where(stands, lower[1] + 1, 0)))) > 0))
     slopes = _slopes(middle[lower][stands], stances) if stances >= _STEPS else np.zeros(2)

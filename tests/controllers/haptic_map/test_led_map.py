@@ -143,4 +143,4 @@ def test_a_foot_that_swings_low_is_not_planted():
     assert marks.planted.sum(axis=1).min() == 1
     # A walk stands on both feet for about a quarter of its time; a skidding sole would make it more.
     assert 0.2 < np.mean(marks.planted.all(axis=1)) < 0.35
-    assert np.mean(marks.standing.all(axis=1)) > 0.5
+    assert np.mean(marks.loaded.all(axis=1)) > 0.5

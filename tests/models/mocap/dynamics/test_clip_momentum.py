@@ -70,7 +70,7 @@ def standing(height, speed=0.0, frames=13, fps=120.0):
 def test_soles_bear_load_near_the_floor_and_at_rest(height, speed, expected):
     found = standing(height, speed)
     assert np.all(found.supported == expected)
-    assert np.all(found.standing == expected)
+    assert np.all(found.loaded == expected)
     assert found.clearance == pytest.approx(np.full(13, height), abs=1e-3)
 
 
@@ -80,7 +80,7 @@ def test_hands_and_other_parts_bear_load_too():
     pose[2] = 0.14  # on the back
     found = contacts(Clip(np.tile(pose, (5, 1)), 60.0, "lying"))
     assert np.all(found.supported)
-    assert not np.any(found.standing)
+    assert not np.any(found.loaded)
 
 
 @pytest.mark.parametrize("name", ["jump", "walk", "squat_dance"])

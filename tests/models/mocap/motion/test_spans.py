@@ -1,0 +1,43 @@
+"""Spans of masks: found, and cleaned of what is too short."""
+
+import numpy as np
+import pytest
+
+from models.mocap.motion.spans import cleaned, spans
+
+
+def mask(marks: str):
+    return np.array([mark == "#" for mark in marks])
+
+
+@pytest.mark.parametrize(
+    ("marks", "expected"),
+    [("", []), ("...", []), ("###", [(0, 3)]), ("#..##.#", [(0, 1), (3, 5), (6, 7)]), (".##.", [(1, 3)])],
+)
+def test_spans_are_the_runs_of_true(marks, expected):
+    assert spans(mask(marks)) == expected
+
+
+@pytest.mark.parametrize(
+    ("marks", "expected"),
+    [
+        ("####..####", "##########"), ("####...####", "####...####"), ("..####..", "..####.."),
+        ("##.....####", ".......####"), ("##..##", "######"), ("##", "##"), ("..", ".."), ("#.", ".."),
+    ],
+)  # fmt: skip
+def test_short_gaps_within_are_filled_then_short_runs_dropped_but_not_a_whole_mask(marks, expected):
+    given = mask(marks)
+    np.testing.assert_array_equal(cleaned(given, 3, 4), mask(expected))
+    np.testing.assert_array_equal(given, mask(marks))
+
+
+@pytest.mark.parametrize(
+    ("marks", "expected"),
+    [
+        ("##.....###", "##.....###"), ("##........", ".........."), (".#####..#.", "##########"), ("#", "#"),
+        ("#####.#####", "###########"), (".####.....", ".####....."), ("....####..", "....####.."),
+    ],
+)  # fmt: skip
+def test_runs_and_gaps_go_on_over_the_seam_of_a_closed_mask(marks, expected):
+    given = mask(marks)
+    np.testing.assert_array_equal(cleaned(given, 3, 4, closed=True), mask(expected))
