@@ -8,6 +8,7 @@ from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import sole_points
 from sim.body.figure_state import FigureGains
 
@@ -21,8 +22,7 @@ _SAME = 0.02  # laps that differ by less are the same: `natural_lap` takes the s
 def longest_flight(clip: Clip) -> float:
     """Longest time for which the figure would fly [s]: no point of a sole is below `FigureGains.flight_height`."""
     flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FigureGains().flight_height
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flies.astype(int), [0]))))
-    return float((edges[1::2] - edges[::2]).max(initial=0)) / clip.fps
+    return max((end - start for start, end in spans(flies)), default=0) / clip.fps
 
 
 def least_upright(clip: Clip) -> float:

@@ -21,6 +21,7 @@ from matplotlib.patches import Circle
 
 from controllers.state import Array, Mask
 from experiments.results.changes import river_changes
+from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
@@ -234,6 +235,5 @@ def _mark_changes(ax: Axes, recording: Recording) -> None:
 
 
 def _shade(ax: Axes, t: Array, where: Mask, color: str, label: str) -> None:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
-    for i, (start, stop) in enumerate(edges.reshape(-1, 2)):
+    for i, (start, stop) in enumerate(spans(where)):
         ax.axvspan(float(t[start]), float(t[stop - 1]), color=color, lw=0, label=label if i == 0 else None)

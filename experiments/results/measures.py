@@ -25,6 +25,7 @@ from experiments.results.summary_parts import (
     TraceSummary,
 )
 from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 
 Span = tuple[float, float]
@@ -176,9 +177,8 @@ class PathMeasure:
         self._phase, self._time = float(phase[-1]), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], at_work.astype(int), [0]))))
-        for first, last in zip(edges[::2], edges[1::2], strict=True):
-            block = slice(int(first), int(last))
+        for first, last in spans(at_work):
+            block = slice(first, last)
             away = ticks["p"][block] - ticks["nearest"][block]
             distance = np.linalg.norm(away, axis=1)
             k = int(np.argmax(distance))

@@ -31,6 +31,7 @@ from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import lap_of
 from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
@@ -174,9 +175,8 @@ def _middle_of_longest(mask: Mask) -> int:
     if mask.all():
         return 0
     start = int(np.argmin(mask))
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], np.roll(mask, -start).astype(int), [0]))))
-    k = int(np.argmax(edges[1::2] - edges[::2]))
-    return int((edges[2 * k] + edges[2 * k + 1]) // 2 + start) % n
+    longest = max(spans(np.roll(mask, -start)), key=lambda span: span[1] - span[0])
+    return (sum(longest) // 2 + start) % n
 
 
 def s_curve() -> Trajectory:

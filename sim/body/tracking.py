@@ -15,6 +15,7 @@ from controllers.state import Array, Mask
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.motion.clip import CLOSES, Clip, pose_difference
+from models.mocap.motion.spans import spans
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
@@ -286,8 +287,7 @@ def _slide(contacts: Array, touches: Mask) -> float:
     """Largest horizontal distance of a point in contact from where the contact began [m]."""
     largest = 0.0
     for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], touch, [False])).astype(np.int8)))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for start, end in spans(touch):
             stand = point[start:end, :2]
             largest = max(largest, float(np.linalg.norm(stand - stand[0], axis=1).max()))
     return largest

@@ -39,6 +39,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from controllers.state import Array, Mask
+from models.mocap.motion.spans import spans
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
@@ -119,11 +120,11 @@ def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: Mas
     """
     new = np.diff(clock) > 0.0
     joined = used[1:] & used[:-1] & (np.diff(tick) == 1.0) & new
-    cuts = np.flatnonzero(np.diff(np.concatenate(([0], joined.astype(int), [0]))))
-    spans = [(a, b + 1) for a, b in cuts.reshape(-1, 2)]
     return [
-        Motion(clock[a:b], theta[a:b], torque[a:b]) for a, b in spans if clock[b - 1] - clock[a] > 3.0 * WINDOW
-    ]  # fmt: skip
+        Motion(clock[a : b + 1], theta[a : b + 1], torque[a : b + 1])
+        for a, b in spans(joined)
+        if clock[b] - clock[a] > 3.0 * WINDOW
+    ]
 
 
 class _Equations(NamedTuple):

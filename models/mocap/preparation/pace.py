@@ -20,6 +20,7 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import FLIGHT
 from models.mocap.preparation.poses import contact_points
 
@@ -68,14 +69,11 @@ def falling(clip: Clip) -> float | None:
     By heights alone, unlike `contacts`, since the rate in doubt is that of all speeds.
     """
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], (heights > _HIGH).astype(int), [0]))))
-    spans = [
-        (a, b)
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        if b - a >= max(4, _SHORT * clip.fps) and heights[a:b].max() > _CLEAR
+    flights = [
+        (a, b) for a, b in spans(heights > _HIGH) if b - a >= max(4, _SHORT * clip.fps) and heights[a:b].max() > _CLEAR
     ]
-    if not spans:
+    if not flights:
         return None
     height = momentum(clip).com[:, 2]
-    falls = [-2.0 * np.polyfit(np.arange(b - a) / clip.fps, height[a:b], 2)[0] for a, b in spans]
-    return float(np.average(falls, weights=[float(b - a) ** 4 for a, b in spans]))
+    falls = [-2.0 * np.polyfit(np.arange(b - a) / clip.fps, height[a:b], 2)[0] for a, b in flights]
+    return float(np.average(falls, weights=[float(b - a) ** 4 for a, b in flights]))

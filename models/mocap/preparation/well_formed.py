@@ -16,6 +16,7 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import (
     FLATTEST,
     FLIGHT,
@@ -185,9 +186,8 @@ def _tilt(clip: Clip, resting: Mask) -> float:
 def stance_slides(points: Array, standing: Mask) -> Array:
     """Largest distance of contact points (n, k, 3) from their median place in each stance [m]; 0 without one."""
     slides = [0.0]
-    for sphere, mask in enumerate(standing.T.astype(int)):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], mask, [0]))))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
+    for sphere, mask in enumerate(standing.T):
+        for start, end in spans(mask):
             stand = points[start:end, sphere, :2]
             slides.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
     return np.array(slides if len(slides) == 1 else slides[1:])
@@ -207,17 +207,16 @@ def _flights(clip: Clip) -> tuple[int, float]:
     if clip.n_frames < 5:
         return 0, 0.0
     flying = ~contacts(clip).supported
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flying.astype(int), [0]))))
-    spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > SHORTEST_FLIGHT * clip.fps]
-    if not spans:
+    flights = [(a, b) for a, b in spans(flying) if b - a > SHORTEST_FLIGHT * clip.fps]
+    if not flights:
         return 0, 0.0
     com = momentum(clip).com
     squares: list[float] = []
-    for start, end in spans:
+    for start, end in flights:
         times = np.arange(end - start) / clip.fps
         if len(times) < 4:
             continue
         # A parabola's leading coefficient is half the acceleration, without the noise of second differences.
         acceleration = 2.0 * np.polyfit(times, com[start:end], 2)[0]
         squares.append(float(np.sum((acceleration + np.array([0.0, 0.0, GRAVITY])) ** 2)))
-    return len(spans), float(np.sqrt(np.mean(squares))) if squares else 0.0
+    return len(flights), float(np.sqrt(np.mean(squares))) if squares else 0.0
