@@ -310,18 +310,20 @@ def _dying(pose: Array, velocity: Array, fps: float, within: bool) -> Array:
     """
     longest = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST)
     times = np.repeat((longest, _REST), (3, len(velocity) - 3))
-    n = round(longest * fps)
     allowed = np.maximum(beyond_ranges(pose[None])[0], 0.0) + _SLACK
-    for _ in range(_HALVINGS):
-        x = np.minimum(np.arange(1, n + 1)[:, None] / (fps * times), 1.0)
-        poses = plus(np.repeat(pose[None], n, axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
-        leaves = beyond_ranges(poses).max(axis=0) > allowed
-        if not within or not leaves.any():
-            break
-        times[6:] /= 1.0 + np.repeat(leaves, 3)
+    for _ in range(_HALVINGS if within else 0):
+        times[6:] /= 1.0 + np.repeat(beyond_ranges(_decay(pose, velocity, times, fps)).max(axis=0) > allowed, 3)
+    poses = _decay(pose, velocity, times, fps)
+    x = np.arange(1, len(poses) + 1) / (fps * longest)
     low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
-    poses[:, 2] -= _smooth(x[:, 0]) * low
+    poses[:, 2] -= _smooth(x) * low
     return poses
+
+
+def _decay(pose: Array, velocity: Array, times: Array, fps: float) -> Array:
+    """Poses over the longest of the times T (57,) in which each component of a velocity decays in its own [s]."""
+    x = np.minimum(np.arange(1, round(times.max() * fps) + 1)[:, None] / (fps * times), 1.0)
+    return plus(np.repeat(pose[None], len(x), axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
 
 
 def mirrored(clip: Clip) -> Clip:
