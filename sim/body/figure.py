@@ -50,8 +50,8 @@ from sim.errors import SimError
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
-# Share of the coefficient of friction that contact forces are planned with: with 0.7 and 1.0 the residual of five clips
-# moves by 0.3 % of weight at most (the jump's: 2.5 and 2.9, with 0.9 2.6).
+# Share of the coefficient of friction that contact forces are planned with: with 0.7 and 1.0 the residual of walk, run
+# and jump moves by 0.3 % of weight at most (the jump's: 3.1 and 2.7, with 0.9 2.8).
 _RELIED_ON = 0.9
 _N_MOTORS = N_TANGENT - 6
 _MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")

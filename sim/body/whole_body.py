@@ -22,8 +22,8 @@ from sim.body.stance import N_LEG, factor, stance_response, substitute
 from sim.body.support import find_support
 
 # [m] lever arm that converts moment to force in the cost of the residual, which trades one for the other: the RMS
-# force of walk, run and jump is 1.2, 2.8 and 2.6 % of weight; with twice as much 0.7, 2.0 and 1.7 and the moment 1.6
-# to 2.3 times as large, with half 1.4, 3.9 and 3.7 and the moment a third to a half.
+# force of walk, run and jump is 0.6, 1.7 and 2.8 % of weight; with twice as much 0.4, 1.3 and 1.7, with half 0.8, 2.3
+# and 3.7.
 _LEVER = 0.5
 # Share of a point on the floor; 1/share is the relative error that spreading the load may cost. A tenth or ten times
 # of it moves the residual of five clips by less than 0.1 % of weight.
