@@ -25,6 +25,8 @@ _CERTAIN = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
 # Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
 _NEAR, HAND_REACH = 0.06, 0.12
+# Speed below which a palm rests [m/s]. With 0.55 LAFAN's fall from 36 s, whose hands then stand more briefly, falls.
+_HAND_SLOW = 0.6
 # Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures (../shared/prepare-prototype.md):
 # ±1 cm and ±0.1 m/s move the residual of what is prepared by less than 1 point.
 _REACH, _SLOW = 0.045, 0.55
@@ -118,7 +120,9 @@ def contacts(clip: Clip) -> Contacts:
     slides = _slower_side(np.abs(np.diff(heights, axis=0)) * clip.fps)
     near = np.full(heights.shape[1], _NEAR)
     near[feet : len(spheres)] = HAND_REACH
-    slow = (heights < near) & (speeds < _SLOW)
+    least = np.full(heights.shape[1], _SLOW)
+    least[feet : len(spheres)] = _HAND_SLOW
+    slow = (heights < near) & (speeds < least)
     skids = (heights < _LOW) & (slides < _LEVEL)
     rests = slow.copy()
     stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSES))
