@@ -113,8 +113,7 @@ def test_a_somersault_is_not_disturbed():
         pytest.skip(f"needs motion capture in {MOCAP}")
     report = track(prepared_clips([file])[0].clip, 8.0)
     assert not report.falls
-    # 13 % until its end; 34 % with falls where feet beside and above the root were placed, too.
-    assert report.residual_force < 0.15
+    assert report.residual_force < 0.15  # 8 %
 
 
 @pytest.mark.slow
@@ -122,12 +121,22 @@ def test_a_capture_that_jumps_again_and_again_does_not_fall():
     file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
+    report = track(prepared_clips([file])[0].clip, 20.0)
+    assert not report.falls
+    assert report.residual_force < 0.04  # 2.7 %
+
+
+@pytest.mark.slow
+def test_placed_feet_lower_what_a_series_of_jumps_lacks():
+    file = MOCAP / "animated_drawings" / "jumping.bvh"
+    if not file.is_file():
+        pytest.skip(f"needs motion capture in {MOCAP}")
     clip = prepared_clips([file])[0].clip
     placed, left = (
         track(clip, 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))
         for reach in (FigureGains().placement_reach, 0.0)
     )
-    # 4.2 % without a fall, 20 % and a fall.
+    # 7.0 to 7.4 %, and 12.3 to 12.6 %, from starts that differ by 0.2 mm.
     assert not placed.falls
-    assert placed.residual_force < 0.08
-    assert placed.residual_force < 0.5 * left.residual_force
+    assert placed.residual_force < 0.09
+    assert placed.residual_force < 0.7 * left.residual_force
