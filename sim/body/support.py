@@ -17,9 +17,11 @@ from numba import njit
 
 from controllers.state import Array
 from controllers.work_array import work_array
-from models.humanoid.skeleton import N_TANGENT
+from models.humanoid.skeleton import FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT
 from sim.body.figure_state import N_FOOT, REPORT_FLIES, FigureState
 from sim.compilation.native import mj_integrate_pos, mj_kinematics
+
+_N = len(FOOT_CONTACTS + HAND_CONTACTS)
 
 
 @njit
@@ -36,13 +38,13 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
     q_r, v_r, a_r : Array
         Reference pose (75), velocity (57) and acceleration (57).
     """
-    n, gains = s.share.shape[0], s.gains
-    later, soon, brief = work_array((10, 3)), work_array((10, 3)), work_array(10)
+    gains = s.gains
+    later, soon, brief = work_array((_N, 3)), work_array((_N, 3)), work_array(_N)
     _predict(s, q_r, v_r, a_r, gains.unload_time, later)
     _predict(s, q_r, v_r, a_r, gains.lift_time, soon)
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
-    for c in range(n):
+    for c in range(_N):
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
     for leg in range(2):
@@ -50,7 +52,7 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
         for c in range(N_FOOT * leg, N_FOOT * leg + N_FOOT):
             s.loaded[leg] = max(s.loaded[leg], _nearness(s.points[c, 2], gains.contact_reach))
     support, lowest = 0.0, np.inf
-    for c in range(n):
+    for c in range(_N):
         now = s.twin_contact_pos[s.twin_contact[c]]
         touch = _nearness(s.points[c, 2], gains.contact_reach)
         if c < 2 * N_FOOT:
@@ -65,7 +67,7 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
         support = max(support, touch * _nearness(height, gains.flight_height))
         lowest = min(lowest, now[2] - s.radius)
     lacking = 1.0 - s.share.max()
-    for c in range(n):
+    for c in range(_N):
         s.share[c] += lacking * max(brief[c] - s.share[c], 0.0)
     s.report[REPORT_FLIES] = 1.0 if lowest > gains.flight_height else 0.0
     return support
@@ -80,7 +82,7 @@ def _predict(s: FigureState, q_r: Array, v_r: Array, a_r: Array, ahead: float, p
     s.twin_qpos[:] = q_r
     mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, mean.ctypes, ahead)
     mj_kinematics(s.twin_model, s.twin_data)
-    for c in range(places.shape[0]):
+    for c in range(_N):
         places[c] = s.twin_contact_pos[s.twin_contact[c]]
 
 
