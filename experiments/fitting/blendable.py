@@ -13,7 +13,6 @@ from models.mocap.preparation.poses import sole_points
 from sim.body.figure_state import FigureGains
 
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
-UPRIGHT = -0.5  # least vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
 FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same of clips with flights: these need 0.8 to 1.2 of gravity
 SLOWEST, FASTEST = 0.75, 1.33  # played pace over own: inertial forces go with its square, 0.56 to 1.8
 _SAME = 0.02  # laps that differ by less are the same: `natural_lap` takes the shortest of those
@@ -23,11 +22,6 @@ def longest_flight(clip: Clip) -> float:
     """Longest time for which the figure would fly [s]: no point of a sole is below `FigureGains.flight_height`."""
     flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FigureGains().flight_height
     return max((end - start for start, end in spans(flies)), default=0) / clip.fps
-
-
-def least_upright(clip: Clip) -> float:
-    """Least vertical component of the pelvis axis."""
-    return float((1.0 - 2.0 * (clip.poses[:, 4] ** 2 + clip.poses[:, 5] ** 2)).min())
 
 
 def same(clips: Sequence[Clip]) -> bool:
@@ -41,9 +35,9 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
         return ()
     found: list[str] = []
     for clip in {clip.name: clip for clip in clips}.values():
-        flight, upright = longest_flight(clip), least_upright(clip)
-        if upright < UPRIGHT:
-            over = f"turns over (pelvis {np.rad2deg(np.arccos(upright)):.0f}° from upright)"
+        flight = longest_flight(clip)
+        if clip.turns_over:
+            over = f"turns over (pelvis {np.rad2deg(np.arccos(clip.least_upright)):.0f}° from upright)"
             found.append(f"{clip.name} {over}: no motion lies between it and others")
         elif flight > LONGEST_FLIGHT:
             found.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")

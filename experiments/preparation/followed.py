@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.bounds import FLYING, RESIDUAL
+from models.mocap.preparation.bounds import FLYING, RESIDUAL, beyond
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
@@ -57,7 +57,8 @@ class Followed(NamedTuple):
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:
-            return (f"the physical figure lacks {100 * self.residual:.0f} % of weight; {100 * bound:.0f} at most",)
+            lacks = beyond(100 * self.residual, 100 * bound)
+            return (f"the physical figure lacks {lacks} % of weight; {100 * bound:.0f} at most",)
         return ()
 
 

@@ -12,6 +12,8 @@ from models.mocap.motion import quaternions
 CLOSES = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
 
+_TURNS_OVER = -0.5  # vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
+
 
 @dataclass(frozen=True)
 class PlanarDisplacement:
@@ -102,6 +104,16 @@ class Clip:
         yaw = float(np.remainder(yaw + np.pi, 2.0 * np.pi) - np.pi)
         start = quaternions.rotated(quaternions.about_axis(2, np.array(yaw)), first[:3])
         return PlanarDisplacement(float(last[0] - start[0]), float(last[1] - start[1]), yaw)
+
+    @property
+    def least_upright(self) -> float:
+        """Least vertical component of the pelvis axis, −1 to 1."""
+        return float((1.0 - 2.0 * (self.poses[:, 4] ** 2 + self.poses[:, 5] ** 2)).min())
+
+    @property
+    def turns_over(self) -> bool:
+        """Whether the pelvis is upside down at some time, more than 120° from upright."""
+        return self.least_upright < _TURNS_OVER
 
     def closes(self, tolerance: float = 1e-6) -> bool:
         """Whether the last frame is the first displaced over the floor, within `tolerance` [rad], [m] at the root."""

@@ -1,4 +1,4 @@
-"""Bounds of a well-formed clip; `well_formed` measures what they bound. Without imports that take long."""
+"""Bounds of a well-formed clip, and how a measure beyond one is written. Without imports that take long."""
 
 import numpy as np
 
@@ -15,3 +15,9 @@ LIMIT = np.deg2rad(1.0)  # excess over a joint's range: Euler angles and rotatio
 # faults in two of 26 clips; with twice of it the embedded run has no flights.
 SHORTEST_FLIGHT = 0.08
 FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
+
+
+def beyond(measure: float, bound: float) -> str:
+    """A measure greater than its bound, with as many decimals, one or more, as tell the two apart."""
+    texts = (f"{measure:.{digits}f}" for digits in range(1, 17))
+    return next((text for text in texts if float(text) > bound), str(measure))

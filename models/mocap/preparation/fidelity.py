@@ -6,6 +6,7 @@ import numpy as np
 
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.preparation.bounds import beyond
 from models.mocap.preparation.looping import Looped
 from models.mocap.preparation.poses import resampled
 
@@ -13,7 +14,7 @@ from models.mocap.preparation.poses import resampled
 # fighting and a punch by 7 to 8°, roots by 2.3 to 6.6 cm.
 GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
 _LISTED = 5  # joints listed
-_TRAVELS = 0.4  # way of a lap beyond which a closed clip is a gait [m]
+_TRAVELS = 0.4  # way of a lap beyond which a closed clip that does not turn over is a gait [m]
 
 
 class Extreme(NamedTuple):
@@ -59,11 +60,11 @@ class Fidelity(NamedTuple):
         """Measures that exceed their bounds, a line each."""
         found: list[str] = []
         if self.joints > (bound := GAIT if self.gait else OTHERWISE):
-            found.append(
-                f"joints are {np.rad2deg(self.joints):.1f}° RMS from the capture; {np.rad2deg(bound):.0f} at most"
-            )
+            far, most = beyond(np.rad2deg(self.joints), np.rad2deg(bound)), f"{np.rad2deg(bound):.0f}"
+            found.append(f"joints are {far}° RMS from the capture; {most} at most")
         if self.root > ROOT:
-            found.append(f"the root is {100 * self.root:.1f} cm RMS from the capture; {100 * ROOT:.0f} at most")
+            far = beyond(100 * self.root, 100 * ROOT)
+            found.append(f"the root is {far} cm RMS from the capture; {100 * ROOT:.0f} at most")
         return tuple(found)
 
     def line(self) -> str:
@@ -108,5 +109,5 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
     return Fidelity(
         float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(level**2 + height**2))),
         tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in most),
-        clip.closes() and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
+        clip.closes() and not clip.turns_over and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
     )  # fmt: skip

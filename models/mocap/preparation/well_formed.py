@@ -29,6 +29,7 @@ from models.mocap.preparation.bounds import (
     SEAM,
     SHORTEST_FLIGHT,
     SKATE,
+    beyond,
 )
 from models.mocap.preparation.feasible import Borne, borne
 from models.mocap.preparation.poses import around, contact_points, resampled, smoothed
@@ -100,25 +101,29 @@ class WellFormed:
         """Measures that exceed their bounds, a line each."""
         found: list[str] = []
         if self.lowest < LOWEST or self.highest > HIGHEST:
-            found.append(f"soles stand at {100 * self.lowest:.1f} to {100 * self.highest:.1f} cm; −0.3 to 0.5")
+            found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
         if self.tilt > FLATTEST:
-            found.append(f"soles are tilted by {np.rad2deg(self.tilt):.1f}°; 2° at most")
+            found.append(f"soles are tilted by {beyond(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
         if self.skate > SKATE:
-            found.append(f"feet skate by {100 * self.skate:.1f} cm in a stance; 0.5 at most")
+            found.append(
+                f"feet skate by {beyond(1000 * self.skate, 1000 * SKATE)} mm in a stance; {1000 * SKATE:.0f} at most"
+            )
         if self.outliers:
             found.append(f"{self.outliers} frames stand out by their acceleration; none")
         if self.closed and self.seam > SEAM:
-            found.append(f"velocities at the seam differ by {self.seam:.2f} rad/s; {SEAM} at most")
+            found.append(f"velocities at the seam differ by {beyond(self.seam, SEAM)} rad/s; {SEAM} at most")
         if not self.closed and self.seam > REST:
-            found.append(f"an end moves with {self.seam:.2f} rad/s; rest at both, {REST} at most")
+            found.append(f"an end moves with {beyond(self.seam, REST)} rad/s; rest at both, {REST} at most")
         if self.falling > FLIGHT:
-            found.append(f"flights fall with {self.falling:.1f} m/s² beside gravity; {FLIGHT} at most")
+            found.append(f"flights fall with {beyond(self.falling, FLIGHT)} m/s² beside gravity; {FLIGHT} at most")
         if self.excess > LIMIT:
-            found.append(f"a joint is {np.rad2deg(self.excess):.0f}° beyond its range; 1° at most")
+            found.append(f"a joint is {beyond(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
         if self.residual > (bound := FLYING if self.flights else RESIDUAL):
-            found.append(f"contact lacks {100 * self.residual:.0f} % of weight RMS; {100 * bound:.0f} % at most")
+            found.append(
+                f"contact lacks {beyond(100 * self.residual, 100 * bound)} % of weight RMS; {100 * bound:.0f} % at most"
+            )
         if self.strain > 1.0:
-            found.append(f"{self.joint} needs {100 * self.strain:.0f} % of its torque limit; 100 % at most")
+            found.append(f"{self.joint} needs {beyond(100 * self.strain, 100.0)} % of its torque limit; 100 % at most")
         return tuple(found)
 
     def lines(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from models.humanoid.skeleton import JOINTS
 from models.mocap.library import embedded
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
-from models.mocap.preparation.fidelity import fidelity
+from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.poses import resampled
 
@@ -59,3 +59,20 @@ def test_a_clip_at_another_pace_is_compared_moment_by_moment(walk):
     slow = resampled(Clip(walk.poses, 0.8 * walk.fps, "slow"), 120.0)
     found = fidelity(slow, walk, whole(slow), 0.8)
     assert found.joints < 1e-6
+
+
+def test_a_lap_in_which_the_body_turns_over_is_no_gait(walk):
+    poses, n = walk.poses.copy(), walk.n_frames
+    wheel = 2.0 * np.pi * np.arange(n) / (n - 1)
+    poses[:, 3:7] = quaternions.product(poses[:, 3:7], quaternions.about_axis(0, wheel))
+    cartwheel = Clip(poses, walk.fps, "cartwheel")
+    assert cartwheel.closes(1e-3)
+    assert not fidelity(cartwheel, cartwheel, whole(cartwheel), 1.0).gait
+
+
+def test_a_measure_just_beyond_its_bound_is_told_apart_from_it():
+    found = Fidelity(np.deg2rad(3.0004), 0.0512, (), gait=True)
+    assert found.faults() == (
+        "joints are 3.0004° RMS from the capture; 3 at most",
+        "the root is 5.1 cm RMS from the capture; 5 at most",
+    )
