@@ -45,7 +45,8 @@ class JointName(NamedTuple):
     bare : str
         The other words in lower case, in one: ``upperarm``.
     noisy : bool
-        Whether words such as *joint* or *stretch* are left out of `bare`: a name without them is the more likely one.
+        Whether words such as *joint* or *stretch*, or leading underscores, are left out of `bare`: a name without them
+        is the more likely one.
     helper : bool
         Whether it is a twist, a tip, or another joint that is no part of the body.
     """
@@ -74,12 +75,20 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
         if n < _SHARE * len(joints) or of_body or word in _SIDES:
             break
         split = [words[1:] if len(words) > 1 and words[0] == word else words for words in split]
-    return tuple(_read(words, sided) for words in split)
+    # MakeHuman's __UpLeg_L is the link from the pelvis to UpLeg_L.
+    return tuple(
+        _read(words, sided, _plain(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
+    )
+
+
+def _plain(name: str) -> str:
+    """A name without namespace, in the usual form of its characters."""
+    return unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
 
 
 def _words(name: str) -> list[str]:
     """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
-    name = unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
+    name = _plain(name)
     name = _GLOSS.sub("", name) or name
     for text, word in _JAPANESE.items():
         name = name.replace(text, f" {word} ")
@@ -96,13 +105,13 @@ def _words(name: str) -> list[str]:
     return words
 
 
-def _read(words: list[str], sided: frozenset[str]) -> JointName:
+def _read(words: list[str], sided: frozenset[str], link: bool) -> JointName:
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     kept = [word for word in words if word not in _SIDES]
     if not side and not _CENTRE.issuperset(kept):
         kept = [word for word in kept if word not in _CENTRE]
     bare = "".join(word for word in kept if word not in _NOISE)
-    noisy, helper = not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
+    noisy, helper = link or not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
     if not side:
         for mark in _SIDES:
             rest = bare.removeprefix(mark)
