@@ -173,7 +173,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         lines = body_lines(motion, roles, positions, rotations)
     check_bones(motion, roles, positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
-    up = up_axis(motion, lines, positions[:, body], hints.up)
+    up = up_axis(motion, roles, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, positions)
     frame = None if rest is None else rest - first
@@ -197,7 +197,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
-    remarks = list(_named_frames(broken, [k for k in jumps if k >= dropped], motion.fps))
+    kept = [[k for k in told if k >= dropped] for told in (broken, jumps)]
+    remarks = list(_named_frames(kept[0], kept[1], motion.fps))
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):

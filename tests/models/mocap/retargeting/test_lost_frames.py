@@ -75,6 +75,22 @@ def test_arms_held_out_before_a_fast_motion_are_left_out(name, fps, drop, tmp_pa
     np.testing.assert_allclose(led.clip.poses, load(tmp_path / "plain.bvh", UP).clip.poses, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", ["walk", "run", "cheer"])
+def test_arms_held_out_that_a_filter_blends_into_the_motion_are_left_out(name, tmp_path):
+    """Over 0.05 s, so that no step is far from the next one."""
+    clip = embedded(name)
+    pose, n = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1)), round(0.05 * clip.fps)
+    first = clip.poses[0, 3:].reshape(-1, 4)
+    shares = np.sin(np.pi / 2.0 * np.arange(n) / n)
+    blended = [np.concatenate((clip.poses[0, :3], quaternions.slerped(pose, first, s).ravel())) for s in shares]
+    write_rig(Rig(zero="random", seed=5), clip, tmp_path / "plain.bvh")
+    write_rig(Rig(zero="random", seed=5), Clip(np.vstack((blended, clip.poses)), clip.fps, name), tmp_path / "led.bvh")
+    led, plain = load(tmp_path / "led.bvh", UP), load(tmp_path / "plain.bvh", UP).clip
+    assert n - 1 <= led.report.dropped <= n
+    kept = led.clip.poses[n - led.report.dropped :]
+    assert largest_angle(Clip(kept, clip.fps, name), plain) < 1.0
+
+
 @pytest.mark.parametrize("name", embedded_names())
 def test_a_motion_that_begins_anywhere_keeps_its_frames(name, tmp_path):
     write_rig(Rig(), embedded(name), tmp_path / "r.bvh")
