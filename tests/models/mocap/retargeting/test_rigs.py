@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
@@ -243,6 +244,35 @@ def test_a_tip_that_continues_the_shank_is_no_toe(motions, compared, tmp_path):
 def test_a_piece_of_a_somersault_does_not_tell_what_is_up(motions, tmp_path):
     clip = motions.whole("backflip", 30.0)
     write_rig(Rig(), Clip(clip.poses[30:45], clip.fps, "flight"), tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match="the motion does not tell what is up"):
+        load(tmp_path / "r.bvh")
+
+
+def turned_over(clip, axis, degrees, place=(0.0, 0.0, 0.0)):
+    """The clip's motion turned about a horizontal axis through the floor's origin, and moved [m]."""
+    turn = Rotation.from_euler(axis, degrees, degrees=True)
+    poses = clip.poses.copy()
+    poses[:, :3] = turn.apply(poses[:, :3]) + place
+    whole = turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True)
+    poses[:, 3:7] = whole.as_quat(scalar_first=True)
+    return Clip(poses, clip.fps, f"{clip.name} turned about {axis} by {degrees}")
+
+
+@pytest.mark.parametrize("up", ["+Y", "+Z"])
+def test_a_body_that_lies_throughout_does_not_tell_what_is_up(up, motions, tmp_path):
+    """Along the floor it stands as well as a body that stands."""
+    lying = turned_over(motions.whole("cheer"), "y", -90.0, (0.5, 0.3, 0.05))
+    write_rig(Rig(up=up, zero="upright T"), lying, tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=re.escape(f"--up {up} or --up ")):
+        load(tmp_path / "r.bvh")
+
+
+def test_a_run_that_leans_into_its_curve_tells_what_is_up(motions, tmp_path):
+    """Its weight is beside its feet; where its rig stands, and where floors are, confirm the vertical."""
+    leaning = turned_over(motions.whole("run", 20.0), "x", 15.0)
+    write_rig(Rig(zero="upright T"), leaning, tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").report.up == "+Y"
+    write_rig(Rig(zero="along X"), leaning, tmp_path / "r.bvh")
     with pytest.raises(ModelError, match="the motion does not tell what is up"):
         load(tmp_path / "r.bvh")
 
