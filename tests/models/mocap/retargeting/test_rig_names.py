@@ -133,6 +133,13 @@ RIGS = {
         Spine3 __Clavicle_@ Clavicle_@ UpArm_@ LoArm_@ Hand_@ __Index1_@ Index1_@""",
         "L R", "Hips Spine2 Spine3 Head Clavicle_L UpArm_L LoArm_L Hand_L UpLeg_L LoLeg_L Foot_L Toe_L",
     ),
+    "Maya's duplicates": (
+        """hips_dup spine1_dup spine2_dup spine3_dup neck_dup head_dup
+        hips_dup @_hip_dup @_thigh_dup @_knee_dup @_foot_dup @_toes_dup
+        spine3_dup @_clavicle_dup @_shoulder_dup @_elbow_dup @_hand_dup""",
+        "l r", "hips_dup spine2_dup spine3_dup head_dup l_clavicle_dup l_shoulder_dup l_elbow_dup l_hand_dup "
+        "l_thigh_dup l_knee_dup l_foot_dup l_toes_dup",
+    ),
     "Kinect": (
         """SpineBase SpineMid SpineShoulder Neck Head
         SpineShoulder Shoulder@ Elbow@ Wrist@ Hand@
