@@ -37,9 +37,10 @@ _CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared
 _LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
-# Largest height of the lowest joint on a floor at zero [leg lengths], and least cosine of the zero pose, and of the
-# trunk of a run, to the vertical.
-_ON_ZERO, _ALONG = 0.1, 0.8
+# Largest height of the lowest joint of a body that lies on a floor at zero, and of one that runs there, whose lowest
+# joint may be an ankle [leg lengths].
+_ON_ZERO, _OVER_ZERO = 0.1, 0.2
+_ALONG = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the vertical
 _FLAT = 0.5  # largest height of a body that lies [leg lengths]: 0.2 and 0.3 in two captures
 _SAMPLES = 200  # number of frames that are evaluated
 _DIRECTIONS = 16  # directions in which the hull of the bearing joints is bounded
@@ -85,7 +86,7 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     if (lying := _lies_along(best, zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
     lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
-    if min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG and np.median(np.abs(lowest)) < _ON_ZERO:
+    if min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG and np.median(np.abs(lowest)) < _OVER_ZERO:
         least = min(least, _LEAST_RESTING)
     if lead < _CERTAIN or scores[best] < least:
         raise MotionFileError(
@@ -154,8 +155,9 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         shoulders lie on average the other way than the hips: no trunk is twisted by more than 90° throughout.
     """
     left = unit(lines.left)
-    ahead = unit(np.cross(left, unit(lines.trunk)))
-    toes = unit(lines.toes - lines.ankles) @ ahead[:, :, None]
+    # Ahead of its own shank: the toes of a body that kneels point back in the room.
+    ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
+    toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
     clear = [np.sign(s) for s in signs if abs(s) > _SURE]

@@ -303,6 +303,38 @@ def test_a_zero_pose_in_front_is_left_out(motions, compared, tmp_path):
     assert load(tmp_path / "r.bvh").report.dropped == 1
 
 
+def posed(turns, clip):
+    """The clip with joints turned about an axis [deg] from the figure's rest pose, throughout."""
+    poses = clip.poses.copy()
+    for body, axis, degrees in turns:
+        k = 3 + 4 * BODIES.index(body)
+        poses[:, k : k + 4] = Rotation.from_euler(axis, degrees, degrees=True).as_quat(scalar_first=True)
+    return Clip(poses, clip.fps, f"{clip.name} posed")
+
+
+def test_a_body_that_kneels_is_not_mirrored(motions, tmp_path):
+    """Its toes point back in the room, and ahead of their own shanks."""
+    bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+            for part, degrees in (("thigh", 0.0), ("shank", 90.0), ("foot", 30.0))]  # fmt: skip
+    kneeling = posed(bend, motions.whole("cheer"))
+    write_rig(Rig(), kneeling, tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh", Hints(up="+Y")).report.up == "+Y"
+    exchanged(tmp_path / "r.bvh", "")
+    with pytest.raises(ModelError, match="the body is mirrored"):
+        load(tmp_path / "r.bvh", Hints(up="+Y"))
+
+
+def test_soles_of_a_squat_on_the_toes_are_said_to_be_a_guess(motions, tmp_path):
+    """At rest and low, but not level: no ankle is bent by 50° on average."""
+    squat = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+             for part, degrees in (("thigh", -80.0), ("shank", 130.0), ("foot", 0.0))]  # fmt: skip
+    standing = motions.whole("cheer")
+    low = posed(squat, standing).poses[:1] - np.eye(1, standing.poses.shape[1], 2) * 0.5
+    both = Clip(np.vstack((standing.poses[:20], np.repeat(low, 40, axis=0))), standing.fps, "squat")
+    write_rig(Rig(), both, tmp_path / "r.bvh")
+    assert "soles lie is a guess" in "; ".join(load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks)
+
+
 def exchanged(path, *words):
     """Left and right exchanged in a file's names that have one of these words."""
     sides = {"Left": "Right", "Right": "Left"}
