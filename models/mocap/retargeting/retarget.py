@@ -198,7 +198,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     kept = [[k for k in told if k >= dropped] for told in (broken, jumps)]
-    remarks = list(_named_frames(kept[0], kept[1], motion.fps))
+    remarks = list(_named_frames(kept[0], kept[1], motion.fps, motion.timed))
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):
@@ -281,8 +281,11 @@ def _named_endless(lines: BodyLines, roles: Roles) -> str:
     return f"nothing tells where {', '.join(without)} end: how they point is a guess" if without else ""
 
 
-def _named_frames(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:
-    """Remarks on frames that are long, on those that were lost, and on jumps that are left."""
+def _named_frames(broken: Sequence[int], jumps: Sequence[int], fps: float, timed: bool) -> Iterator[str]:
+    """Remarks on frames whose time is not stated or long, on those that were lost, and on jumps that are left."""
+    if not timed:
+        told = f"the file states no frame rate: {fps:g} a second are assumed"
+        yield f"{told}; if it is another, convert it to BVH and correct its Frame Time"
     if fps < COARSE:
         yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, correct its Frame Time"
     if broken:

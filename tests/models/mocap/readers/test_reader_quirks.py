@@ -212,6 +212,7 @@ def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path)
         places(degrees)[0, 2], np.array([1, 2, 3]) + (root * thigh).apply([0, -2, 0]), atol=1e-12
     )
     np.testing.assert_allclose(degrees.tips[2], [0, -3, 0])
+    assert (degrees.fps, degrees.timed) == (120.0, False)
 
 
 def deepmimic_row(duration, x, turn):

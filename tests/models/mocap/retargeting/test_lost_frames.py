@@ -16,7 +16,7 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.leading_pose import leading_frames
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.retarget import Hints, retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -205,3 +205,13 @@ def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
         assert told in load(tmp_path / "r.bvh").report.remarks
     with pytest.raises(ModelError, match=r"since a frame lasts 33 s; expected a Frame Time in seconds, such as"):
         prepared(tmp_path / "r.bvh")
+
+
+def test_a_frame_rate_that_the_file_does_not_state_is_said(tmp_path):
+    """As of AMC files."""
+    write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
+    motion = read_motion(tmp_path / "r.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    assert retarget(motion, roles)[1].remarks == ()
+    (said,) = retarget(replace(motion, timed=False), roles)[1].remarks
+    assert said.startswith("the file states no frame rate: 30 a second are assumed; ")
