@@ -31,7 +31,7 @@ from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.leading_pose import leading_frames
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import AXES, check_sides, up_axis
+from models.mocap.retargeting.upright import AXES, check_sides, check_stature, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
@@ -174,6 +174,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     check_bones(motion, roles, positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, roles, lines, positions[:, body], hints.up)
+    check_stature(motion, lines, up.axis)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, positions)
     frame = None if rest is None else rest - first

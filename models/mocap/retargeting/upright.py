@@ -44,6 +44,9 @@ _ALONG = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the
 _FLAT = 0.5  # largest height of a body that lies [leg lengths]: 0.2 and 0.3 in two captures
 _SAMPLES = 200  # number of frames that are evaluated
 _DIRECTIONS = 16  # directions in which the hull of the bearing joints is bounded
+# Length of an animal's trunk [leg lengths], 0.5 to 0.6 in humans and 1.4 in a dog, and the largest mean cosine of one
+# that is level to the vertical.
+_LONG, _LEVEL = 1.0, 0.5
 _SURE = 0.15  # least mean sine of the knees' bend, and cosine of the toes' direction, that tell left from right
 
 
@@ -143,6 +146,20 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> f
         outside = np.maximum(outside, middle @ along - furthest)
     balance = float(outside.mean()) / lines.leg
     return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
+
+
+def check_stature(motion: SourceMotion, lines: BodyLines, up: Array) -> None:
+    """Refuse an animal under the names of a human: a trunk that is longer than the legs and level throughout.
+
+    Raises
+    ------
+    MotionFileError
+        If it is one.
+    """
+    size = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
+    if lines.has_arms and size > _LONG and float((unit(lines.trunk) @ up).mean()) < _LEVEL:
+        what = f"the trunk is {size:.1f} times as long as thigh and shank, and never upright"
+        raise MotionFileError(motion.path, 0, what, "a human, who stands at times")
 
 
 def check_sides(motion: SourceMotion, lines: BodyLines) -> None:

@@ -303,6 +303,16 @@ def test_a_zero_pose_in_front_is_left_out(motions, compared, tmp_path):
     assert load(tmp_path / "r.bvh").report.dropped == 1
 
 
+def test_an_animal_under_the_names_of_a_human_is_refused(motions, tmp_path):
+    """Whatever is said to be up; a human of these proportions stands at times."""
+    dog = Rig(proportions={"trunk": 1.3, "thigh": 0.7, "shank": 0.7, "arm": 0.7})
+    write_rig(dog, turned_over(motions.whole("walk"), "y", 80.0), tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=r"the trunk is 1\.\d times as long as thigh and shank, and never upright"):
+        load(tmp_path / "r.bvh", Hints(up="+Y"))
+    write_rig(dog, motions.whole("walk"), tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").report.up == "+Y"
+
+
 def posed(turns, clip):
     """The clip with joints turned about an axis [deg] from the figure's rest pose, throughout."""
     poses = clip.poses.copy()
