@@ -279,7 +279,8 @@ def _limb(
 def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
     """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
 
-    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames.
+    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames. The feet of a
+    body that walks on the spot stand where they move with the ground under it.
     """
     n = len(source)
     if n == 1:
@@ -288,14 +289,30 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
     if not np.isnan(lines.toes[:, k]).any():
         places.append(lines.toes[:, k])
     turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
-    passing = np.max([np.linalg.norm(np.gradient(place, axis=0), axis=1) for place in places], axis=0) * fps / lines.leg
     heights = lines.lowest_joints @ up
     low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
+    ground = _ground(lines, up, fps)
+    off = [np.linalg.norm(np.gradient(place, axis=0) - ground, axis=1) for place in places]
+    passing = np.max(off, axis=0) * fps / lines.leg
     for factor in _PATIENCE:
         flat = np.flatnonzero(low & (passing < factor * AT_REST) & (turning < factor * _TURNS))
         if len(flat) >= _LEAST:
             return flat
     return np.zeros(0, dtype=np.intp)
+
+
+def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
+    """Motion in a frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
+
+    It is that of the lower ankle in the median, if that ankle moves with it more often than it rests.
+    """
+    n, ankles, rest = len(lines.middle), lines.lowest_joints, AT_REST * lines.leg / fps
+    lower = np.gradient(ankles, axis=0)[np.arange(n), np.argmin(ankles @ up, axis=1)]
+    carried = np.median(lower, axis=0)
+    carried = carried - (carried @ up) * up
+    travels = np.linalg.norm(lines.middle[-1] - lines.middle[0]) > n * rest
+    still, moved = (np.sum(np.linalg.norm(lower - ground, axis=1) < rest) for ground in (0.0, carried))
+    return carried if not travels and moved > still and np.linalg.norm(carried) > rest else np.zeros(3)
 
 
 def _foot(

@@ -345,6 +345,23 @@ def test_soles_of_a_squat_on_the_toes_are_said_to_be_a_guess(motions, tmp_path):
     assert "soles lie is a guess" in "; ".join(load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks)
 
 
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+def test_soles_of_a_walk_on_the_spot_are_level(fps, motions, calibrated, tmp_path):
+    """As games have them: its feet never rest, but move with the ground."""
+    walk = motions.whole("walk", fps)
+    spot = walk.poses.copy()
+    drift = (spot[-1, :2] - spot[0, :2]) / (len(spot) - 1)
+    spot[:, :2] -= np.outer(np.arange(len(spot)), drift)
+    write_rig(Rig(zero="random", seed=7), walk, tmp_path / "r.bvh")
+    over_ground = calibrated(tmp_path / "r.bvh", Hints(up="+Y"))
+    write_rig(Rig(zero="random", seed=7), Clip(spot, walk.fps, "spot"), tmp_path / "r.bvh")
+    on_the_spot = calibrated(tmp_path / "r.bvh", Hints(up="+Y"))
+    feet = [BODIES.index("left_foot"), BODIES.index("right_foot")]
+    apart = quaternions.product(quaternions.conjugate(over_ground.segments[:, feet]), on_the_spot.segments[:, feet])
+    assert np.rad2deg(np.linalg.norm(quaternions.logarithm(apart), axis=2)).max() < LARGEST
+    assert "soles" not in on_the_spot.remarks
+
+
 def exchanged(path, *words):
     """Left and right exchanged in a file's names that have one of these words."""
     sides = {"Left": "Right", "Right": "Left"}
