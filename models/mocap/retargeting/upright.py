@@ -79,9 +79,6 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     lost = motion.at_rest(range(len(motion.joints)))[-len(positions) :]
     calm, rests = _calm(positions / lines.leg, motion.fps, lost)
     frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLES).round().astype(int))]
-    least = _LEAST_RESTING if rests else _LEAST_MOVING
-    if np.isnan(lines.ankles).any():
-        least = np.inf  # knees of a squat are no support
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
@@ -89,8 +86,10 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     if (lying := _lies_along(best, zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
     lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
-    if min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG and np.median(np.abs(lowest)) < _OVER_ZERO:
-        least = min(least, _LEAST_RESTING)
+    confirmed = min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG and np.median(np.abs(lowest)) < _OVER_ZERO
+    least = _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
+    if np.isnan(lines.ankles).any():
+        least = np.inf  # knees of a squat are no support
     if lead < _CERTAIN or scores[best] < least:
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"

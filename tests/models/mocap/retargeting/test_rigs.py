@@ -233,7 +233,9 @@ def test_arms_end_where_their_tips_are_or_it_is_said(tips, motions, compared, tm
 
 def test_legs_end_where_their_tips_are_or_do_not_tell_what_is_up(motions, compared):
     assert_same_motion(compared(Rig(without=("foot",)), motions.whole("walk")))
-    assert "does not tell what is up" in compared(Rig(without=("foot",), tips=None), motions.whole("squat_dance"))
+    for zero in ("T", "upright T"):
+        rig = Rig(without=("foot",), tips=None, zero=zero)
+        assert "does not tell what is up" in compared(rig, motions.whole("squat_dance"))
 
 
 def test_a_tip_that_continues_the_shank_is_no_toe(motions, compared, tmp_path):
