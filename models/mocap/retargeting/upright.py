@@ -101,7 +101,7 @@ def _lies_along(best: str, zero: Array, positions: Array) -> str | None:
     """Another axis than the best along which a body lies on the floor [leg lengths], if there is one."""
     heights = {name: positions @ np.array(AXES[name], dtype=np.float64) for name in (best, "+Y", "+Z")}
     off = {name: float(np.quantile(np.abs(h.min(axis=1)), 0.9)) for name, h in heights.items()}
-    for name in {"+Y", "+Z"} - {best}:
+    for name in ("+Y", "+Z"):
         flat = float(np.median(np.ptp(heights[name], axis=1))) < _FLAT
         if off[name] < min(_ON_ZERO, off[best]) and flat and zero @ AXES[name] > _ALONG:
             return name
@@ -156,7 +156,8 @@ def check_stature(motion: SourceMotion, lines: BodyLines, up: Array) -> None:
         If it is one.
     """
     size = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
-    if lines.has_arms and size > _LONG and float((unit(lines.trunk) @ up).mean()) < _LEVEL:
+    whole = lines.has_arms and not np.isnan(lines.ankles).any()
+    if whole and size > _LONG and float((unit(lines.trunk) @ up).mean()) < _LEVEL:
         what = f"the trunk is {size:.1f} times as long as thigh and shank, and never upright"
         raise MotionFileError(motion.path, 0, what, "a human, who stands at times")
 
