@@ -100,6 +100,7 @@ def parsed(words: Sequence[str]) -> Any:
         If it was mistyped; tyro's boxed message is shortened to one line.
     """
     _refuse_empty(words)
+    words = _with_axes(words)
     said = io.StringIO()
     named = words[0] if words and words[0] in commands.NAMES else None
     # The other commands' options are not even imported.
@@ -127,6 +128,17 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
             raise ParameterError(f"nothing is given behind {option}; expected a value")
+
+
+def _with_axes(words: Sequence[str]) -> list[str]:
+    """The words with ``--up -Y`` as one: argparse takes an axis with a minus for an option, and misses the value."""
+    joined: list[str] = []
+    for word in words:
+        if re.fullmatch("-[XYZ]", word) and joined and re.fullmatch(r"--[\w-]+", joined[-1]):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def _one_line(said: str, words: Sequence[str]) -> str:

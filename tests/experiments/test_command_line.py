@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
+from experiments.cli import main, parsed
 
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
@@ -138,6 +138,12 @@ def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pyt
     before = target.read_bytes()
     assert "--overwrite" in refused(["convert", str(source), str(target)], capsys)
     assert target.read_bytes() == before
+
+
+@pytest.mark.parametrize("command", ["convert", "prepare"])
+def test_an_axis_that_points_down_is_the_value_of_its_option(command: str) -> None:
+    assert parsed([command, "in.bvh", "out.bvh", "--up", "-Y"]).up == "-Y"
+    assert parsed([command, "--up=-Z", "in.bvh", "out.bvh"]).up == "-Z"
 
 
 def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def read_amc(path: Path) -> SourceMotion:
             if freedom in values:
                 translations[:, index, axis] += values[freedom]
     unit = _INCH / skeleton.length_unit
-    return SourceMotion(path, tuple(joints), parents, offsets, tips, rotations, translations, FPS, unit)
+    return SourceMotion(path, tuple(joints), parents, offsets, tips, rotations, translations, FPS, unit, timed=False)
 
 
 def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array:

@@ -24,6 +24,7 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
+_NIL = 1e-3  # largest place of a joint, as a share of its OFFSET, that is none
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 
@@ -43,7 +44,8 @@ class _Joint:
 def read_bvh(path: Path) -> SourceMotion:
     """Read a BVH file.
 
-    Position channels replace the joint's OFFSET, on any joint; each joint may have its own channels in its own order.
+    Position channels replace the joint's OFFSET, on any joint, unless they are displacements from it (`_displaced`);
+    each joint may have its own channels in its own order.
 
     Raises
     ------
@@ -58,14 +60,30 @@ def read_bvh(path: Path) -> SourceMotion:
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
     rotations = np.zeros((len(frames), len(joints), 4))
     rotations[..., 0] = 1.0
+    displaced = _displaced(joints, frames)
     for index, joint in enumerate(joints):
         for axis, column in joint.positions:
-            translations[:, index, axis] = frames[:, column]
+            start = offsets[index, axis] if displaced and index else 0.0
+            translations[:, index, axis] = start + frames[:, column]
         for axis, column in joint.rotations:
             turn = quaternions.about_axis(axis, np.deg2rad(frames[:, column]))
             rotations[:, index] = quaternions.product(rotations[:, index], turn)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
     return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None)
+
+
+def _displaced(joints: list[_Joint], frames: Array) -> bool:
+    """Whether position channels below the root are displacements from OFFSET.
+
+    Most programs write the place itself, which is as far from the parent as OFFSET is. MakeHuman writes none at all.
+    """
+    told: list[bool] = []
+    for joint in joints[1:]:
+        length = float(np.linalg.norm(joint.offset or ()))
+        if len(joint.positions) == 3 and length > 0.0:
+            places = frames[:, [column for _, column in joint.positions]]
+            told.append(bool(np.abs(places).max() < _NIL * length))
+    return sum(told) > len(told) / 2
 
 
 class _Tokens:

@@ -44,6 +44,8 @@ class SourceMotion:
         The file's axis that points up, such as ``+Y``, if the format defines it.
     loops : bool or None
         Whether the motion is cyclic, if the file states it.
+    timed : bool
+        Whether the file states its frame rate.
     """
 
     path: Path
@@ -57,6 +59,7 @@ class SourceMotion:
     unit: float | None
     up: str | None = None
     loops: bool | None = None
+    timed: bool = True
 
     @property
     def n_frames(self) -> int:

@@ -43,6 +43,9 @@ _PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs,
 # the joints of 19 captures by 0.5° RMS, twice by 0.02°.
 _LOW = 0.05
 _ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
+# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the captures of ../shared/mocap, 30° in one of
+# fifty others. A squat on the toes, and single poses with a foot in the air, have 37 to 114°.
+_STRANGE = np.deg2rad(35.0)
 _SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals: half or twice changes none of 17 captures
 # Inclination of the chest up to which a head can be level: 25° turns the joints of a dance by 11° RMS, 80° those of
 # four of 17 captures by up to 1.3°.
@@ -276,7 +279,8 @@ def _limb(
 def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
     """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
 
-    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames.
+    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames. The feet of a
+    body that walks on the spot stand where they move with the ground under it.
     """
     n = len(source)
     if n == 1:
@@ -285,9 +289,11 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
     if not np.isnan(lines.toes[:, k]).any():
         places.append(lines.toes[:, k])
     turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
-    passing = np.max([np.linalg.norm(np.gradient(place, axis=0), axis=1) for place in places], axis=0) * fps / lines.leg
     heights = lines.lowest_joints @ up
     low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
+    ground = _ground(lines, up, fps)
+    off = [np.linalg.norm(np.gradient(place, axis=0) - ground, axis=1) for place in places]
+    passing = np.max(off, axis=0) * fps / lines.leg
     for factor in _PATIENCE:
         flat = np.flatnonzero(low & (passing < factor * AT_REST) & (turning < factor * _TURNS))
         if len(flat) >= _LEAST:
@@ -295,12 +301,27 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
     return np.zeros(0, dtype=np.intp)
 
 
+def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
+    """Motion in a frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
+
+    It is that of the lower ankle in the median, if that ankle moves with it more often than it rests.
+    """
+    n, ankles, rest = len(lines.middle), lines.lowest_joints, AT_REST * lines.leg / fps
+    lower = np.gradient(ankles, axis=0)[np.arange(n), np.argmin(ankles @ up, axis=1)]
+    carried = np.median(lower, axis=0)
+    carried = carried - (carried @ up) * up
+    travels = np.linalg.norm(lines.middle[-1] - lines.middle[0]) > n * rest
+    still, moved = (np.sum(np.linalg.norm(lower - ground, axis=1) < rest) for ground in (0.0, carried))
+    return carried if not travels and moved > still and np.linalg.norm(carried) > rest else np.zeros(3)
+
+
 def _foot(
     source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
 ) -> tuple[Array, int]:  # fmt: skip
     """R of a foot, with a level sole in stance and the heading of its toes; and the number of stance frames used.
 
-    Without stance frames, the sole has the orientation of an ankle in rest pose on average.
+    Without stance frames, or where these would bend an ankle throughout, the sole has the orientation of an ankle in
+    rest pose on average.
     """
     back = quaternions.conjugate(source)
     resting = _carried(source, shank, straight)
@@ -319,6 +340,8 @@ def _foot(
         for _ in range(_SHIFTS):
             near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
             normal = unit((near * likely) @ vertical)
+        if normal @ neutral < np.cos(_STRANGE):
+            normal, told = neutral, np.zeros(0, dtype=bool)
     x = normal
     if not np.isnan(toes).any():
         ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)

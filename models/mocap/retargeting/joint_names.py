@@ -1,12 +1,13 @@
 """Side and body words of a joint's name, whatever a program writes around them.
 
-``Skeleton_001_LeftUpLeg``, ``l_upleg_JNT``, ``leftupleg`` and ``RL_L_UpLeg`` all become (left, upleg). Leading words
-that half of a skeleton's joints share are its own name; numbers are those of a chain, or of an export.
+``Skeleton_001_LeftUpLeg``, ``l_upleg_JNT``, ``leftupleg`` and ``RL_L_UpLeg`` all become (left, upleg). Leading and
+trailing words that half of a skeleton's joints share are its own; numbers are those of a chain, or of an export.
 """
 
 import re
 import unicodedata
 from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 _SIDES = {"left": "left", "l": "left", "lt": "left", "lf": "left", "lft": "left",
@@ -45,7 +46,8 @@ class JointName(NamedTuple):
     bare : str
         The other words in lower case, in one: ``upperarm``.
     noisy : bool
-        Whether words such as *joint* or *stretch* are left out of `bare`: a name without them is the more likely one.
+        Whether words such as *joint* or *stretch*, or leading underscores, are left out of `bare`: a name without them
+        is the more likely one.
     helper : bool
         Whether it is a twist, a tip, or another joint that is no part of the body.
     """
@@ -67,19 +69,37 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
         Words of the body that have a side, and that have none.
     """
     split = [_words(joint) for joint in joints]
-    while True:
-        leading = Counter(words[0] for words in split if len(words) > 1)
-        word, n = leading.most_common(1)[0] if leading else ("", 0)
-        of_body = len(word) > 1 and any(alias.startswith(word) for alias in sided | central)
-        if n < _SHARE * len(joints) or of_body or word in _SIDES:
-            break
-        split = [words[1:] if len(words) > 1 and words[0] == word else words for words in split]
-    return tuple(_read(words, sided) for words in split)
+    for end, of in ((0, str.startswith), (-1, str.endswith)):
+        while (word := _shared(split, end)) is not None:
+            if len(word) > 1 and any(of(alias, word) for alias in sided | central):
+                break
+            split = [_without(words, end) if len(words) > 1 and words[end] == word else words for words in split]
+    # MakeHuman's __UpLeg_L is the link from the pelvis to UpLeg_L.
+    return tuple(
+        _read(words, sided, _plain(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
+    )
+
+
+def _shared(split: Sequence[list[str]], end: int) -> str | None:
+    """The word at an end of the names that is the skeleton's own, if there is one."""
+    counts = Counter(words[end] for words in split if len(words) > 1)
+    word, n = counts.most_common(1)[0] if counts else ("", 0)
+    meant = word in _SIDES or (end == -1 and word in _HELPERS)
+    return None if n < _SHARE * len(split) or meant else word
+
+
+def _without(words: list[str], end: int) -> list[str]:
+    return words[1:] if end == 0 else words[:-1]
+
+
+def _plain(name: str) -> str:
+    """A name without namespace, in the usual form of its characters."""
+    return unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
 
 
 def _words(name: str) -> list[str]:
     """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
-    name = unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
+    name = _plain(name)
     name = _GLOSS.sub("", name) or name
     for text, word in _JAPANESE.items():
         name = name.replace(text, f" {word} ")
@@ -96,13 +116,13 @@ def _words(name: str) -> list[str]:
     return words
 
 
-def _read(words: list[str], sided: frozenset[str]) -> JointName:
+def _read(words: list[str], sided: frozenset[str], link: bool) -> JointName:
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     kept = [word for word in words if word not in _SIDES]
     if not side and not _CENTRE.issuperset(kept):
         kept = [word for word in kept if word not in _CENTRE]
     bare = "".join(word for word in kept if word not in _NOISE)
-    noisy, helper = not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
+    noisy, helper = link or not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
     if not side:
         for mark in _SIDES:
             rest = bare.removeprefix(mark)

@@ -6,7 +6,9 @@ Between the pose and the motion is one step, v₀, that the motion does not go o
 - zero rotations of all joints, as programs write the rig's rest pose: a motion that begins in it by itself goes on from
   it, :math:`|v_0 - v_1| \le |v_1|` from a uniform motion up to one of constant jerk;
 - a body with straight legs and straight arms at least 30° off the trunk, alike on both sides, as T- and A-poses are,
-  whose step is no part of the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`.
+  whose step is no part of the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
+- zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
+  interpolation has spread the one step.
 
 The second and third do not depend on how fast the motion is, nor on its frame rate. |v| is the RMS over the joints that
 segments of the figure follow.
@@ -14,7 +16,7 @@ segments of the figure follow.
 
 import numpy as np
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
@@ -25,6 +27,9 @@ from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 _SHARE = 0.25  # largest share of a motion that may be such a pose, held
 _TIMES = 5.0  # least ratio of the jump to the 99th percentile of the steps
 _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns so far in a frame
+# Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
+# in three captures that were filtered. No body begins faster than it goes on.
+_BLENDED, _FASTER = 0.1, 1.5
 _HELD = 0.1  # largest step while the pose is held, as a share of the jump
 # Of a calibration pose: bend of its limbs, difference of its sides, least angle of its arms to the trunk's line and
 # largest to the trunk's plane.
@@ -34,13 +39,25 @@ _OFF, _AHEAD = np.sin(np.deg2rad([30.0, 25.0]))
 
 def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     """Number of frames in front of a motion that are a calibration pose."""
-    n = motion.n_frames
     used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
     rotations = motion.rotations[:, used]
     turns = quaternions.logarithm(quaternions.product(quaternions.conjugate(rotations[:-1]), rotations[1:]))
+    if motion.n_frames < 4:
+        return 0
+    root = ancestry(roles.segments["pelvis"], motion.parents)
+    at_rest = motion.at_rest([joint for joint in used if joint not in root])
+    jumped = _jumped(turns, at_rest, lines)
+    begun, ended = _spread(_size(turns), round(_BLENDED * motion.fps))
+    told = ended <= _SHARE * motion.n_frames and (at_rest[: begun + 1].all() or _calibrating(lines))
+    return max(jumped, ended) if told else jumped
+
+
+def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:
+    """Number of frames before a jump from a calibration pose; 0 if there is none."""
+    n = len(turns) + 1
     steps = _size(turns)
     early = steps[: max(1, int(_SHARE * n))]
-    if n < 4 or early.max() < _TURN:
+    if early.max() < _TURN:
         return 0
     if n >= FEWEST:
         jump = int(np.argmax(early))
@@ -52,11 +69,22 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     if not _held(steps, jump) or jump + 1 >= n - 1:
         return 0
     leaves = float(_size(turns[jump] - turns[jump + 1]))
-    root = ancestry(roles.segments["pelvis"], motion.parents)
-    at_rest = motion.at_rest([joint for joint in used if joint not in root])[: jump + 2]
-    as_zero = at_rest[:-1].all() and not at_rest[-1] and leaves > steps[jump + 1]
+    as_zero = at_rest[: jump + 1].all() and not at_rest[jump + 1] and leaves > steps[jump + 1]
     as_posed = _calibrating(lines) and leaves > 2.0 * steps[jump + 1 : jump + 4].max()
     return jump + 1 if as_zero or as_posed else 0
+
+
+def _spread(steps: Array, longest: int) -> tuple[int, int]:
+    """From and to which step a pose is left by steps that are all larger than the motion's; 0 and 0 if none are."""
+    if longest < 2 or len(steps) < max(FEWEST, 4 * longest):
+        return 0, 0
+    usual = float(np.quantile(np.sort(steps)[:-longest], 0.99))
+    large = steps > _FASTER * usual
+    begun = int(np.argmax(large))
+    ended = begun + int(np.argmin(np.append(large[begun:], False)))
+    burst = steps[begun:ended]
+    told = len(burst) <= longest and burst.sum() > 3.0 * _TURN
+    return (begun, ended) if told and steps[:begun].max(initial=0.0) < _HELD * burst.max() else (0, 0)
 
 
 def _size(turns: Array) -> Array:

@@ -31,7 +31,7 @@ from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.leading_pose import leading_frames
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import AXES, check_sides, up_axis
+from models.mocap.retargeting.upright import AXES, check_sides, check_stature, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
@@ -173,7 +173,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         lines = body_lines(motion, roles, positions, rotations)
     check_bones(motion, roles, positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
-    up = up_axis(motion, lines, positions[:, body], hints.up)
+    up = up_axis(motion, roles, lines, positions[:, body], hints.up)
+    check_stature(motion, lines, up.axis)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, positions)
     frame = None if rest is None else rest - first
@@ -197,7 +198,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
-    remarks = list(_named_frames(broken, [k for k in jumps if k >= dropped], motion.fps))
+    kept = [[k for k in told if k >= dropped] for told in (broken, jumps)]
+    remarks = list(_named_frames(kept[0], kept[1], motion.fps, motion.timed))
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if beyond := _named_beyond_ranges(clip.poses):
@@ -280,8 +282,11 @@ def _named_endless(lines: BodyLines, roles: Roles) -> str:
     return f"nothing tells where {', '.join(without)} end: how they point is a guess" if without else ""
 
 
-def _named_frames(broken: Sequence[int], jumps: Sequence[int], fps: float) -> Iterator[str]:
-    """Remarks on frames that are long, on those that were lost, and on jumps that are left."""
+def _named_frames(broken: Sequence[int], jumps: Sequence[int], fps: float, timed: bool) -> Iterator[str]:
+    """Remarks on frames whose time is not stated or long, on those that were lost, and on jumps that are left."""
+    if not timed:
+        told = f"the file states no frame rate: {fps:g} a second are assumed"
+        yield f"{told}; if it is another, convert it to BVH and correct its Frame Time"
     if fps < COARSE:
         yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, correct its Frame Time"
     if broken:

@@ -65,6 +65,8 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
     for side in ("left", "right"):
         for limb in (_LEG, _ARM):
             named |= _limb(side, limb, names, parents)
+        if (toe := named.get(f"{side}_toe")) is not None:
+            named[f"{side}_toe"] = _middle_toe(toe, joints, names, parents)
         if (wrist := named.get(f"{side}_wrist")) is not None:
             # Beyond a wrist there may be a hand (CMU): it carries all the rotation.
             below = [joint for joint in joints_below(wrist, parents) if names[joint].side == side]
@@ -164,6 +166,15 @@ def _limb(
             longer.append((k, cost, ((f"{side}_{parts[k]}", joint), *rest)))
         chains += longer
     return dict(min((cost + sum(lacking[:first]), chain) for first, cost, chain in chains)[1])
+
+
+def _middle_toe(toe: int, joints: tuple[str, ...], names: tuple[JointName, ...], parents: tuple[int, ...]) -> int:
+    """Of toes side by side the middle one, in the order of their names: a foot points where it does."""
+    limb = ancestry(toe, parents)
+    foot = next((k for k in limb if names[k].bare != names[toe].bare), -1)
+    alike = [k for k, name in enumerate(names)
+             if name == names[toe] and len(above := ancestry(k, parents)) == len(limb) and foot in above]  # fmt: skip
+    return sorted(alike, key=lambda k: joints[k])[(len(alike) - 1) // 2]
 
 
 def _spine(

@@ -9,8 +9,14 @@ with b from the feet to the trunk's upper end; σ the spread (5 to 95 %) of the 
 the middle of hips and shoulders outside the hull of the joints nearest to the floor, seen along u; l the length of the
 legs; and β = 0.1 for +Y and +Z, the only axes that programs write. Only what stands on something has to do so: frames
 count in which a joint is at rest, or, if those are few, the calmest ones. A somersault is judged by its stances.
+
+What programs write by custom is evidence besides: in most files floors are at zero, and rigs stand along the vertical
+in their zero pose. A body that lies throughout stands along an axis of the floor as well as one that stands, and is
+refused where it is flat on the plane zero of +Y or +Z, along which its rig stands. Runs whose curves leave their weight
+beside their feet need a lower score where both confirm it.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +24,8 @@ import numpy as np
 from models.arrays import Array, IntArray, Mask
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
+from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines, unit
+from models.mocap.retargeting.skeleton_roles import Roles
 
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 # Half or twice of β, or of any of the numbers below but the least scores, finds the same axes for 17 captures.
@@ -30,8 +37,16 @@ _CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared
 _LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
+# Largest height of the lowest joint of a body that lies on a floor at zero, and of one that runs there, whose lowest
+# joint may be an ankle [leg lengths]: 0.02 and 0.04 in two captures, and 0.01 to 0.19 in eight runs of low scores.
+_ON_ZERO, _OVER_ZERO = 0.1, 0.2
+_ALONG = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the vertical
+_FLAT = 0.5  # largest height of a body that lies [leg lengths]: 0.2 and 0.3 in two captures
 _SAMPLES = 200  # number of frames that are evaluated
 _DIRECTIONS = 16  # directions in which the hull of the bearing joints is bounded
+# Length of an animal's trunk [leg lengths], 0.5 to 0.6 in humans and 1.4 in a dog, and the largest mean cosine of one
+# that is level to the vertical.
+_LONG, _LEVEL = 1.0, 0.5
 _SURE = 0.15  # least mean sine of the knees' bend, and cosine of the toes' direction, that tell left from right
 
 
@@ -50,7 +65,7 @@ class Up(NamedTuple):
     confidence: float
 
 
-def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
+def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
     """The file's axis that points up: as the user or the format states it, or estimated from joint positions (n, m, 3).
 
     Raises
@@ -64,17 +79,45 @@ def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str 
     lost = motion.at_rest(range(len(motion.joints)))[-len(positions) :]
     calm, rests = _calm(positions / lines.leg, motion.fps, lost)
     frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLES).round().astype(int))]
-    least = _LEAST_RESTING if rests else _LEAST_MOVING
-    if np.isnan(lines.ankles).any():
-        least = np.inf  # knees of a squat are no support
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
+    zero, trunk = _zero_pose(motion, roles), unit(lines.trunk[frames]).mean(axis=0)
+    if (lying := _lies_along(best, zero, positions[frames] / lines.leg)) is not None:
+        lead, best, second = 0.0, lying, best
+    lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
+    confirmed = min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG and np.median(np.abs(lowest)) < _OVER_ZERO
+    least = _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
+    if np.isnan(lines.ankles).any():
+        least = np.inf  # knees of a squat are no support
     if lead < _CERTAIN or scores[best] < least:
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
         )
     return Up(np.array(AXES[best], dtype=np.float64), lead)
+
+
+def _lies_along(best: str, zero: Array, positions: Array) -> str | None:
+    """Another axis than the best along which a body lies on the floor [leg lengths], if there is one."""
+    heights = {name: positions @ np.array(AXES[name], dtype=np.float64) for name in (best, "+Y", "+Z")}
+    off = {name: float(np.quantile(np.abs(h.min(axis=1)), 0.9)) for name, h in heights.items()}
+    for name in ("+Y", "+Z"):
+        flat = float(np.median(np.ptp(heights[name], axis=1))) < _FLAT
+        if off[name] < min(_ON_ZERO, off[best]) and flat and zero @ AXES[name] > _ALONG:
+            return name
+    return None
+
+
+def _zero_pose(motion: SourceMotion, roles: Roles) -> Array:
+    """Direction from the feet to the trunk's upper end with all rotations zero; 0 where there is none."""
+    unturned = np.zeros((1, len(motion.joints), 4))
+    unturned[..., 0] = 1.0
+    zero = replace(motion, rotations=unturned, translations=np.median(motion.translations, axis=0, keepdims=True))
+    try:
+        lines = body_lines(zero, roles, zero.global_positions(unturned), unturned)
+    except MotionFileError:
+        return np.zeros(3)
+    return np.nan_to_num(unit(lines.top - lines.lowest_joints.mean(axis=1))[0])
 
 
 def _calm(positions: Array, fps: float, lost: Mask) -> tuple[IntArray, bool]:
@@ -104,6 +147,21 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> f
     return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
 
 
+def check_stature(motion: SourceMotion, lines: BodyLines, up: Array) -> None:
+    """Refuse an animal under the names of a human: a trunk that is longer than the legs and level throughout.
+
+    Raises
+    ------
+    MotionFileError
+        If it is one.
+    """
+    size = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
+    whole = lines.has_arms and not np.isnan(lines.ankles).any()
+    if whole and size > _LONG and float((unit(lines.trunk) @ up).mean()) < _LEVEL:
+        what = f"the trunk is {size:.1f} times as long as thigh and shank, and never upright"
+        raise MotionFileError(motion.path, 0, what, "a human, who stands at times")
+
+
 def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     """Refuse a mirrored body: hips and trunk define left, which toes, the bend of the knees and the arms must confirm.
 
@@ -114,8 +172,9 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         shoulders lie on average the other way than the hips: no trunk is twisted by more than 90° throughout.
     """
     left = unit(lines.left)
-    ahead = unit(np.cross(left, unit(lines.trunk)))
-    toes = unit(lines.toes - lines.ankles) @ ahead[:, :, None]
+    # Ahead of its own shank: the toes of a body that kneels point back in the room.
+    ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
+    toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
     clear = [np.sign(s) for s in signs if abs(s) > _SURE]

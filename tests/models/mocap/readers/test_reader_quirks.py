@@ -67,6 +67,16 @@ def test_position_channels_replace_the_offset_on_any_joint(tmp_path):
     np.testing.assert_allclose(motion.offsets, [[1, 2, 3], [0, -5.9e-14, 4]])
 
 
+def test_positions_that_are_nil_leave_the_joint_at_its_offset(tmp_path):
+    """As MakeHuman writes channels of positions on every joint: displacements, of which there are none."""
+    six = "CHANNELS 6 Xposition Yposition Zposition Yrotation"
+    text = CHAIN.replace("CHANNELS 3 Yrotation", six)
+    still = read_text(tmp_path, text.replace(" 40 ", " 0 -0.000001 0.0 40 "))
+    np.testing.assert_allclose(still.translations, [[[10, 20, 30], [0, 0, 4]], [[11, 21, 31], [0, 0, 4]]], atol=1e-5)
+    moved = read_text(tmp_path, text.replace(" 40 ", " 0 3.9 0.7 40 "))
+    np.testing.assert_allclose(moved.translations[:, 1], [[0, 3.9, 0.7]] * 2)
+
+
 def test_rotations_may_stand_before_positions(tmp_path):
     text = CHAIN.replace(
         "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation",
@@ -202,6 +212,7 @@ def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path)
         places(degrees)[0, 2], np.array([1, 2, 3]) + (root * thigh).apply([0, -2, 0]), atol=1e-12
     )
     np.testing.assert_allclose(degrees.tips[2], [0, -3, 0])
+    assert (degrees.fps, degrees.timed) == (120.0, False)
 
 
 def deepmimic_row(duration, x, turn):

@@ -16,7 +16,7 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.leading_pose import leading_frames
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.retarget import Hints, retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -73,6 +73,22 @@ def test_arms_held_out_before_a_fast_motion_are_left_out(name, fps, drop, tmp_pa
     led = load(tmp_path / "led.bvh", UP)
     assert led.report.dropped == 1
     np.testing.assert_allclose(led.clip.poses, load(tmp_path / "plain.bvh", UP).clip.poses, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["walk", "run", "cheer"])
+def test_arms_held_out_that_a_filter_blends_into_the_motion_are_left_out(name, tmp_path):
+    """Over 0.05 s, so that no step is far from the next one."""
+    clip = embedded(name)
+    pose, n = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1)), round(0.05 * clip.fps)
+    first = clip.poses[0, 3:].reshape(-1, 4)
+    shares = np.sin(np.pi / 2.0 * np.arange(n) / n)
+    blended = [np.concatenate((clip.poses[0, :3], quaternions.slerped(pose, first, s).ravel())) for s in shares]
+    write_rig(Rig(zero="random", seed=5), clip, tmp_path / "plain.bvh")
+    write_rig(Rig(zero="random", seed=5), Clip(np.vstack((blended, clip.poses)), clip.fps, name), tmp_path / "led.bvh")
+    led, plain = load(tmp_path / "led.bvh", UP), load(tmp_path / "plain.bvh", UP).clip
+    assert n - 1 <= led.report.dropped <= n
+    kept = led.clip.poses[n - led.report.dropped :]
+    assert largest_angle(Clip(kept, clip.fps, name), plain) < 1.0
 
 
 @pytest.mark.parametrize("name", embedded_names())
@@ -189,3 +205,13 @@ def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
         assert told in load(tmp_path / "r.bvh").report.remarks
     with pytest.raises(ModelError, match=r"since a frame lasts 33 s; expected a Frame Time in seconds, such as"):
         prepared(tmp_path / "r.bvh")
+
+
+def test_a_frame_rate_that_the_file_does_not_state_is_said(tmp_path):
+    """As of AMC files."""
+    write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
+    motion = read_motion(tmp_path / "r.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    assert retarget(motion, roles)[1].remarks == ()
+    (said,) = retarget(replace(motion, timed=False), roles)[1].remarks
+    assert said.startswith("the file states no frame rate: 30 a second are assumed; ")

@@ -116,6 +116,30 @@ RIGS = {
         "L R", "Bip01_Pelvis Bip01_Spine1 Bip01_Spine2 Bip01_Head Bip01_L_Clavicle Bip01_L_UpperArm Bip01_L_Forearm "
         "Bip01_L_Hand Bip01_L_Thigh Bip01_L_Calf Bip01_L_Foot Bip01_L_Toe0",
     ),
+    "MakeHuman": (
+        """root spine05 spine04 spine03 spine02 spine01 neck01 neck02 neck03 head
+        root pelvis.@ upperleg01.@ upperleg02.@ lowerleg01.@ lowerleg02.@ foot.@ toe5-1.@ toe5-2.@
+        foot.@ toe4-1.@ toe4-2.@
+        foot.@ toe2-1.@
+        foot.@ toe1-1.@
+        foot.@ toe3-1.@ toe3-2.@
+        spine01 clavicle.@ shoulder01.@ upperarm01.@ upperarm02.@ lowerarm01.@ lowerarm02.@ wrist.@ finger1-1.@""",
+        "L R", "root spine03 spine01 head clavicle.L upperarm01.L lowerarm01.L wrist.L upperleg01.L lowerleg01.L "
+        "foot.L toe3-1.L",
+    ),
+    "MakeHuman's links": (
+        """Root Spine1 Spine2 Spine3 Neck Head __Jaw Jaw
+        Root Hips __UpLeg_@ UpLeg_@ LoLeg_@ Foot_@ Toe_@
+        Spine3 __Clavicle_@ Clavicle_@ UpArm_@ LoArm_@ Hand_@ __Index1_@ Index1_@""",
+        "L R", "Hips Spine2 Spine3 Head Clavicle_L UpArm_L LoArm_L Hand_L UpLeg_L LoLeg_L Foot_L Toe_L",
+    ),
+    "Maya's duplicates": (
+        """hips_dup spine1_dup spine2_dup spine3_dup neck_dup head_dup
+        hips_dup @_hip_dup @_thigh_dup @_knee_dup @_foot_dup @_toes_dup
+        spine3_dup @_clavicle_dup @_shoulder_dup @_elbow_dup @_hand_dup""",
+        "l r", "hips_dup spine2_dup spine3_dup head_dup l_clavicle_dup l_shoulder_dup l_elbow_dup l_hand_dup "
+        "l_thigh_dup l_knee_dup l_foot_dup l_toes_dup",
+    ),
     "Kinect": (
         """SpineBase SpineMid SpineShoulder Neck Head
         SpineShoulder Shoulder@ Elbow@ Wrist@ Hand@

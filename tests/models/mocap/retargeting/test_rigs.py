@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
@@ -232,7 +233,9 @@ def test_arms_end_where_their_tips_are_or_it_is_said(tips, motions, compared, tm
 
 def test_legs_end_where_their_tips_are_or_do_not_tell_what_is_up(motions, compared):
     assert_same_motion(compared(Rig(without=("foot",)), motions.whole("walk")))
-    assert "does not tell what is up" in compared(Rig(without=("foot",), tips=None), motions.whole("squat_dance"))
+    for zero in ("T", "upright T"):
+        rig = Rig(without=("foot",), tips=None, zero=zero)
+        assert "does not tell what is up" in compared(rig, motions.whole("squat_dance"))
 
 
 def test_a_tip_that_continues_the_shank_is_no_toe(motions, compared, tmp_path):
@@ -243,6 +246,35 @@ def test_a_tip_that_continues_the_shank_is_no_toe(motions, compared, tmp_path):
 def test_a_piece_of_a_somersault_does_not_tell_what_is_up(motions, tmp_path):
     clip = motions.whole("backflip", 30.0)
     write_rig(Rig(), Clip(clip.poses[30:45], clip.fps, "flight"), tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match="the motion does not tell what is up"):
+        load(tmp_path / "r.bvh")
+
+
+def turned_over(clip, axis, degrees, place=(0.0, 0.0, 0.0)):
+    """The clip's motion turned about a horizontal axis through the floor's origin, and moved [m]."""
+    turn = Rotation.from_euler(axis, degrees, degrees=True)
+    poses = clip.poses.copy()
+    poses[:, :3] = turn.apply(poses[:, :3]) + place
+    whole = turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True)
+    poses[:, 3:7] = whole.as_quat(scalar_first=True)
+    return Clip(poses, clip.fps, f"{clip.name} turned about {axis} by {degrees}")
+
+
+@pytest.mark.parametrize("up", ["+Y", "+Z"])
+def test_a_body_that_lies_throughout_does_not_tell_what_is_up(up, motions, tmp_path):
+    """Along the floor it stands as well as a body that stands."""
+    lying = turned_over(motions.whole("cheer"), "y", -90.0, (0.5, 0.3, 0.05))
+    write_rig(Rig(up=up, zero="upright T"), lying, tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=re.escape(f"--up {up} or --up ")):
+        load(tmp_path / "r.bvh")
+
+
+def test_a_run_that_leans_into_its_curve_tells_what_is_up(motions, tmp_path):
+    """Its weight is beside its feet; where its rig stands, and where floors are, confirm the vertical."""
+    leaning = turned_over(motions.whole("run", 20.0), "x", 15.0)
+    write_rig(Rig(zero="upright T"), leaning, tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").report.up == "+Y"
+    write_rig(Rig(zero="along X"), leaning, tmp_path / "r.bvh")
     with pytest.raises(ModelError, match="the motion does not tell what is up"):
         load(tmp_path / "r.bvh")
 
@@ -271,6 +303,65 @@ def test_a_limb_that_is_not_a_humans_is_told_before_what_is_up(motions, tmp_path
 def test_a_zero_pose_in_front_is_left_out(motions, compared, tmp_path):
     assert_same_motion(compared(Rig(leading=1), motions.whole("walk")))
     assert load(tmp_path / "r.bvh").report.dropped == 1
+
+
+def test_an_animal_under_the_names_of_a_human_is_refused(motions, tmp_path):
+    """Whatever is said to be up; a human of these proportions stands at times."""
+    dog = Rig(proportions={"trunk": 1.3, "thigh": 0.7, "shank": 0.7, "arm": 0.7})
+    write_rig(dog, turned_over(motions.whole("walk"), "y", 80.0), tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=r"the trunk is 1\.\d times as long as thigh and shank, and never upright"):
+        load(tmp_path / "r.bvh", Hints(up="+Y"))
+    write_rig(dog, motions.whole("walk"), tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").report.up == "+Y"
+
+
+def posed(turns, clip):
+    """The clip with joints turned about an axis [deg] from the figure's rest pose, throughout."""
+    poses = clip.poses.copy()
+    for body, axis, degrees in turns:
+        k = 3 + 4 * BODIES.index(body)
+        poses[:, k : k + 4] = Rotation.from_euler(axis, degrees, degrees=True).as_quat(scalar_first=True)
+    return Clip(poses, clip.fps, f"{clip.name} posed")
+
+
+def test_a_body_that_kneels_is_not_mirrored(motions, tmp_path):
+    """Its toes point back in the room, and ahead of their own shanks."""
+    bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+            for part, degrees in (("thigh", 0.0), ("shank", 90.0), ("foot", 30.0))]  # fmt: skip
+    kneeling = posed(bend, motions.whole("cheer"))
+    write_rig(Rig(), kneeling, tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh", Hints(up="+Y")).report.up == "+Y"
+    exchanged(tmp_path / "r.bvh", "")
+    with pytest.raises(ModelError, match="the body is mirrored"):
+        load(tmp_path / "r.bvh", Hints(up="+Y"))
+
+
+def test_soles_of_a_squat_on_the_toes_are_said_to_be_a_guess(motions, tmp_path):
+    """At rest and low, but not level: no ankle is bent by 50° on average."""
+    squat = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+             for part, degrees in (("thigh", -80.0), ("shank", 130.0), ("foot", 0.0))]  # fmt: skip
+    standing = motions.whole("cheer")
+    low = posed(squat, standing).poses[:1] - np.eye(1, standing.poses.shape[1], 2) * 0.5
+    both = Clip(np.vstack((standing.poses[:20], np.repeat(low, 40, axis=0))), standing.fps, "squat")
+    write_rig(Rig(), both, tmp_path / "r.bvh")
+    assert "soles lie is a guess" in "; ".join(load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+def test_soles_of_a_walk_on_the_spot_are_level(fps, motions, calibrated, tmp_path):
+    """As games have them: its feet never rest, but move with the ground."""
+    walk = motions.whole("walk", fps)
+    spot = walk.poses.copy()
+    drift = (spot[-1, :2] - spot[0, :2]) / (len(spot) - 1)
+    spot[:, :2] -= np.outer(np.arange(len(spot)), drift)
+    write_rig(Rig(zero="random", seed=7), walk, tmp_path / "r.bvh")
+    over_ground = calibrated(tmp_path / "r.bvh", Hints(up="+Y"))
+    write_rig(Rig(zero="random", seed=7), Clip(spot, walk.fps, "spot"), tmp_path / "r.bvh")
+    on_the_spot = calibrated(tmp_path / "r.bvh", Hints(up="+Y"))
+    feet = [BODIES.index("left_foot"), BODIES.index("right_foot")]
+    apart = quaternions.product(quaternions.conjugate(over_ground.segments[:, feet]), on_the_spot.segments[:, feet])
+    assert np.rad2deg(np.linalg.norm(quaternions.logarithm(apart), axis=2)).max() < LARGEST
+    assert "soles" not in on_the_spot.remarks
 
 
 def exchanged(path, *words):
