@@ -15,11 +15,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.dynamics.contacts import GAP
 from models.mocap.motion.spans import cleaned, spans
 
 _TURNING, _TURN = 1.5, np.deg2rad(45.0)  # rate [rad/s] and angle [rad] from which a foot turns in its stance
 LOADED = 0.35  # vertical load above which something must bear [body weights]
+_FLAT = 0.1  # shortest rest between two turns the same way, or at an end [s]: places are kept for 0.05 s beside
 _SMOOTHING = 0.02  # standard deviation of the filter for the rate [s]
 _ENOUGH = 4  # frames in which a foot stands on heel and toes, from which its place is taken there
 
@@ -76,12 +76,16 @@ def turns(yaw: Array, load: Array, fps: float) -> list[tuple[int, int]]:
     if len(yaw) < 2:
         return []
     rate = gaussian_filter1d(np.gradient(yaw), _SMOOTHING * fps) * fps
-    fast = cleaned(np.abs(rate) > _TURNING, round(GAP * fps), 2)
-    return [
-        (start, end)
-        for start, end in spans(fast)
-        if abs(yaw[end - 1] - yaw[start]) > _TURN and load[start:end].mean() > LOADED
-    ]
+    found: list[tuple[int, int]] = []
+    for way in (-1.0, 1.0):
+        rests = cleaned(way * rate <= _TURNING, 0, round(_FLAT * fps))
+        found += (
+            (start, end)
+            for start, end in spans(~rests)
+            if way * (yaw[end - 1] - yaw[start]) > _TURN and load[start:end].mean() > LOADED
+        )
+    found.sort()
+    return [turn for k, turn in enumerate(found) if k == 0 or turn[0] >= found[k - 1][1]]
 
 
 def heading(turned: Array) -> Array:
