@@ -1,11 +1,12 @@
 r"""Contact detection: the contact schedule of a capture, from motion of its soles and from its vertical load.
 
 Heel and toes of a foot stand by the rule of all contacts (`standing_parts`); each stance has one flat place on the
-floor. Where nothing stands although the centre of mass accelerates as if under load, the capture skates or hovers: a
-neighbouring stance is then extended, on the toes if the stance came before and on the lower part of the foot if it
-comes after. Without such a stance the lowest part of the feet bears load while sliding, most of which `root_path`
-removes before. An open clip with an upright end rests there on both feet, since nobody can rest on the toes of one, as
-captures may be cut. Hands are in the schedule of a clip in which they bear load (`hand_stances`), and only there.
+floor, or stands on one sphere while it turns (`foot_places`). Where nothing stands although the centre of mass
+accelerates as if under load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the
+stance came before and on the lower part of the foot if it comes after. Without such a stance the lowest part of the
+feet bears load while sliding, most of which `root_path` removes before. An open clip with an upright end rests there on
+both feet, since nobody can rest on the toes of one, as captures may be cut. Hands are in the schedule of a clip in
+which they bear load (`hand_stances`), and only there.
 """
 
 from typing import NamedTuple
@@ -22,16 +23,17 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.motion.spans import cleaned, spans
+from models.mocap.preparation.foot_places import LOADED, heading, lying, place_foot
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
 
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
 # the frames of 19 captures.
 _LOW, _FAR = 0.10, 0.15  # largest height of a foot, and travel of what stands longer, where a stance is extended [m]
-_LOADED = 0.35  # vertical load above which something must bear [body weights]
 _NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
 _SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
 _SWING = 0.015  # least height of a swinging foot [m]: the tracking controller takes one below 8 mm for standing
+_LIFT = 0.01  # least height of the other spheres of a foot that turns on one [m]
 _RISE = 0.08  # time before and after stance in which this height is reached [s]; captured feet swing at 2 to 5 cm
 _RESTS = 0.1  # time at both ends of an open clip in which both feet stand [s]
 _KEPT = 0.05  # time before and after a stance over which a sphere keeps its place ever less [s]: one knot of `Change`
@@ -99,7 +101,13 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     standing, places = np.column_stack((_of_spheres(parts), hands)), np.full(points.shape, CONTACT_RADIUS)
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
-        _place(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], parts[:, foot], places[:, mine])
+        yaw = np.unwrap(heading(turned[:, BODIES.index(f"{side}_foot")]))
+        for start, end in spans(np.any(parts[:, foot], axis=1)):
+            stance = slice(start, end)
+            place_foot(
+                points[stance, mine], yaw[stance], soles()[mine], parts[stance, foot], load[stance], fps,
+                standing[stance, mine], places[stance, mine],
+            )  # fmt: skip
     for palm, bears in enumerate(hands.T, start=_N_SOLES):
         for start, end in spans(bears):
             places[start:end, palm, :2] = np.median(points[start:end, palm, :2], axis=0)
@@ -112,7 +120,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         firm[:-shift] &= standing[shift:]
     pushing = firm | sliding
     # In frames under load in which nothing else may bear, standing spheres bear without the lag.
-    none = ~pushing.any(axis=1) & (load > _LOADED)
+    none = ~pushing.any(axis=1) & (load > LOADED)
     pushing[none] |= standing[none]
     kept = _kept(standing, places, round(_KEPT * fps))
     here = slice(first, first + clip.n_frames)
@@ -157,8 +165,8 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
             if schedule.standing[at, mine].any():
                 place = schedule.places[at, mine]
             else:
-                yaw = float(_heading(turned[at, BODIES.index(f"{side}_foot")]))
-                place = _lying(points[None, at, mine], soles()[mine], yaw, [0, 1, 2, 3])
+                yaw = float(heading(turned[at, BODIES.index(f"{side}_foot")]))
+                place = lying(points[None, at, mine], soles()[mine], yaw, [0, 1, 2, 3])
             made.places[span, mine] = place
             made.standing[span, mine] = made.pushing[span, mine] = True
             made.sliding[span, mine] = False
@@ -168,17 +176,19 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
     """Least height of each contact sphere in swing phase [m], rising from 0 at stance, shape (n, k).
 
-    The tracking controller would take a foot that swings a few millimetres over the floor for a standing one. A hand
-    stays above the floor.
+    The tracking controller would take a foot that swings a few millimetres over the floor for a standing one. So are
+    the other spheres of a foot lifted that turns on one. A hand stays above the floor.
     """
     grounded = schedule.standing | schedule.sliding
     n = len(grounded)
-    laps = np.tile(grounded, (3, 1)) if closed else grounded
+    turns = schedule.feet.reshape(n, 2, 4).sum(axis=2) == 1
+    laps, turns = (np.tile(of, (3, 1)) if closed else of for of in (grounded, turns))
     here = slice(n, 2 * n) if closed else slice(0, n)
     least = np.zeros(grounded.shape)
     for foot in range(2):
         mine = slice(4 * foot, 4 * foot + 4)
         swings = ~laps[:, mine].any(axis=1)
+        height = np.where(swings, _SWING, np.where(turns[:, foot], _LIFT, 0.0))
         for sphere in range(4 * foot, 4 * foot + 4):
             stands = np.flatnonzero(laps[:, sphere])
             if not len(stands):
@@ -189,7 +199,7 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
                 np.abs(frames - stands[np.minimum(after, len(stands) - 1)]),
                 np.abs(frames - stands[np.maximum(after - 1, 0)]),
             )
-            risen = np.where(swings, _SWING, 0.0) * np.minimum(away / (_RISE * fps), 1.0)
+            risen = height * np.minimum(away / (_RISE * fps), 1.0)
             least[:, sphere] = risen[here]
     return least
 
@@ -220,7 +230,7 @@ def _of_spheres(parts: Mask) -> Mask:
 def _bare(parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
     """Where nothing stands under load, shape (n,)."""
     stands = parts.any(axis=(1, 2)) | hands.any(axis=1)
-    return cleaned(~stands & (load > _LOADED), round(0.03 * fps), 2)
+    return cleaned(~stands & (load > LOADED), round(0.03 * fps), 2)
 
 
 def _slides(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
@@ -245,22 +255,6 @@ def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
             return
 
 
-def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array) -> None:
-    """Write the places of one foot's spheres: one flat placement for each stance."""
-    heel, toe = parts.T
-    yaw = np.unwrap(_heading(turned))
-    for start, end in spans(heel | toe):
-        span = np.arange(start, end)
-        flat = span[heel[span] & toe[span]]
-        if len(flat) >= 4:
-            frames, spheres = flat, [0, 1, 2, 3]
-        elif toe[span].sum() >= heel[span].sum():
-            frames, spheres = span[toe[span]], [2, 3]
-        else:
-            frames, spheres = span[heel[span]], [0, 1]
-        places[start:end] = _lying(points[frames], sole, float(np.median(yaw[frames])), spheres)
-
-
 def _kept(standing: Mask, places: Array, width: int) -> Array:
     """Share with which spheres keep their places; `places` are extended over the frames beside stances."""
     share = standing.astype(np.float64)
@@ -274,21 +268,6 @@ def _kept(standing: Mask, places: Array, width: int) -> Array:
     # Nothing holds a foot that leaves into a flight or lands from one: held there, a backflip and a kick fell.
     share[~standing.any(axis=1)] = 0.0
     return share
-
-
-def _heading(turned: Array) -> Array:
-    """Heading of a foot's forward axis about the vertical [rad]."""
-    x = 1.0 - 2.0 * (turned[..., 2] ** 2 + turned[..., 3] ** 2)
-    y = 2.0 * (turned[..., 1] * turned[..., 2] + turned[..., 0] * turned[..., 3])
-    return np.arctan2(y, x)
-
-
-def _lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
-    """Sphere centres of a sole flat on the floor, placed at the median of its spheres over frames, shape (4, 3) [m]."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    level = sole[:, :2] @ np.array([[c, s], [-s, c]])
-    place = np.median(points[:, spheres, :2] - level[spheres], axis=(0, 1))
-    return np.column_stack((level + place, np.full(4, CONTACT_RADIUS)))
 
 
 def _load(poses: Array, fps: float) -> Array:

@@ -10,6 +10,7 @@ from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.feasible import borne
+from models.mocap.preparation.fidelity import OTHERWISE
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import plus, resampled, sole_points
 from models.mocap.preparation.prepare import prepared
@@ -299,6 +300,16 @@ def test_a_captured_cartwheel_is_made_feasible_on_feet_and_hands(mocap, tmp_path
     assert outcome.measures.residual < 0.05
     assert outcome.followed.stands
     assert "hands bear load for" in summary(outcome)
+
+
+@pytest.mark.slow
+def test_a_captured_dance_turns_on_its_feet(mocap, tmp_path):
+    outcome = prepare_file(mocap / "deepmimic/humanoid3d_dance_a.txt", tmp_path / "dance.bvh")
+    assert outcome.made.near
+    assert outcome.made.fidelity.joints < OTHERWISE
+    assert outcome.measures.skate < 0.005
+    assert outcome.measures.tilt < np.deg2rad(2.0)
+    assert outcome.followed.stands
 
 
 @pytest.fixture
