@@ -107,6 +107,5 @@ class Governed(Law):
     field: Law
     governor: Governor
 
-    def program(self) -> Program:
-        """Compiled form of the sum."""
+    def _composed(self) -> Program:
         return self.field + self.governor
