@@ -20,7 +20,7 @@ from numba import njit
 
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.base import CompiledMap, KernelMap
 from controllers.legs.grounded import grounded, hastened, runs
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
@@ -29,7 +29,7 @@ from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
 from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
 from controllers.rotations import multiply, relative
-from controllers.state import Array, Mask, Pose
+from controllers.state import Array, Mask
 from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,
@@ -197,7 +197,7 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
                 jacobian[3 + 3 * joint : 6 + 3 * joint, by] = spins[joint, :, by]
 
 
-class Led(HapticMap):
+class Led(KernelMap):
     r"""A travelling clip on the path of a figure that is led (see `controllers.fields.leading`).
 
     The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, with s the arc length [m] and u
@@ -305,7 +305,7 @@ class Led(HapticMap):
         width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
         header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
-        self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
+        super().__init__(LED, led_map, np.concatenate([header, *(limb.packed() for limb in limbs), *packed]))
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
@@ -316,27 +316,6 @@ class Led(HapticMap):
         """Numbers of a configuration."""
         return 3 + 4 * self._rotations
 
-    @property
-    def nv(self) -> int:
-        """Numbers of a tangent."""
-        return 3 + 3 * self._rotations
-
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with a straight path along x, 30 m to both sides of the origin."""
         return CompiledMap(LED, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
-
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration at x = [s, u, …], shape (nq,), on the path in the memory, or on a straight one."""
-        return self._evaluate(x, memory, 0)[0]
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative by x, shape (nv, 6): columns by s and u, the others are zero."""
-        return self._evaluate(x, memory, self.nv)[1]
-
-    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
-        walker = np.asarray(x, dtype=np.float64)
-        if walker.shape != (STYLUS,):
-            raise ParameterError(f"the walker of a map has shape ({STYLUS},), got {walker.shape}")
-        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        led_map(self._params, walker, self.compiled().memory if memory is None else memory, pose, jacobian)
-        return pose, jacobian
