@@ -26,7 +26,8 @@ from controllers.legs.limb_ends import end_channels, end_lag, end_poses
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
-from controllers.motion.captures import Capture, lap_signs, low_passed
+from controllers.motion.captures import Capture, low_passed
+from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Mask
@@ -278,7 +279,7 @@ class Led(KernelMap):
             rows = np.concatenate([rows, ends[:, 0]], axis=1)
             rows[:, column : column + 4] = quaternions[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        signs = lap_signs(rows, self._rotations)
+        signs = closing_signs(rows, self._rotations)
         forms, self.flies, self.grounds, self.pace = [rows], False, False, 1.0
         if standing is not None:
             stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]

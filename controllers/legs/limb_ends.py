@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.limbs import END, Limb
+from controllers.motion.channels import continuous
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
@@ -33,9 +34,7 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
         turn = turn * _rotations(channels, joint)
     place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
-    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
-    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
-    return place.reshape(n, m, 3), quaternions
+    return place.reshape(n, m, 3), continuous(quaternions)
 
 
 def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
+from controllers.motion.channels import continuous, normalise
 from controllers.state import Array
 
 _STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # [m], [rad] a lap that ends this near to its start has no drift
@@ -147,9 +148,7 @@ def checked_clip(poses: Array, fps: float, name: str) -> Array:
             raise ParameterError(
                 f"{name}: quaternion at number {first} of frame {int(np.abs(norms - 1).argmax())} is not unit"
             )
-        dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
-        signs = np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
-        array[:, first : first + 4] = quaternions / norms * signs[:, None]
+        array[:, first : first + 4] = continuous(quaternions / norms)
     return array
 
 
@@ -222,9 +221,7 @@ def there_and_back(poses: Array, fps: float) -> Array:
     own = np.where(times < 2.0 * brakes, times**2 / (4.0 * brakes), times - brakes)
     own = np.where(rest < 2.0 * brakes, seconds - rest**2 / (4.0 * brakes), own)
     slow = CubicSpline(np.arange(len(poses)) / fps, poses)(np.clip(own, 0.0, seconds))
-    turns = slow[:, 3:].reshape(len(slow), -1, 4)
-    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
-    slow[:, 3:] = turns.reshape(len(slow), -1)
+    normalise(slow, (slow.shape[1] - 3) // 4)
     return np.concatenate([slow, slow[-2::-1]])
 
 
