@@ -157,7 +157,7 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
         over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
-        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, SHARP))
+        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
 

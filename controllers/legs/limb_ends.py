@@ -44,7 +44,7 @@ def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
     return (-softness * np.log(np.exp(-heights / softness).sum(axis=0))).reshape(quaternions.shape[:-1])
 
 
-def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
+def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb) -> Array:
     """Slip of an end over the ground from each sample to the next, at the touching points, so that a foot may roll.
 
     Parameters
@@ -56,19 +56,17 @@ def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb
     headings : Array, shape (n, k)
         Their headings [rad], continuous along n.
     limb : Limb
-    softness : float
-        Softness of the minimum that decides which points touch [m].
 
     Returns
     -------
     Array, shape (n - 1, k, 3)
-        Displacement (x, y) of the points, weighted towards the lowest, without the part due to the turn about the
-        vertical, [m]; and that turn [rad].
+        Displacement (x, y) of the points, weighted towards the lowest (`SHARP`), without the part due to the turn about
+        the vertical, [m]; and that turn [rad].
     """
     turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
     offsets = limb.points - limb.points.mean(axis=0)
     levers = np.stack([turn.apply(p).reshape(*headings.shape, 3) for p in offsets], axis=-2)
-    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / softness)
+    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / SHARP)
     weights /= weights.sum(axis=-1, keepdims=True)
     share, lever = 0.5 * (weights[1:] + weights[:-1])[..., None], 0.5 * (levers[1:] + levers[:-1])
     turning = np.diff(headings, axis=0)

@@ -111,7 +111,7 @@ def planted_ends(
     for kept in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
         over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
-        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, SHARP)[:, 0]
+        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb)[:, 0]
         ahead = kept * gap(stays[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
