@@ -7,7 +7,7 @@ import numpy as np
 from numba import typeof, types
 
 from controllers.fields.instructions import VECTOR
-from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS
@@ -47,6 +47,14 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
         Written, shape (n, 75).
     """
     _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
+
+
+def map_poses(haptic_map: HapticMap, points: Array, memory: Array | None = None) -> Array:
+    """Poses (n, nq) of a map along a path of the stylus (n, 7); a memory is updated, by default that of a new run."""
+    kind, params, fresh = haptic_map.compiled()
+    poses = np.empty((len(points), haptic_map.nq))
+    poses_along(kind, params, fresh if memory is None else memory, points, poses)
+    return poses
 
 
 def poses_unit() -> Unit:
