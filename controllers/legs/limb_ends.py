@@ -141,7 +141,7 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     return yawed(-angle, quaternions), np.concatenate([place, lags], axis=2)
 
 
-def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
+def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array | None = None) -> Array:
     """Channels with limbs given by their ends.
 
     Parameters
@@ -151,6 +151,8 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
     drifts : Array, shape (m, 3)
         Drifts ξ of the loops.
     limbs : sequence of Limb
+    weights : Array, shape (m,), optional
+        Of the loops in λ (`end_lag`).
 
     Returns
     -------
@@ -165,7 +167,8 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
     """
     result, ends = channels.copy(), list[Array]()
     for limb in limbs:
-        quaternions, end = end_channels(channels, drifts, limb, end_lag(end_poses(channels, limb)[0], drifts))
+        lag = end_lag(end_poses(channels, limb)[0], drifts, weights)
+        quaternions, end = end_channels(channels, drifts, limb, lag)
         column = 3 + 4 * limb.joints[2]
         result[..., column : column + 4] = quaternions
         ends.append(end)
