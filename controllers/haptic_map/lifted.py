@@ -420,7 +420,7 @@ def _flag(name: str, value: float) -> bool:
 
 
 def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:
-    poses, fps = checked_clip(*clip, f"clip {name}"), clip[1]
+    poses = checked_clip(*clip, f"clip {name}")
     checked = checked_angles(angles, len(poses), closed, f"clip {name}")
     gap = closing_gap(poses) if closed else 0.0
     if gap > CLOSES:
@@ -428,7 +428,7 @@ def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Arr
             f"clip {name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
             "give it as open, or cut it where it repeats"
         )
-    return PlacedClip.of(poses, fps, checked, closed)
+    return PlacedClip.of(poses, checked, closed)
 
 
 def _checked_margin(margin: float) -> float:

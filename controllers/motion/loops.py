@@ -106,8 +106,6 @@ class Loop:
         ξ = (v_x, v_y [m], ω [rad]) per lap.
     duration : float
         Duration of a lap [s].
-    gap : float
-        Largest angle [rad] of a joint between the clip's ends, before they were closed.
     splines : list of CubicSpline
         ρ's position, then root and joint rotations in R⁴, each of period 1, or 2 if q returns as −q.
     share : float
@@ -116,7 +114,6 @@ class Loop:
 
     drift: Array
     duration: float
-    gap: float
     splines: list[CubicSpline]
     share: float = 1.0
 
@@ -241,15 +238,10 @@ def forward_loop(poses: Array, fps: float) -> Loop:
     drift = drift_of(placed)
     rest = remainder(placed, s, drift)
     splines: list[CubicSpline] = []
-    gap = 0.0
     for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:
         values = rest[:, first:stop]
-        sign = 1.0
-        if first:
-            dot = float(values[-1] @ values[0])
-            sign = 1.0 if dot >= 0.0 else -1.0
-            gap = max(gap, 2.0 * float(np.arccos(min(1.0, abs(dot)))))
+        sign = -1.0 if first and values[-1] @ values[0] < 0.0 else 1.0
         if np.abs(values[-1] - sign * values[0]).max() > 1e-6:
             values = _closed(s, values, sign)
         splines.append(_periodic_spline(s, values, sign))
-    return Loop(drift, (len(poses) - 1) / fps, gap, splines)
+    return Loop(drift, (len(poses) - 1) / fps, splines)

@@ -141,18 +141,15 @@ class PlacedClip:
         Whether the last frame is the first of the next lap.
     drift : Array, shape (3,)
         ξ of a lap.
-    duration : float
-        Duration of the clip [s].
     """
 
     poses: Array
     angles: Array
     closed: bool
     drift: Array
-    duration: float
 
     @staticmethod
-    def of(poses: Array, fps: float, angles: Array, closed: bool) -> "PlacedClip":
+    def of(poses: Array, angles: Array, closed: bool) -> "PlacedClip":
         """Clip from poses that passed `checked_clip` and angles that passed `checked_angles`."""
         placed = placed_at_origin(poses, (angles - angles[0]) / _TURN)
         drift = drift_of(placed)
@@ -160,7 +157,7 @@ class PlacedClip:
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
         placed[:, :2] = turned(heading, placed[:, :2]) + shift
         placed[:, 3:7] = yawed(heading, placed[:, 3:7])
-        return PlacedClip(placed, angles, closed, drift, (len(poses) - 1) / fps)
+        return PlacedClip(placed, angles, closed, drift)
 
     @property
     def remainder(self) -> Array:
