@@ -11,6 +11,7 @@ from controllers.borrowed import borrowed
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
+from controllers.motion.channels import closing_signs
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
@@ -74,15 +75,6 @@ def blend_corrected(
     )  # fmt: skip
 
 
-def _closing_signs(channels: Array, rotations: int) -> Array:
-    """Signs (m, channels) with which channels (N, m, ·) close: −1 for a quaternion that returns as −q."""
-    signs = np.ones(channels.shape[1:])
-    for first in range(3, 3 + 4 * rotations, 4):
-        dots = (channels[-1, :, first : first + 4] * channels[0, :, first : first + 4]).sum(axis=1)
-        signs[:, first : first + 4] = np.where(dots < 0.0, -1.0, 1.0)[:, None]
-    return signs
-
-
 def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Sequence[Limb]) -> Array:
     """Parameters of `blend`: the loops, aligned in time to the first, as splines through equal steps of the lap.
 
@@ -104,6 +96,5 @@ def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Seque
     """
     drifts = np.stack([loop.drift for loop in loops])
     channels = with_ends(aligned_channels(loops, samples, limbs), drifts, limbs)
-    rotations = len(groups)
-    rows = control_points(channels, _closing_signs(channels, rotations)).ravel()
+    rows = control_points(channels, closing_signs(channels, len(groups))).ravel()
     return np.concatenate([[samples, len(loops)], drifts.ravel(), packed_figure(groups, limbs), rows])

@@ -19,13 +19,14 @@ from controllers.state import Array, IntArray
 from controllers.work_array import work_array
 
 _TERMS = 3  # terms of the polynomial, and mixtures of each pair that are interpolated exactly
+_ROUNDING = 1e-9  # [m]
 _ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
 
 
-def neighbouring_pairs(sites: Array) -> list[tuple[int, int]]:
-    """Pairs of sites (rows, m, 2) that are Gabriel neighbours at some row (Gabriel & Sokal 1969).
+def neighbouring_pairs(sites: Array, share: float = 0.0) -> list[tuple[int, int]]:
+    """Pairs of sites (rows, m, 2) that are Gabriel neighbours (Gabriel & Sokal 1969) at a share of the rows, or at one.
 
-    No other site lies in the circle whose diameter is the segment between the two.
+    No other site lies in or on the circle whose diameter is the segment between the two.
     """
     clips = sites.shape[1]
     found: list[tuple[int, int]] = []
@@ -34,7 +35,8 @@ def neighbouring_pairs(sites: Array) -> list[tuple[int, int]]:
             middle, half = 0.5 * (sites[:, i] + sites[:, j]), 0.5 * np.linalg.norm(sites[:, i] - sites[:, j], axis=1)
             others = np.delete(sites, (i, j), axis=1)
             apart = np.linalg.norm(others - middle[:, None], axis=2).min(axis=1, initial=np.inf)
-            if (apart >= half).any():
+            alone = apart > half + _ROUNDING
+            if alone.any() and alone.mean() >= share:
                 found.append((i, j))
     return found
 

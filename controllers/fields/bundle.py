@@ -57,8 +57,7 @@ class RiverBundle(Law):
         """V(p) [m/s], shape (3,)."""
         return np.sum([river.flow(t, p) for river in self.rivers], axis=0)
 
-    def program(self) -> Program:
-        """Compiled form of the force."""
+    def _composed(self) -> Program:
         return reduce(add, (river.program() for river in self.rivers))
 
     def arrays(self) -> dict[str, Array]:

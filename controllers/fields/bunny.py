@@ -1,7 +1,6 @@
 """The bunny: a moving attractor on the curve, felt only in its neighbourhood (Donald & Henle 2000, section 7.3)."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -142,12 +141,7 @@ class Bunny(Law):
         """Gains of the weighted form that is executed."""
         return felt_bunny(self.k_r, self.b_d, self.delta, self.attraction)
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         along, waits, felt = float(self.attraction == "along"), float(self.pace == "wait"), self.felt
         gains = BunnyGains(felt.k_r, felt.b_d, felt.delta**-2, along, waits)
         return Program.of(self, bunny_wrench, gains, [np.nan] * _MEMORY, self.curve)
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 from numba import njit, types
@@ -47,14 +47,9 @@ class CompiledLaw(FunctionLaw):
         super().__post_init__()
         _kernel(self.function, len(self.parameters))
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         numbers = [float(value) for value in self.parameters.values()]
         return Program.of(self, _kernel(self.function, len(numbers)), numbers, [])
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program
 
 
 @cache

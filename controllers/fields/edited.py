@@ -125,18 +125,13 @@ class Performance(Law):
     epsilon: float
     pace: Literal["clock", "wait"]
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         river, waits = self.river, float(self.pace == "wait")
         gains = RecordedGains(
             river.drag / river.tau, river.drag, river.epsilon**-2, self.weight, self.epsilon**-2, waits
         )  # fmt: skip
         numbers = np.concatenate([gains, self.performed.packed()])
         return Program.of(self, recorded_wrench, numbers, [np.nan] * _MEMORY, river.curve)
-
-    def program(self) -> Program:
-        """Compiled form of α U as a force."""
-        return self._program
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,17 +182,13 @@ class Edited(Law):
     def _blobs(self) -> tuple[Array, ...]:
         return tuple(curve.packed() for curve in (self.river.curve, *self.performed))
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
+        """With pace "wait", s starts at φ's start in each run."""
         laws = [
             Performance(self.river, curve, weight, self.epsilon, self.pace)
             for curve, weight in zip(self.performed, self.weights, strict=True)
         ]
         return reduce(Program.__add__, laws, self.river.program())
-
-    def program(self) -> Program:
-        """Compiled form of the force of V + Σ α U; with pace "wait", s starts at φ's start in each run."""
-        return self._program
 
     def flow(self, t: float, p: Array) -> Array:
         """V + Σ α U at time t of the performance [m/s], shape (3,)."""

@@ -1,7 +1,6 @@
 """FOLLOW: a spring to the curve plus a damper to its tangent velocity (Donald & Henle 2000, section 4)."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -126,15 +125,10 @@ class Follow(Law):
         checked("b_d", self.b_d, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         return Program.of(self, follow_wrench, self.gains, [np.nan], self.curve)
 
     @property
     def gains(self) -> FollowGains:
         """Parameters of the kernel."""
         return FollowGains(self.k_r, self.b_d, self.epsilon**-2, float(self.parallel))
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

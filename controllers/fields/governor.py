@@ -1,7 +1,6 @@
 """The governor: a force that resists playing a motion slower or faster than is physically feasible."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -94,12 +93,7 @@ class Governor(Law):
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
         object.__setattr__(self, "speeds", checked_speeds("governor", self.speeds))
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         speeds = np.asarray(self.speeds)
         numbers = np.concatenate([GovernorGains(self.drag, self.epsilon**-2, len(speeds)), speeds.ravel()])
         return Program.of(self, governor_wrench, numbers, [np.nan], self.curve)
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

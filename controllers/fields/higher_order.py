@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -299,8 +298,7 @@ class HigherOrder(Law):
         checked("hysteresis", self.hysteresis, "m/s")
         one_of("form", self.form, ("smooth", "discrete"))
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         blocks: list[Array] = []
         for river in self.bundle.rivers:
             speeds = np.zeros(0) if river.speeds is None else np.ravel(river.speeds)
@@ -314,7 +312,3 @@ class HigherOrder(Law):
         offsets = np.cumsum([_HEADER + len(blocks), *(len(block) for block in blocks[:-1])])
         memory = [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0]
         return Program.of(self, higher_order_wrench, np.concatenate([header, offsets, *blocks]), memory)
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

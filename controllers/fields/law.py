@@ -41,8 +41,16 @@ class Law(ABC):
     """
 
     @abstractmethod
+    def _composed(self) -> "Program":
+        """The field as it is executed, for `program`, which asks for it once."""
+
+    @cached_property
+    def _program(self) -> "Program":
+        return self._composed()
+
     def program(self) -> "Program":
         """Compiled form of the field, which the servo runs."""
+        return self._program
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
@@ -225,8 +233,7 @@ class Program(Law):
         ops = np.vstack([self.ops, [[join, len(self.params), 0, 0]]])
         return replace(self, ops=ops, params=np.concatenate([self.params, params]))
 
-    def program(self) -> "Program":
-        """Itself."""
+    def _composed(self) -> "Program":
         return self
 
     @cached_property

@@ -4,7 +4,6 @@ The figure's walker is a state of its own (`controllers.walking.walking`), which
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -118,13 +117,8 @@ class Leading(Law):
         for name, unit in (("k_l", "N/m"), ("k_z", "N/m"), ("b", "N s/m")):
             checked(name, getattr(self, name), unit)
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         gains = LeadingGains(self.k_l, self.b, self.k_z, self.walking.scale, *self.walking.lead)
         numbers = np.concatenate([gains, self.walking.packed()])
         feed = WalkerFeed(TRACE_SIZE, len(gains), self.walking)
         return Program.of(self, leading_wrench, numbers, np.zeros(FOLLOWED), feeds=(feed,))
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

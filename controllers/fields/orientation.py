@@ -1,7 +1,6 @@
 """Orientation field: a rotational spring and damper that align the stylus with the curve's orientation."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -85,11 +84,6 @@ class Orientation(Law):
         checked("b_o", self.b_o, "N m s/rad")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         gains = OrientationGains(self.k_o, self.b_o, self.epsilon**-2)
         return Program.of(self, orientation_wrench, gains, [np.nan], self.curve)
-
-    def program(self) -> Program:
-        """Compiled form of the field."""
-        return self._program

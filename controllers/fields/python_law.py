@@ -1,7 +1,6 @@
 """Laws of force in plain Python, usable wherever a compiled law is."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 from numba import njit
 
@@ -26,11 +25,6 @@ class PythonLaw(FunctionLaw):
     that the function keeps between ticks is not part of the field's memory. Parameters are those of `FunctionLaw`.
     """
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
         feed = PythonFeed(TRACE_SIZE, self.six_numbers)
         return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))
-
-    def program(self) -> Program:
-        """Compiled form of the field: a kernel that reads the function's six numbers from the memory."""
-        return self._program

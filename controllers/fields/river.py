@@ -89,8 +89,7 @@ class River(Law):
         """The river as a force: FOLLOW with k_r = b/τ and b_d = b."""
         return Follow(self.curve, self.drag / self.tau, self.drag, self.epsilon)
 
-    def program(self) -> Program:
-        """Compiled form of the force."""
+    def _composed(self) -> Program:
         return self.force.program()
 
     def flow(self, t: float, p: Array) -> Array:

@@ -14,7 +14,6 @@ h and h_* at the stylus are written to the law's memory before it is evaluated (
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -187,8 +186,8 @@ class SoftWall(Law):
                     f"({2.0 * self.margin:.3g} rad) or more"
                 )
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
+        """A new run starts with the initial memory of the map."""
         haptic_map = self.haptic_map
         _, params, memory = haptic_map.compiled()
         gains = WallGains(
@@ -202,7 +201,3 @@ class SoftWall(Law):
         given = np.zeros(haptic_map.nq + haptic_map.nv * STYLUS_TANGENT)
         numbers = np.concatenate([gains, table.ravel(), params])
         return Program.of(self, soft_wall_wrench, numbers, np.concatenate([given, memory]), feeds=(feed,))
-
-    def program(self) -> Program:
-        """Compiled form of the field; a new run starts with the initial memory of the map."""
-        return self._program

@@ -1,7 +1,6 @@
 """STRETCHY TUBES: a deformable guide; a curve is found, grasped and bent like rubber (Donald & Henle 2000, sec. 4)."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -269,8 +268,8 @@ class StretchyTubes(Law):
         if np.isfinite(self.until) and self.then is None:
             raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
 
-    @cached_property
-    def _program(self) -> Program:
+    def _composed(self) -> Program:
+        """The memory contains the curve, which is bent there."""
         follow = self.then
         then = FollowGains(0.0, 0.0, 0.0, 0.0) if follow is None else follow.gains
         state = np.zeros(_RECORD)
@@ -280,10 +279,6 @@ class StretchyTubes(Law):
             self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease, float(self.hold == "stylus")
         )
         return Program.of(self, stretchy_wrench, gains, memory)
-
-    def program(self) -> Program:
-        """Compiled form of the field; its memory contains the curve, which is bent there."""
-        return self._program
 
     @staticmethod
     def record_at(slot: int = TRACE_SIZE) -> int:

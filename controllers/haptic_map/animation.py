@@ -1,7 +1,6 @@
 """Base classes of the maps that blend clips: clips become loops, and a lap of the hand plays a lap of every clip."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,26 +8,20 @@ from controllers.blending.blend import packed_blend
 from controllers.blending.clip_arrays import kept
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.base import CompiledMap, Kernel, KernelMap
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import in_step
-from controllers.state import Array, Pose
-
-Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
+from controllers.state import Array
 
 
-class ClipMap(HapticMap):
+class ClipMap(KernelMap):
     """A map whose kernel computes poses from clips, and whose memory is the frame of the lap.
 
     Parameters
     ----------
-    kind : int
-        Number of the kernel (see `evaluate`).
-    kernel : Kernel
-        Compiled function (params, x, memory, pose, jacobian).
-    params : Array
-        Parameters of the kernel.
+    kind, kernel, params
+        As in `KernelMap`.
     clips : sequence of (Array, float)
         Clips that the map is made of: poses (n, nq) and frames per second.
     names : sequence of str
@@ -46,7 +39,7 @@ class ClipMap(HapticMap):
         names: Sequence[str],
         limbs: Sequence[Limb],
     ) -> None:
-        self._kind, self._kernel, self._params = kind, kernel, params
+        super().__init__(kind, kernel, params)
         # Stored as given, so that a map made of them again is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
         self.names, self.limbs = tuple(names), tuple(limbs)
@@ -57,11 +50,6 @@ class ClipMap(HapticMap):
         return self.clips[0][0].shape[1]
 
     @property
-    def nv(self) -> int:
-        """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
-        return 6 + 3 * ((self.nq - 7) // 4)
-
-    @property
     def lap_seconds(self) -> float:
         """Duration of a lap at which the clips run on average at their own pace [s]."""
         return float(np.mean([(len(poses) - 1) / fps for poses, fps in self.clips]))
@@ -70,32 +58,14 @@ class ClipMap(HapticMap):
         """The map in the form of its kernel, with the memory of a new run."""
         return CompiledMap(self._kind, self._params, fresh_lap())
 
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
-        return self._evaluate(x, memory, 0)[0]
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
-        return self._evaluate(x, memory, self.nv)[1]
-
-    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
-        stylus = np.asarray(x, dtype=np.float64)
-        if stylus.shape != (STYLUS,):
-            raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
-        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
-        return pose, jacobian
-
 
 class AnimationMap(ClipMap):
     """A map whose poses are blends of clips that were closed and aligned.
 
     Parameters
     ----------
-    kind : int
-        Number of the kernel (see `evaluate`).
-    kernel : Kernel
-        Compiled function (params, x, memory, pose, jacobian).
+    kind, kernel
+        As in `KernelMap`.
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second; a pose is root position, root quaternion, then joint quaternions (wxyz).
         Clips that do not close are closed (`closed_loop`), travelling ones brought in step (`strides`), and all

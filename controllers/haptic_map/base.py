@@ -1,15 +1,19 @@
 """Interface of haptic maps, from stylus poses to configurations of a target (Donald & Henle 2000, section 2.2)."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from collections.abc import Callable
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
+from controllers.errors import ParameterError
 from controllers.haptic_map.own_map import OWN, Asked, checked_pose, finite_differences
 from controllers.state import Array, Pose
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
 STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H
+Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
+"""Compiled function (params, x, memory, pose, jacobian) of a map; writes h(x), and h_*(x) unless jacobian is empty."""
 _ORIGIN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
@@ -109,3 +113,36 @@ class HapticMap(ABC):
         The power is the same: (h_*ᵀ f)·ẋ = f·(h_* ẋ). `torque`, shape (nv,): f, the force or torque on each rate.
         """
         return self.jacobian(x, memory).T @ np.asarray(torque, dtype=np.float64)
+
+
+class KernelMap(HapticMap):
+    """A map whose pose and derivative are computed by one compiled kernel.
+
+    Parameters
+    ----------
+    kind : int
+        Number of the kernel (see `evaluate`).
+    kernel : Kernel
+        The kernel.
+    params : Array
+        Its parameters.
+    """
+
+    def __init__(self, kind: int, kernel: Kernel, params: Array) -> None:
+        self._kind, self._kernel, self._params = kind, kernel, params
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
+        return self._evaluate(x, memory, 0)[0]
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
+        return self._evaluate(x, memory, self.nv)[1]
+
+    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
+        stylus = np.asarray(x, dtype=np.float64)
+        if stylus.shape != (STYLUS,):
+            raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
+        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
+        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
+        return pose, jacobian

@@ -7,7 +7,7 @@ addresses come from `sim.compilation.kernel_units`.
 from numba import njit, types
 
 from controllers.errors import ControllerError
-from controllers.haptic_map.animation import Kernel
+from controllers.haptic_map.base import Kernel
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express

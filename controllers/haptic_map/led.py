@@ -14,22 +14,24 @@ Channels are (1 − u) ρ + u ρ_grounded; u, the share of the grounded form, is
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.base import CompiledMap, KernelMap
 from controllers.legs.grounded import grounded, hastened, runs
-from controllers.legs.limb_ends import end_channels, end_lag, end_poses
+from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
-from controllers.motion.captures import Capture, lap_signs, low_passed
+from controllers.motion.captures import Capture, low_passed
+from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
 from controllers.rotations import multiply, relative
-from controllers.state import Array, Mask, Pose
+from controllers.state import Array, Mask
 from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,
@@ -197,7 +199,38 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
                 jacobian[3 + 3 * joint : 6 + 3 * joint, by] = spins[joint, :, by]
 
 
-class Led(HapticMap):
+class _Forms(NamedTuple):
+    """Rows of a led clip in its forms, the length of a lap [m], and attributes of `Led`."""
+
+    rows: list[Array]
+    stride: float
+    flies: bool = False
+    grounds: bool = False
+    pace: float = 1.0
+
+
+def _captured_forms(
+    rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stands: Mask, capture: Capture, duration: float,
+    sway: Array,
+) -> _Forms:  # fmt: skip
+    """Form of a capture: feet in stance held, and flight phases made steps, unless it hops on one foot or leaps far.
+
+    `duration` is that of a lap [s]; the other arguments are those of `with_planted_ends`.
+    """
+    flights, stride, still = runs(~np.any(stands, axis=1)), float(drift[0]), np.zeros((2, 2))
+    # A flight phase of the capture becomes a walking step, which is shorter.
+    steps = min(stride, capture.step * len(flights)) if flights else stride
+    held = (channels, drift, limbs, stands, capture.radius, duration)
+    planted = with_planted_ends(rows, *held, steps, still if flights else sway)
+    low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stands, sway)
+    if low is not None:
+        return _Forms([reached(low, steps, limbs)], steps, False, True, 1.0 / hastened(stands))
+    if flights:
+        planted = with_planted_ends(rows, *held, stride, still)
+    return _Forms([planted], stride, bool(flights))
+
+
+class Led(KernelMap):
     r"""A travelling clip on the path of a figure that is led (see `controllers.fields.leading`).
 
     The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, with s the arc length [m] and u
@@ -270,42 +303,27 @@ class Led(HapticMap):
         if capture is not None:
             channels = low_passed(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
-        rows, limbs = channels, [limb.allowing([channels]) for limb in limbs]
-        for limb in limbs:
-            lag = end_lag(end_poses(channels[:, None], limb)[0], drift, np.ones(1))
-            quaternions, ends = end_channels(channels[:, None], drift, limb, lag)
-            column = 3 + 4 * limb.joints[2]
-            rows = np.concatenate([rows, ends[:, 0]], axis=1)
-            rows[:, column : column + 4] = quaternions[:, 0]
+        limbs = [limb.allowing([channels]) for limb in limbs]
+        rows = with_ends(channels[:, None], drift, limbs, np.ones(1))[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        signs = lap_signs(rows, self._rotations)
-        forms, self.flies, self.grounds, self.pace = [rows], False, False, 1.0
+        signs, made = closing_signs(rows, self._rotations), _Forms([rows], self.stride)
         if standing is not None:
             stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
-            flights = runs(~np.any(stands, axis=1))
-            self.flies = bool(flights)
             sway = np.zeros((2, 2)) if sway is None else sway
             if capture is None:
                 low = grounded(rows, signs, self.stride, limbs, stands, sway)
-                forms, self.grounds = ([rows], False) if low is None else ([rows, low], True)
+                flies = bool(runs(~np.any(stands, axis=1)))
+                made = _Forms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
             else:
-                # A flight phase of the capture becomes a walking step, which is shorter.
-                steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
-                held = (channels, drift[0], limbs, stands, capture.radius, self.duration)
-                forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]
-                low = grounded(forms[0], signs, steps, limbs, stands, sway)
-                if low is not None:
-                    forms, self.stride, self.flies, self.grounds = [reached(low, steps, limbs)], steps, False, True
-                    self.pace = 1.0 / hastened(stands)
-                elif flights:
-                    forms = [with_planted_ends(rows, *held, self.stride, np.zeros((2, 2)))]
+                made = _captured_forms(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
+        forms, self.stride, self.flies, self.grounds, self.pace = made
         self.sways = self.grounds or (capture is not None and not self.flies)
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
         header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
-        self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
+        super().__init__(LED, led_map, np.concatenate([header, *(limb.packed() for limb in limbs), *packed]))
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
@@ -316,27 +334,6 @@ class Led(HapticMap):
         """Numbers of a configuration."""
         return 3 + 4 * self._rotations
 
-    @property
-    def nv(self) -> int:
-        """Numbers of a tangent."""
-        return 3 + 3 * self._rotations
-
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with a straight path along x, 30 m to both sides of the origin."""
         return CompiledMap(LED, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
-
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration at x = [s, u, …], shape (nq,), on the path in the memory, or on a straight one."""
-        return self._evaluate(x, memory, 0)[0]
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative by x, shape (nv, 6): columns by s and u, the others are zero."""
-        return self._evaluate(x, memory, self.nv)[1]
-
-    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
-        walker = np.asarray(x, dtype=np.float64)
-        if walker.shape != (STYLUS,):
-            raise ParameterError(f"the walker of a map has shape ({STYLUS},), got {walker.shape}")
-        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        led_map(self._params, walker, self.compiled().memory if memory is None else memory, pose, jacobian)
-        return pose, jacobian

@@ -40,6 +40,7 @@ from controllers.legs.floor import SOFTNESS
 from controllers.legs.footing import fresh_footing, packed_soles
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
 from controllers.legs.limbs import END, Limb
+from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
 from controllers.motion.loops import checked_clip
 from controllers.saturation import clamped
@@ -396,9 +397,7 @@ class Lifted(ClipMap):
         phases = np.arange(rows) * 2.0 * np.pi / rows
         channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
         last = channels.shape[2] - END * len(limbs)
-        rotations = channels[..., 3:last].reshape(rows, len(self._placed), -1, 4)
-        rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
-        channels[..., 3:last] = rotations.reshape(rows, len(self._placed), -1)
+        normalise(channels, (last - 3) // 4)
         for n in range(len(limbs)):
             channels[..., last + END * n + 3] = round_lap(lags[:, n], phases)[:, None]
         steps = round_lap(self.sites, np.arange(_PAIR_STEPS) * 2.0 * np.pi / _PAIR_STEPS)
@@ -421,7 +420,7 @@ def _flag(name: str, value: float) -> bool:
 
 
 def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:
-    poses, fps = checked_clip(*clip, f"clip {name}"), clip[1]
+    poses = checked_clip(*clip, f"clip {name}")
     checked = checked_angles(angles, len(poses), closed, f"clip {name}")
     gap = closing_gap(poses) if closed else 0.0
     if gap > CLOSES:
@@ -429,7 +428,7 @@ def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Arr
             f"clip {name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
             "give it as open, or cut it where it repeats"
         )
-    return PlacedClip.of(poses, fps, checked, closed)
+    return PlacedClip.of(poses, checked, closed)
 
 
 def _checked_margin(margin: float) -> float:

@@ -18,18 +18,17 @@ so that a closed path of the tool is a closed path of the joints. h_* differenti
 """
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, KernelMap
 from controllers.motion.vectors import Quaternion, Vector, cross, product, turned, turned_back
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import saturate_vector
-from controllers.state import Array, Pose
+from controllers.state import Array
 
 ROBOT_ARM = 4
 JOINTS = 7
@@ -150,7 +149,7 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
         jacobian[4, j], jacobian[5, j], jacobian[6, j] = _zyz_rates(pose[4], pose[5], in_arm)
 
 
-class RobotArm(HapticMap):
+class RobotArm(KernelMap):
     """The stylus leads the tool of a robot arm.
 
     A configuration is the seven joint angles [rad], a tangent their rates [rad/s]. Stylus positions saturate smoothly
@@ -200,14 +199,14 @@ class RobotArm(HapticMap):
     ) -> None:
         q = np.asarray(orientation, dtype=float)
         numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
-        self._params = np.array(numbers, dtype=float)
+        super().__init__(ROBOT_ARM, robot_arm_map, np.array(numbers, dtype=float))
         if self._params.shape != (_SIZE,) or not np.isfinite(self._params).all():
             raise ParameterError(f"a robot arm's map has {_SIZE} finite numbers, got {numbers}")
         if not (scale > 0.0 and 0.0 < reach[0] < reach[1] and 0.0 < turn[0] < turn[1] < np.pi):
             raise ParameterError(
                 f"scale {scale}, reach {reach} m, turn {turn} rad; expected positive numbers, intervals that increase"
             )
-        self._check_domain(np.asarray(limits, dtype=float), evaluate or self._evaluated)
+        self._check_domain(np.asarray(limits, dtype=float), evaluate)
 
     @property
     def nq(self) -> int:
@@ -219,36 +218,18 @@ class RobotArm(HapticMap):
         """Numbers of a tangent: seven."""
         return JOINTS
 
-    @cached_property
-    def _compiled(self) -> CompiledMap:
-        return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
-
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel; it has no memory."""
-        return self._compiled
+        return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
 
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Joint angles h(x) [rad], shape (7,), of a stylus pose (7,)."""
-        pose = np.empty(JOINTS)
-        robot_arm_map(self._params, _stylus(x), np.zeros(0), pose, np.empty((0, STYLUS_TANGENT)))
-        return pose
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative h_*(x), shape (7, 6): columns linear, then angular velocity in H."""
-        jacobian = np.empty((JOINTS, STYLUS_TANGENT))
-        robot_arm_map(self._params, _stylus(x), np.zeros(0), np.empty(JOINTS), jacobian)
-        return jacobian
-
-    def _evaluated(self, compiled: CompiledMap, points: Array) -> Array:
-        return np.array([self.pose(x) for x in points])
-
-    def _check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array]) -> None:
+    def _check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None) -> None:
         """Raise unless the arm works at the centre and the edge of the domain, on a grid of directions and turns."""
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
         edge = [(place, turn) for place in _FAR * directions for turn in _NEARLY_BACK * directions]
         points = np.array([np.concatenate([place, exponential.py_func(*turn)]) for place, turn in edge])
-        for (place, turn), q in zip(edge, evaluate(self.compiled(), points), strict=True):
+        poses = [self.pose(x) for x in points] if evaluate is None else evaluate(self.compiled(), points)
+        for (place, turn), q in zip(edge, poses, strict=True):
             straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
             if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
                 raise ParameterError(
@@ -257,10 +238,3 @@ class RobotArm(HapticMap):
                     f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
                     f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
                 )
-
-
-def _stylus(x: Array) -> Array:
-    stylus = np.asarray(x, dtype=np.float64)
-    if stylus.shape != (STYLUS,):
-        raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
-    return stylus

@@ -27,6 +27,7 @@ from controllers.easing import smooth_steps
 from controllers.legs.limb_ends import SHARP, contact_moves, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.sole_heights import STANDS, SWINGS
+from controllers.motion.channels import continuous
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
@@ -76,10 +77,7 @@ def _mean_rotations(quaternions: Array, weights: Array) -> Array:
     """Chordal means (n, k, 4) of rotations (n, m, 4) with weights (k, m); signs continuous along n."""
     n, m, _ = quaternions.shape
     squares = (quaternions[..., :, None] * quaternions[..., None, :]).reshape(n, m, 16)
-    mean = np.linalg.eigh((weights @ squares).reshape(n, -1, 4, 4))[1][..., -1]
-    dots = np.einsum("nkx,nkx->nk", mean[:-1], mean[1:])
-    mean[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[..., None]
-    return mean
+    return continuous(np.linalg.eigh((weights @ squares).reshape(n, -1, 4, 4))[1][..., -1])
 
 
 def gap(slips: Array, hold: Array, turn: Array) -> Array:
@@ -159,7 +157,7 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
         over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
-        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, SHARP))
+        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
 

@@ -19,6 +19,7 @@ from scipy.ndimage import convolve1d, minimum_filter1d
 from controllers.curves.splines import round_lap
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import extension, shortfall
+from controllers.motion.channels import signed_like
 from controllers.state import Array, Mask
 
 # σ₋, σ₊: their excess over 1 gives a double support of a tenth of the flight. Divided 0.6 to 0.4 instead of equally, a
@@ -73,7 +74,7 @@ def grounded(
         for joint in joints:
             result[:, joint] /= np.linalg.norm(result[:, joint], axis=1, keepdims=True)
             # The same sign as in the clip, so that both forms can be blended.
-            result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
+            result[:, joint] = signed_like(result[:, joint], rows[:, joint])
         result[:, first + END * j + 3] += (warp - np.arange(n)) / n
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
     short = np.zeros(n)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.limbs import END, Limb
+from controllers.motion.channels import continuous
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
@@ -33,9 +34,7 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
         turn = turn * _rotations(channels, joint)
     place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
-    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
-    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
-    return place.reshape(n, m, 3), quaternions
+    return place.reshape(n, m, 3), continuous(quaternions)
 
 
 def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
@@ -45,7 +44,7 @@ def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
     return (-softness * np.log(np.exp(-heights / softness).sum(axis=0))).reshape(quaternions.shape[:-1])
 
 
-def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
+def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb) -> Array:
     """Slip of an end over the ground from each sample to the next, at the touching points, so that a foot may roll.
 
     Parameters
@@ -57,19 +56,17 @@ def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb
     headings : Array, shape (n, k)
         Their headings [rad], continuous along n.
     limb : Limb
-    softness : float
-        Softness of the minimum that decides which points touch [m].
 
     Returns
     -------
     Array, shape (n - 1, k, 3)
-        Displacement (x, y) of the points, weighted towards the lowest, without the part due to the turn about the
-        vertical, [m]; and that turn [rad].
+        Displacement (x, y) of the points, weighted towards the lowest (`SHARP`), without the part due to the turn about
+        the vertical, [m]; and that turn [rad].
     """
     turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
     offsets = limb.points - limb.points.mean(axis=0)
     levers = np.stack([turn.apply(p).reshape(*headings.shape, 3) for p in offsets], axis=-2)
-    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / softness)
+    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / SHARP)
     weights /= weights.sum(axis=-1, keepdims=True)
     share, lever = 0.5 * (weights[1:] + weights[:-1])[..., None], 0.5 * (levers[1:] + levers[:-1])
     turning = np.diff(headings, axis=0)
@@ -144,7 +141,7 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     return yawed(-angle, quaternions), np.concatenate([place, lags], axis=2)
 
 
-def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
+def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array | None = None) -> Array:
     """Channels with limbs given by their ends.
 
     Parameters
@@ -154,6 +151,8 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
     drifts : Array, shape (m, 3)
         Drifts ξ of the loops.
     limbs : sequence of Limb
+    weights : Array, shape (m,), optional
+        Of the loops in λ (`end_lag`).
 
     Returns
     -------
@@ -168,7 +167,8 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
     """
     result, ends = channels.copy(), list[Array]()
     for limb in limbs:
-        quaternions, end = end_channels(channels, drifts, limb, end_lag(end_poses(channels, limb)[0], drifts))
+        lag = end_lag(end_poses(channels, limb)[0], drifts, weights)
+        quaternions, end = end_channels(channels, drifts, limb, lag)
         column = 3 + 4 * limb.joints[2]
         result[..., column : column + 4] = quaternions
         ends.append(end)

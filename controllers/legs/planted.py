@@ -29,6 +29,7 @@ from controllers.legs.grounded import runs
 from controllers.legs.limb_ends import SHARP, contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import reached, shortfall
+from controllers.motion.channels import signed_like
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array, Mask
 
@@ -110,7 +111,7 @@ def planted_ends(
     for kept in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
         over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
-        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, SHARP)[:, 0]
+        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb)[:, 0]
         ahead = kept * gap(stays[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
@@ -139,9 +140,8 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     down = slope * _FLAT**2 / (slope**2 + _FLAT**2)
     rolls, lays = ((-share * lies * angle)[:, None] * axis for angle, axis in ((tilt, length), (down, across)))
-    levelled = (Rotation.from_rotvec(lays) * Rotation.from_rotvec(rolls) * turn).as_quat(scalar_first=True)
-    same = np.sum(levelled * quaternions, axis=1, keepdims=True) >= 0.0
-    return np.where(same, levelled, -levelled)
+    levelled = Rotation.from_rotvec(lays) * Rotation.from_rotvec(rolls) * turn
+    return signed_like(levelled.as_quat(scalar_first=True), quaternions)
 
 
 def levels(heights: Array, stands: Mask) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.legs.limbs import END, Limb
+from controllers.motion.channels import signed_like
 from controllers.state import Array
 
 # Largest extension of a limb over its length: straighter, a led knee stops with 2500 rad/s², beyond its motor. Knees
@@ -71,9 +72,7 @@ def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
         reach = upper.apply(a + middle.apply(b))
         upper = _shortest(reach, line) * upper
         for column, turned in zip(columns, (upper, middle), strict=True):
-            quaternions = turned.as_quat(scalar_first=True)
-            same = np.sum(quaternions * rows[:, column], axis=1, keepdims=True) >= 0.0
-            result[:, column] = np.where(same, quaternions, -quaternions)
+            result[:, column] = signed_like(turned.as_quat(scalar_first=True), rows[:, column])
     return result
 
 

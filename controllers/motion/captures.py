@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.errors import ParameterError
+from controllers.motion.channels import closing_signs, normalise
 from controllers.state import Array
 
 
@@ -50,21 +51,6 @@ class Capture:
             )
 
 
-def lap_signs(rows: Array, quaternions: int) -> Array:
-    """−1 for the channels of a quaternion that returns with the opposite sign after a lap, 1 for all others.
-
-    Parameters
-    ----------
-    rows : Array, shape (n, 3 + 4 quaternions + …)
-        Channels at equal steps of the lap: position, quaternions, others.
-    quaternions : int
-    """
-    signs = np.ones(rows.shape[1])
-    for first in range(3, 3 + 4 * quaternions, 4):
-        signs[first : first + 4] = 1.0 if rows[-1, first : first + 4] @ rows[0, first : first + 4] >= 0.0 else -1.0
-    return signs
-
-
 def low_passed(channels: Array, duration: float, cutoff: float) -> Array:
     """Low-passed channels of a lap (n, 3 + 4 k): position and k quaternions.
 
@@ -77,13 +63,12 @@ def low_passed(channels: Array, duration: float, cutoff: float) -> Array:
     cutoff : float
         f_c [Hz], at which amplitudes are halved.
     """
-    n, numbers = channels.shape
-    signs = lap_signs(channels, (numbers - 3) // 4)
+    n, count = len(channels), (channels.shape[1] - 3) // 4
+    signs = closing_signs(channels, count)
     # Over two laps, since a quaternion may return with the opposite sign.
     spectrum = np.fft.rfft(np.concatenate([channels, signs * channels]), axis=0)
     frequency = np.arange(len(spectrum)) / (2.0 * duration)
     spectrum /= (1.0 + (frequency / cutoff) ** 4)[:, None]
     result = np.fft.irfft(spectrum, 2 * n, axis=0)[:n]
-    rotations = result[:, 3:].reshape(n, -1, 4)
-    rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
+    normalise(result, count)
     return result

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
+from controllers.motion.channels import continuous, normalise
 from controllers.state import Array
 
 _STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # [m], [rad] a lap that ends this near to its start has no drift
@@ -105,8 +106,6 @@ class Loop:
         ξ = (v_x, v_y [m], ω [rad]) per lap.
     duration : float
         Duration of a lap [s].
-    gap : float
-        Largest angle [rad] of a joint between the clip's ends, before they were closed.
     splines : list of CubicSpline
         ρ's position, then root and joint rotations in R⁴, each of period 1, or 2 if q returns as −q.
     share : float
@@ -115,7 +114,6 @@ class Loop:
 
     drift: Array
     duration: float
-    gap: float
     splines: list[CubicSpline]
     share: float = 1.0
 
@@ -147,9 +145,7 @@ def checked_clip(poses: Array, fps: float, name: str) -> Array:
             raise ParameterError(
                 f"{name}: quaternion at number {first} of frame {int(np.abs(norms - 1).argmax())} is not unit"
             )
-        dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
-        signs = np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
-        array[:, first : first + 4] = quaternions / norms * signs[:, None]
+        array[:, first : first + 4] = continuous(quaternions / norms)
     return array
 
 
@@ -222,9 +218,7 @@ def there_and_back(poses: Array, fps: float) -> Array:
     own = np.where(times < 2.0 * brakes, times**2 / (4.0 * brakes), times - brakes)
     own = np.where(rest < 2.0 * brakes, seconds - rest**2 / (4.0 * brakes), own)
     slow = CubicSpline(np.arange(len(poses)) / fps, poses)(np.clip(own, 0.0, seconds))
-    turns = slow[:, 3:].reshape(len(slow), -1, 4)
-    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
-    slow[:, 3:] = turns.reshape(len(slow), -1)
+    normalise(slow, (slow.shape[1] - 3) // 4)
     return np.concatenate([slow, slow[-2::-1]])
 
 
@@ -244,15 +238,10 @@ def forward_loop(poses: Array, fps: float) -> Loop:
     drift = drift_of(placed)
     rest = remainder(placed, s, drift)
     splines: list[CubicSpline] = []
-    gap = 0.0
     for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:
         values = rest[:, first:stop]
-        sign = 1.0
-        if first:
-            dot = float(values[-1] @ values[0])
-            sign = 1.0 if dot >= 0.0 else -1.0
-            gap = max(gap, 2.0 * float(np.arccos(min(1.0, abs(dot)))))
+        sign = -1.0 if first and values[-1] @ values[0] < 0.0 else 1.0
         if np.abs(values[-1] - sign * values[0]).max() > 1e-6:
             values = _closed(s, values, sign)
         splines.append(_periodic_spline(s, values, sign))
-    return Loop(drift, (len(poses) - 1) / fps, gap, splines)
+    return Loop(drift, (len(poses) - 1) / fps, splines)

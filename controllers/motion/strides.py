@@ -25,6 +25,7 @@ _SAMPLES = 128
 _MOST = 12  # largest number of repeats searched in a clip
 _SAME = 1e-3  # [m], or components of rotations: largest difference between repeats
 _FASTER = 3.0  # cost of playing faster relative to slower
+_SHORTEST, _LONGEST = 3.0, 6.0  # [s] of a natural lap, unless a loop lasts longer
 _FURTHEST = 0.3  # [m] a lap that travels less is not a gait
 
 
@@ -84,17 +85,17 @@ def _times(durations: Array, lap: float) -> int:
     return int(ways[np.maximum(-faster, _FASTER * faster).max(axis=1).argmin()])
 
 
-def natural_lap(loops: Sequence[Loop], shortest: float = 3.0, longest: float = 6.0) -> float:
+def natural_lap(loops: Sequence[Loop]) -> float:
     """Duration of a lap [s] in which the first loop plays at its own pace, and the others `in_step` as nearly.
 
-    Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from the
-    shortest to the longest duration, or that of the longest loop; of all within 2 % of the best, the shortest is taken.
+    Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from 3 to 6 s or
+    the duration of the longest loop; of all within 2 % of the best, the shortest is taken.
     A lap of several short cycles gives the hand more time to change the blend.
     """
     first = loops[0]
     stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
-    least = int(np.ceil(shortest / stride - _SAME))
-    most = int(max(longest, *(loop.duration for loop in loops)) / stride + _SAME)
+    least = int(np.ceil(_SHORTEST / stride - _SAME))
+    most = int(max(_LONGEST, *(loop.duration for loop in loops)) / stride + _SAME)
     laps = stride * np.arange(least, max(least, most) + 1)
     worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in in_step(loops, float(lap))) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

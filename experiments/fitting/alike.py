@@ -18,7 +18,7 @@ from experiments.files.kept import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 SKATES = 0.02
 """Largest foot skate of a blend, 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
@@ -101,12 +101,10 @@ def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: fl
     rows = max(64, round(_FPS * lap))
     # The last pose repeats the first, as in a closed clip: without it the motion would be taken for one that stops.
     angles, r = 2.0 * np.pi * np.arange(rows + 1) / rows, r_low + place[0] * (r_high - r_low)
-    stylus, poses = np.zeros((rows + 1, 7)), np.empty((rows + 1, made.nq))
+    stylus = np.zeros((rows + 1, 7))
     stylus[:, 0], stylus[:, 1] = r * np.cos(angles), r * np.sin(angles)
     stylus[:, 2], stylus[:, 3] = z_low + place[1] * (z_high - z_low), 1.0
-    kind, params, memory = made.compiled()
-    poses_along(kind, params, memory.copy(), stylus, poses)
-    return motion_of(poses, rows / lap)
+    return motion_of(map_poses(made, stylus), rows / lap)
 
 
 def arms(legs: Sequence[Limb]) -> list[int]:

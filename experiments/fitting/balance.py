@@ -22,7 +22,7 @@ from experiments.files.kept import kept_array
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.compilation.sources import kept_folder
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 _ROWS = 96  # samples of a lap
 _ROUNDS = 3
@@ -129,11 +129,8 @@ def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
 
 
 def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
-    kind, params, memory = haptic_map.compiled()
-    angles = 2.0 * np.pi * np.arange(-1, _ROWS + 1) / _ROWS
-    poses = np.empty((len(haptic_map.mixtures), len(angles), haptic_map.nq))
-    for node, places in enumerate(haptic_map.places(angles)):
-        poses_along(kind, params, memory.copy(), places, poses[node])
+    places = haptic_map.places(2.0 * np.pi * np.arange(-1, _ROWS + 1) / _ROWS)
+    poses = np.stack([map_poses(haptic_map, stylus) for stylus in places])
     return measured_laps(poses, lap / _ROWS, figure)
 
 

@@ -25,7 +25,7 @@ from experiments.fitting.verdict import BEARABLE, FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
 WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is taken at once
@@ -63,11 +63,9 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
     angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
-    stylus, poses = np.zeros((len(times), 7)), np.empty((len(times), made.nq))
+    stylus = np.zeros((len(times), 7))
     stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
-    kind, params, memory = made.compiled()
-    poses_along(kind, params, memory.copy(), stylus, poses)
-    return Clip(poses, FPS, "blend")
+    return Clip(map_poses(made, stylus), FPS, "blend")
 
 
 def push_profile(times: Array) -> Array:

@@ -7,7 +7,7 @@ from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
 from experiments.fitting.balance import SHARE, measured_laps, nearest_supported, sway_of
 from sim.body.figure import FigureGains
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 # A foot that is planned to bear load but is not held in place twists on the spot. A led figure may stop anywhere, so
 # its contact points are unloaded at half the height (reference_reach) at which they are released (stance_height).
@@ -34,11 +34,8 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
     walker = np.zeros((_ROWS + 2, 7))
     walker[:, 0] = led.stride * (np.arange(-1, _ROWS + 1) / _ROWS - led.phase)
     walker[:, 1] = walker[:, 3] = 1.0
-    poses = np.empty((1, _ROWS + 2, led.nq))
     for _ in range(_ROUNDS):
-        compiled = result.compiled()
-        poses_along(compiled.kind, compiled.params, compiled.memory, walker, poses[0])
-        laps = measured_laps(poses, seconds / _ROWS, figure)
+        laps = measured_laps(map_poses(result, walker)[None], seconds / _ROWS, figure)
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, SHARE) - laps.zmp)
         # The flights have the clip's own mean root position: a constant offset would have to be undone and throw the
         # figure.

@@ -18,7 +18,7 @@ from controllers.state import Array
 from experiments.fitting.carried import EVERY, SHARES, WELL, is_sound, push_profile
 from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 _PUSHED = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
 
@@ -33,11 +33,9 @@ def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     pushed = _PUSHED * push_profile(np.maximum(times - EVERY, 0.0))
     since = times if keeps_pace else _slowed(curve, pushed)
     phases = since % curve.duration if curve.periodic else np.minimum(since, curve.duration)
-    points, poses = curve.point(curve.start + phases), np.empty((len(times), made.nq))
+    points = curve.point(curve.start + phases)
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
-    kind, params, memory = made.compiled()
-    poses_along(kind, params, memory.copy(), stylus_path(points), poses)
-    return Clip(poses, FPS, "pushed")
+    return Clip(map_poses(made, stylus_path(points)), FPS, "pushed")
 
 
 def _slowed(curve: Trajectory, pushed: Array) -> Array:

@@ -9,7 +9,7 @@ from controllers.haptic_map.river_clips import RIVER, RiverClips
 from controllers.legs.sole_heights import STANDS
 from experiments.fitting.balance import nearest_supported
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 _ROWS = 96  # samples of a lap
 _SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
@@ -30,15 +30,13 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         Model of the figure alone.
     """
     data, feet = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    kind, params, memory = clips.compiled()
-    poses, centre, contacts = np.empty((_ROWS, clips.nq)), np.empty((_ROWS, 2)), np.empty((_ROWS, len(feet), 3))
+    centre, contacts = np.empty((_ROWS, 2)), np.empty((_ROWS, len(feet), 3))
     rests: list[npt.NDArray[np.float64]] = []
     for river, curve in enumerate(clips.curves):
         phases = curve.start + curve.duration * np.arange(_ROWS) / _ROWS
-        lap = memory.copy()
+        lap = clips.compiled().memory
         lap[RIVER] = river
-        poses_along(kind, params, lap, stylus_path(curve.point(phases)), poses)
-        for i, pose in enumerate(poses):
+        for i, pose in enumerate(map_poses(clips, stylus_path(curve.point(phases)), lap)):
             data.qpos[:] = pose
             mujoco.mj_kinematics(figure, data)
             mujoco.mj_comPos(figure, data)

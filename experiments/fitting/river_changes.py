@@ -26,7 +26,7 @@ from models.mocap.preparation.feasible import Feasible, contact_residual, feasib
 from models.mocap.preparation.stances import Stances, stances
 from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
-from sim.reference.reference import make_reference, poses_along, reference_along
+from sim.reference.reference import make_reference, map_poses, reference_along
 
 _LEAD, _TAIL = 0.7, 0.9  # [s] before and after a change that belong to it and are optimised
 _SETTLES, _BANDWIDTH = 1.0, 40.0  # [s] settling time and [Hz] cut-off of the stylus filter, high enough not to show
@@ -148,12 +148,9 @@ def _strides(made: RiverClips, first: int, second: int) -> int:
 
 def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
     """Poses of a river's clip at phases [s] after the start of the lap, beginning with a given memory of the map."""
-    kind, params, fresh = made.compiled()
-    memory = fresh.copy() if memory is None else memory.copy()
-    memory[RIVER] = river
-    curve, poses = made.curves[river], np.empty((len(phases), made.nq))
-    poses_along(kind, params, memory, stylus_path(curve.point(curve.start + phases % curve.duration)), poses)
-    return poses
+    curve, own = made.curves[river], made.compiled().memory if memory is None else memory.copy()
+    own[RIVER] = river
+    return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), own)
 
 
 def _passage(

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from controllers.blending.pair_corrections import neighbouring_pairs
 from controllers.haptic_map.animation import ClipMap
 from controllers.state import Array
 from experiments.lifting.in_betweens import MotionMeasure, measure_motion
@@ -70,6 +71,10 @@ class Layout:
     sites: Array
     times: Array
 
+    def neighbours(self) -> list[tuple[int, int]]:
+        """Pairs of clips with no other between them over half of the lap."""
+        return neighbouring_pairs(self.sites, 0.5)
+
 
 class MapQuality(NamedTuple):
     """Measures of a map of clips.
@@ -98,25 +103,10 @@ class MapQuality(NamedTuple):
     clips: MotionMeasure
 
 
-def neighbours(sites: Array) -> list[tuple[int, int]]:
-    """Pairs of clips whose midpoint is nearer to them than to others over half of the lap (Gabriel & Sokal 1969)."""
-    n = sites.shape[1]
-    found: list[tuple[int, int]] = []
-    for j in range(n):
-        for i in range(j):
-            middle = 0.5 * (sites[:, i] + sites[:, j])
-            half = 0.5 * np.linalg.norm(sites[:, i] - sites[:, j], axis=1)
-            others = [k for k in range(n) if k not in (i, j)]
-            clear = [np.linalg.norm(sites[:, k] - middle, axis=1) > half + 1e-9 for k in others]
-            if np.mean(np.all(clear, axis=0) if clear else np.ones(len(sites))) >= 0.5:
-                found.append((i, j))
-    return found
-
-
 def measure_map(layout: Layout, clips: tuple[Clip, ...], rng: np.random.Generator) -> MapQuality:
     """Measure a map on the default figure."""
     scale = np.concatenate([np.ones(3), np.repeat(body_weights(), 3)])[:, None]
-    pairs, sites, n = neighbours(layout.sites), layout.sites, len(layout.names)
+    pairs, sites, n = layout.neighbours(), layout.sites, len(layout.names)
     distance = [np.linalg.norm(sites[:, i] - sites[:, j], axis=1).min() for i, j in combinations(range(n), 2)]
     angles = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     along = [_condition(layout, scale, angles, sites[:, i]) for i in range(n)]

@@ -16,7 +16,6 @@ from controllers.errors import ParameterError
 from controllers.state import Array
 from experiments.results.folder import RECORDING
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -134,11 +133,6 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
         edge = np.minimum(times[rows] - start, end - times[rows]) / ease
         poses[rows] = between(poses[rows], theirs, smooth_steps(edge))
     return poses
-
-
-def mixed_clip(take: TakeData, regions: Sequence[Region], name: str) -> Clip:
-    """The poses of `mixed` as a clip."""
-    return Clip(mixed(take, regions), FPS, name)
 
 
 def between(start: Array, end: Array, share: Array) -> Array:

@@ -14,8 +14,9 @@ from controllers.state import Array
 from experiments.live.clock_panel import Acts
 from experiments.live.desk import Desk
 from experiments.live.run_panel import configuration_text
-from experiments.live.take_mix import FPS, Region, TakeData, mixed, mixed_clip
+from experiments.live.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
+from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.viewer.take_ghosts import COLORS, TakeGhosts
 
@@ -147,7 +148,7 @@ class TakesPanel:
         self._said.content = f'<p style="margin:.3rem .75rem;font-size:.8rem">{"; ".join(said) or "no regions"}</p>'
 
     def _on_export(self, event: Any) -> None:
-        clip = mixed_clip(TakeData.of(self._folder(self._list)), self._regions, "mix")
+        clip = Clip(mixed(TakeData.of(self._folder(self._list)), self._regions), FPS, "mix")
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "mix.bvh"
             write_bvh(clip, file)

@@ -10,26 +10,27 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGM
 from models.mocap.motion.clip import Clip
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
+_PICTURES = 14
 _APART = 1.0  # distance between two pictures [m]
 
 
-def filmstrip(clips: dict[str, Clip], pictures: int = 14) -> Figure:
+def filmstrip(clips: dict[str, Clip]) -> Figure:
     """A row for every clip, seen from the side of its direction of travel, or along y if it stays in place."""
-    figure = Figure(figsize=(0.9 * pictures, 1.9 * len(clips)), layout="constrained")
+    figure = Figure(figsize=(0.9 * _PICTURES, 1.9 * len(clips)), layout="constrained")
     for axes, (title, clip) in zip(np.atleast_1d(figure.subplots(len(clips), 1)), clips.items(), strict=True):
-        _row(axes, clip, pictures)
+        _row(axes, clip)
         axes.set_title(title, loc="left", fontsize=9)
     return figure
 
 
-def _row(axes: Axes, clip: Clip, pictures: int) -> None:
+def _row(axes: Axes, clip: Clip) -> None:
     model = figure_model()
     data = mujoco.MjData(model)
     spheres = [int(model.geom(name).id) for name in FOOT_CONTACTS]
     there = clip.poses[-1, :2] - clip.poses[0, :2]
     yaw = float(np.arctan2(there[1], there[0])) if np.linalg.norm(there) > 0.5 else 0.0
     view = np.array([[np.cos(yaw), 0.0], [np.sin(yaw), 0.0], [0.0, 1.0]])
-    for k, frame in enumerate(np.linspace(0, clip.n_frames - 1, pictures).astype(int)):
+    for k, frame in enumerate(np.linspace(0, clip.n_frames - 1, _PICTURES).astype(int)):
         data.qpos = clip.poses[frame]
         mujoco.mj_kinematics(model, data)
         origin = np.append(clip.poses[frame, :2], 0.0)
@@ -52,5 +53,5 @@ def _row(axes: Axes, clip: Clip, pictures: int) -> None:
             line = seen(corners)
             axes.plot(line[:, 0], line[:, 1], color=_COLOURS[side], linewidth=1.0)
     axes.axhline(0.0, color="#999999", linewidth=0.5)
-    axes.set(aspect="equal", xlim=(-0.7, _APART * pictures - 0.3), ylim=(-0.2, 2.1))
+    axes.set(aspect="equal", xlim=(-0.7, _APART * _PICTURES - 0.3), ylim=(-0.2, 2.1))
     axes.axis("off")

@@ -6,6 +6,7 @@ from controllers.state import Array
 
 CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
 RATE = 100.0  # [Hz] at which the speed is sampled
+_HIGHEST, _THRESHOLD, _PADDING = 10.0, 0.05, 4  # [Hz], share of the largest value, powers of two
 _SETTLED = 2.0  # periods of the cutoff after which the filter's response to an end has decayed, to some 1e-4
 
 
@@ -25,17 +26,15 @@ def speed_profile(velocity: Array, rate: float) -> Array:
     return np.linalg.norm(smooth[:: max(1, round(rate / RATE))], axis=1)
 
 
-def spectral_arc_length(
-    speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4
-) -> float:
+def spectral_arc_length(speed: Array, rate: float) -> float:
     r"""SPARC: minus the arc length of the normalised spectrum of the speed; 0 is smoothest.
 
     .. math:: -\int_0^{\omega_c} \sqrt{\omega_c^{-2} + \hat V'(\omega)^2}\, d\omega,
         \qquad \hat V(\omega) = V(\omega)/\max V
 
-    up to the last frequency ω_c below `cutoff` at which V̂ reaches `threshold`. S. Balasubramanian, A.
-    Melendez-Calderon, A. Roby-Brami, E. Burdet, "On the analysis of movement smoothness", *J. NeuroEngineering and
-    Rehabilitation* 12:112, 2015, whose cutoff, threshold and padding are the defaults.
+    up to the last frequency ω_c below 10 Hz at which V̂ reaches 0.05. S. Balasubramanian, A. Melendez-Calderon, A.
+    Roby-Brami, E. Burdet, "On the analysis of movement smoothness", *J. NeuroEngineering and Rehabilitation* 12:112,
+    2015, whose cutoff, threshold and zero padding these are.
 
     Parameters
     ----------
@@ -43,16 +42,14 @@ def spectral_arc_length(
         Speed samples, shape (n,).
     rate : float
         Sampling rate [Hz].
-    cutoff, threshold, padding
-        Highest frequency [Hz]; threshold as a share of the largest value; zero padding, in powers of two.
     """
-    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + _PADDING)
     spectrum, frequency = np.abs(np.fft.rfft(speed, size)), np.fft.rfftfreq(size, 1.0 / rate)
     if spectrum.max() <= 0.0:
         return 0.0
-    within = frequency <= cutoff
+    within = frequency <= _HIGHEST
     spectrum, frequency = spectrum[within] / spectrum.max(), frequency[within]
-    above = np.flatnonzero(spectrum >= threshold)
+    above = np.flatnonzero(spectrum >= _THRESHOLD)
     spectrum, frequency = spectrum[above[0] : above[-1] + 1], frequency[above[0] : above[-1] + 1]
     if len(frequency) < 2:
         return 0.0

@@ -10,7 +10,7 @@ from controllers.state import Array
 from controllers.walking.walker import walker_at
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.session import Session
-from sim.reference.reference import make_reference, poses_along, reference_along
+from sim.reference.reference import make_reference, map_poses, reference_along
 
 
 def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
@@ -20,14 +20,13 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
     """
     if session.parts.maps.plays_rivers:
         return _clips_of_rivers(session, stride)
-    kind, params, memory = session.haptic_map.compiled()
+    haptic_map = session.haptic_map
+    memory = haptic_map.compiled().memory
     if session.parts.walking is not None:
         memory = walker_at.py_func(session.servo.field.walkers.state, 0).path.copy()
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
-        poses = np.empty((len(nearest), session.haptic_map.nq))
-        poses_along(kind, params, memory, session.parts.argument_at(nearest, phases), poses)
-        return poses
+        return map_poses(haptic_map, session.parts.argument_at(nearest, phases), memory)
 
     return poses_at
 

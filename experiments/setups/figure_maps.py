@@ -39,13 +39,12 @@ from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
-from experiments.setups.pace import course_of
+from experiments.setups.pace import course_of, reached
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
-from sim.world.world import phantom_angles
 
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
@@ -258,19 +257,6 @@ def _place(part: AnyMap) -> Place:
     around = part.around
     curve = reached(Trajectory.circle(around.radius, around.lap, wave=around.wave))
     return Place(curve, around.radius, part.reach, part.expressive)
-
-
-def reached(curve: Trajectory) -> Trajectory:
-    """The same curve, checked to lie within the Phantom's reach.
-
-    Raises
-    ------
-    SimError
-        If the Phantom does not reach it.
-    """
-    for phase in np.linspace(curve.start, curve.end, 64):
-        phantom_angles(curve.point(phase))
-    return curve
 
 
 def _cylinder(

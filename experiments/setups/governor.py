@@ -14,7 +14,7 @@ from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts import ClipMapParts
 from models.mocap.motion.clip import Clip
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 _FPS = 120.0  # [1/s] frame rate of the animation whose flights are judged
 _FASTEST = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
@@ -32,14 +32,13 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
     river : int
         Which river of the map the curve is, if it is a map of rivers.
     """
-    (kind, params, memory), seconds = haptic_map.compiled(), haptic_map.lap_seconds
+    memory, seconds = haptic_map.compiled().memory, haptic_map.lap_seconds
     if isinstance(haptic_map, RiverClips):
         change_clip(memory, float(river), curve.start)
         seconds = haptic_map.loops[river].duration
     frames = max(64, round(_FPS * seconds)) + 1
-    points, poses = curve.point(np.linspace(curve.start, curve.end, frames)), np.empty((frames, haptic_map.nq))
-    poses_along(kind, params, memory, stylus_path(points), poses)
-    return Clip(poses, (frames - 1) / seconds, "along the curve")
+    stylus = stylus_path(curve.point(np.linspace(curve.start, curve.end, frames)))
+    return Clip(map_poses(haptic_map, stylus, memory), (frames - 1) / seconds, "along the curve")
 
 
 def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
@@ -107,6 +106,5 @@ class Governed(Law):
     field: Law
     governor: Governor
 
-    def program(self) -> Program:
-        """Compiled form of the sum."""
+    def _composed(self) -> Program:
         return self.field + self.governor

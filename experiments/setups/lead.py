@@ -39,6 +39,7 @@ from sim.users.participant import Participant
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
 PAUSE, BACK_PACE = 0.8, 0.5  # [s] of each pause; pace of the way back over the clip's own
+_PERIOD, _EASE = 0.01, 0.8  # [s] between the points of the hand's path, and of a ramp up or down of its pace
 _START = 0.025  # [m] from its place on the curve within which a hand begins
 STIFFNESS = 150.0  # of the arm [N/m]: compliant enough to be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
@@ -256,18 +257,18 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     return Leading(walking, k_l=mode.leash, b=mode.damping)
 
 
-def leading_hand(field: Leading, period: float = 0.01) -> Arm:
+def leading_hand(field: Leading) -> Arm:
     """The default hand: a pause, along the S at the gait's own pace, a pause, straight back more slowly."""
     curve = s_curve()
     seconds = field.walking.scale * curve.length / field.walking.gait.speed
     start, end = curve.point(curve.start), curve.point(curve.end)
     away = float(np.linalg.norm(end - start)) / curve.length
-    forth, back = _eased(seconds, period), _eased(seconds * away / BACK_PACE, period)
+    forth, back = _eased(seconds), _eased(seconds * away / BACK_PACE)
     path = np.concatenate([
-        np.tile(start, (round(PAUSE / period), 1)), curve.point(curve.start + curve.duration * forth),
-        np.tile(end, (round(PAUSE / period), 1)), end + back[:, None] * (start - end),
+        np.tile(start, (round(PAUSE / _PERIOD), 1)), curve.point(curve.start + curve.duration * forth),
+        np.tile(end, (round(PAUSE / _PERIOD), 1)), end + back[:, None] * (start - end),
     ])  # fmt: skip
-    return Arm(STIFFNESS, path=path, period=period)
+    return Arm(STIFFNESS, path=path, period=_PERIOD)
 
 
 def _hand(config: RunConfig, field: Leading) -> Arm | Participant:
@@ -285,8 +286,8 @@ def walker_argument(s: Array) -> Array:
     return argument
 
 
-def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
-    """Progress from 0 to 1, sampled every `period` [s], at a constant rate with ramps of `ease` [s] at both ends."""
-    t = np.arange(period, seconds + ease, period)
-    total = np.cumsum(cubic_steps(np.minimum(t, seconds + ease - t) / ease))
+def _eased(seconds: float) -> Array:
+    """Progress from 0 to 1, sampled every `_PERIOD`, at a constant rate with ramps of `_EASE` at both ends."""
+    t = np.arange(_PERIOD, seconds + _EASE, _PERIOD)
+    total = np.cumsum(cubic_steps(np.minimum(t, seconds + _EASE - t) / _EASE))
     return total / total[-1]

@@ -12,12 +12,11 @@ from experiments.config.modes import Rivers
 from experiments.setups.budget import fastest
 from experiments.setups.defaults import river_gains
 from experiments.setups.hands import NEAR
-from experiments.setups.pace import paced
+from experiments.setups.pace import paced, reached
 from experiments.setups.parts import RiverChoice
 from experiments.setups.rivers import BESIDE, river_time
 from sim.body.figure import FigureGains
 from sim.users.hand.actions import Push
-from sim.world.world import phantom_angles
 
 _SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
 _SECONDS = 0.6  # [s] duration of a push from one curve to another
@@ -59,10 +58,7 @@ def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
     SimError
         If the Phantom does not reach it.
     """
-    found = haptic_map.curve(curve_number(haptic_map, curve))
-    for phase in np.linspace(found.start, found.end, 64):
-        phantom_angles(found.point(phase))
-    return found
+    return reached(haptic_map.curve(curve_number(haptic_map, curve)))
 
 
 def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:

@@ -31,10 +31,9 @@ def friction_along(curve: Trajectory, phases: Array) -> Array:
     """
     coulomb, viscous = np.array(PREMIUM_1_5.coulomb_friction), np.array(PREMIUM_1_5.viscous_friction)
     force = np.zeros(len(phases))
-    for k, (p, v) in enumerate(zip(curve.point(phases), curve.velocity(phases), strict=True)):
+    for k, (rates, v) in enumerate(zip(_rates(curve, phases), curve.velocity(phases), strict=True)):
         speed = float(np.linalg.norm(v))
         if speed > 0.0:
-            rates = np.linalg.solve(jacobian.py_func(phantom_angles(p)), vector_to_device_frame.py_func(tuple(v)))
             force[k] = float(np.abs(rates) @ coulomb + rates**2 @ viscous) / speed
     return force
 
@@ -120,6 +119,19 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     # Where the curve rests, its timing is kept.
     steps = own * np.divide(drag * speed, pulled, out=np.ones_like(own), where=pulled > 0.0)
     return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)
+
+
+def reached(curve: Trajectory) -> Trajectory:
+    """The same curve, checked to lie within the Phantom's reach.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach it.
+    """
+    for phase in np.linspace(curve.start, curve.end, 64):
+        phantom_angles(curve.point(phase))
+    return curve
 
 
 def course_of(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:

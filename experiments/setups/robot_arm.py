@@ -22,7 +22,7 @@ from sim.compilation.units import Unit
 from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
-from sim.reference.reference import check_reference, poses_along, unlinked_reference
+from sim.reference.reference import check_reference, make_reference, poses_along
 from sim.users.hand.arm import Arm
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
@@ -92,7 +92,7 @@ def wire_arm(
         plant=make_plant(world),
         device=device,
         field=unlinked_field(program, limiter, tank),
-        reference=unlinked_reference(world.arm, nothing, arm_period, config.smoothing),
+        reference=make_reference(world.arm, nothing, arm_period, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
         argument=device.hand[STYLUS_POSE],
@@ -101,5 +101,5 @@ def wire_arm(
     ready(run_units(servo, program))
     compiled = robot_arm_map().compiled()
     world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
-    reference = unlinked_reference(world.arm, compiled, arm_period, config.smoothing)
+    reference = make_reference(world.arm, compiled, arm_period, config.smoothing)
     return servo._replace(reference=reference).linked(program), world, curve

@@ -35,6 +35,7 @@ from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.spans import spans
 from sim.users.hand.actions import Grab
 
 # [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
@@ -136,8 +137,7 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
     over: list[str] = []
     for clip in clips:
         air = ~contacts(clip).supported
-        longest = max((len(run) for run in "".join("x" if flies else " " for flies in air).split()), default=0)
-        if longest <= BLINK * clip.fps:
+        if max((end - start for start, end in spans(air)), default=0) <= BLINK * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.

@@ -38,9 +38,9 @@ from sim.reference.reference import (
     along_unit,
     begin_in_motion,
     check_reference,
+    make_reference,
     no_reference,
     poses_along,
-    unlinked_reference,
 )
 from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
@@ -185,7 +185,7 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
 def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
     figure, period = parts.config.figure, parts.config.clock.servo_period * parts.config.figure.figure_ticks
     legs = packed_legs(world.figure)
-    return unlinked_reference(
+    return make_reference(
         world.figure, compiled, period, figure.smoothing, figure.blend, legs, parts.held_seconds
     )  # fmt: skip
 

@@ -18,11 +18,13 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import Array
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rests import with_rests
-from experiments.lifting.in_betweens import largest_slide, soles
+from experiments.results.soles import Soles
 from experiments.setups.clips import load_clips
 from experiments.setups.rivers import river_bundle
-from models.humanoid.skeleton import figure_model
+from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.motion.clip import pose_difference
+from models.mocap.preparation.poses import sole_points
+from models.world.scene import SceneConfig
 from sim.reference.reference import make_reference, reference_along
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
@@ -55,12 +57,13 @@ class Change(NamedTuple):
 
 def measured_change(poses: Array, period: float = PERIOD) -> Change:
     """Measure a change from its poses, shape (n, 75), one per period [s]."""
-    points = soles(poses)
+    heights, feet = sole_points(poses)[..., 2] - CONTACT_RADIUS, Soles(SceneConfig())
+    feet.add(poses)
     leaps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / period, axis=0))
     return Change(
-        slide=largest_slide(points),
-        height=float(points[..., 2].min(axis=1).max()),
-        depth=float(-points[..., 2].min()),
+        slide=feet.slide,
+        height=float(heights.min(axis=1).max()),
+        depth=float(-heights.min()),
         over=float(leaps[:, :2].max()),
         up=float(leaps[:, 2].max()),
         joint=float(leaps[:, 6:].max()),

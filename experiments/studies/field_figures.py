@@ -185,12 +185,12 @@ def edited_figure() -> Figure:
     return figure
 
 
-def eight(period: float = 4.0) -> Trajectory:
+def eight() -> Trajectory:
     """A river that crosses itself: a figure of eight, 0.12 m by 0.06 m."""
     angle = np.linspace(0.0, 2.0 * np.pi, 129)
     points = np.stack((0.06 * np.sin(angle), 0.03 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
     points[-1] = points[0]
-    return Trajectory(period * angle / (2.0 * np.pi), points, periodic=True)
+    return Trajectory(4.0 * angle / (2.0 * np.pi), points, periodic=True)
 
 
 def main(folder: Path) -> None:

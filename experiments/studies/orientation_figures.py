@@ -27,7 +27,7 @@ from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE
 from models.world.scene import FIGURE, world_model
 from sim.recording.recording import Recording
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 CONFIG = run_config(
     clips=("cheer",), expressive=True, user="turn", seconds=16.0, orientation_stiffness=0.05, orientation_damping=5e-4
@@ -121,11 +121,8 @@ def _figure_poses(recording: Recording) -> Array:
 def _base_poses(recording: Recording) -> Array:
     """Poses of the animation at the same positions of the stylus with the stylus upright."""
     config = config_of(recording)
-    kind, params, memory = wire(config, clips_of(recording)).haptic_map.compiled()
     points = recording.channel("ticks", "p")[:: config.figure.figure_ticks]
-    poses = np.empty((len(points), N_POSE))
-    poses_along(kind, params, memory, stylus_path(points), poses)
-    return poses
+    return map_poses(wire(config, clips_of(recording)).haptic_map, stylus_path(points))
 
 
 def main(folder: Path) -> None:

@@ -20,6 +20,7 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.hand.actions import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
+_SECONDS = 6.0  # of a run
 BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -53,10 +54,10 @@ class Meeting(NamedTuple):
     excess: Array
 
 
-def meet(walls: bool, seconds: float = 6.0) -> Meeting:
+def meet(walls: bool) -> Meeting:
     """Let a hand push outwards, towards the clip with the wrong elbow, in the second half of a lap."""
     inside = embedded("squat_dance")
-    config = run_config(seconds=seconds, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
+    config = run_config(seconds=_SECONDS, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
     session = wire(config, (inside, impossible(inside)))
     frames: list[tuple[Array, Array, Array]] = []
 
@@ -66,7 +67,7 @@ def meet(walls: bool, seconds: float = 6.0) -> Meeting:
         place = ticks.hand[: m * every : every, 1:3]
         frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess(block.reference[:m])))
 
-    Loop(session.servo, session.world, observe).run(seconds)
+    Loop(session.servo, session.world, observe).run(_SECONDS)
     return Meeting(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
 
 

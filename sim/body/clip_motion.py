@@ -80,18 +80,10 @@ def _frames(clip: Clip, end: float) -> tuple[Array, int]:
     laps = [lap]
     while sum(map(len, laps)) < wanted:
         laps.append(clip.displacement.moved(laps[-1]))
-    back = _inverse_lap(clip)
+    back = clip.displacement.inverse().moved(lap)
     margin = min(_MARGIN, len(lap))
     frames = np.concatenate((back[len(back) - margin :], *laps))
     rotations = frames[:, 3:].reshape(len(frames), -1, 4)
     flips = np.sign(np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True))
     rotations[1:] *= np.cumprod(np.where(flips == 0.0, 1.0, flips), axis=0)
     return np.concatenate((frames[:, :3], rotations.reshape(len(frames), -1)), axis=1), margin
-
-
-def _inverse_lap(clip: Clip) -> Array:
-    """The lap before the first: the lap that the clip's displacement moves onto the first."""
-    there = clip.displacement
-    c, s = np.cos(there.yaw), np.sin(there.yaw)
-    back = type(there)(-c * there.x - s * there.y, s * there.x - c * there.y, -there.yaw)
-    return back.moved(clip.poses[:-1])

@@ -43,6 +43,89 @@ def _difference(a: Array, b: Array, out: Array) -> None:
 
 
 @njit
+def _move_chain(
+    bodies: IntArray, xpos: Array, xmat: Array, v: Array, omega: Array, drift: Array, turning: Array
+) -> None:
+    """Angular velocities of root, thigh, shank and foot, and their accelerations due to velocities alone.
+
+    Written, each of shape (4, 3): ω, and the linear and the angular acceleration. Other arguments as in
+    `stance_response`.
+    """
+    relative, arm, spin = work_array(3), work_array(3), work_array(3)
+    omega[:], drift[:], turning[:] = 0.0, 0.0, 0.0
+    for level in range(4):
+        body = 0 if level == 0 else bodies[level - 1]
+        for i in range(3):
+            relative[i] = 0.0
+            for k in range(3):
+                relative[i] += xmat[body, 3 * i + k] * v[3 + 3 * body + k]
+        if level > 0:
+            above = 0 if level == 1 else bodies[level - 2]
+            omega[level] = omega[level - 1]
+            turning[level] = turning[level - 1]
+            cross_add(omega[level - 1], relative, turning[level])
+            _difference(xpos[body], xpos[above], arm)
+            drift[level] = drift[level - 1]
+            cross_add(turning[level - 1], arm, drift[level])
+            spin[:] = 0.0
+            cross_add(omega[level - 1], arm, spin)
+            cross_add(omega[level - 1], spin, drift[level])
+        for i in range(3):
+            omega[level, i] += relative[i]
+
+
+@njit
+def _differentiate_point(bodies: IntArray, point: Array, xpos: Array, xmat: Array, J: Array, J_root: Array) -> None:
+    """Jacobians of a point of the foot, written: by the leg's degrees of freedom (3, 9) and by the root's (3, 6)."""
+    axis, arm, spin = work_array(3), work_array(3), work_array(3)
+    for level in range(4):
+        body = 0 if level == 0 else bodies[level - 1]
+        _difference(point, xpos[body], arm)
+        for k in range(3):
+            for i in range(3):
+                axis[i] = xmat[body, 3 * i + k]
+            spin[:] = 0.0
+            cross_add(axis, arm, spin)
+            if level == 0:
+                J_root[:, 3 + k] = spin
+            else:
+                J[:, 3 * (level - 1) + k] = spin
+    for i in range(3):
+        J_root[i, :3] = 0.0
+        J_root[i, i] = 1.0
+
+
+@njit
+def _resist_drift(arm: Array, omega: Array, drift: Array, turning: Array, result: Array) -> None:
+    """Minus the acceleration due to velocities alone of a point at `arm` from the foot's origin, written to `result`.
+
+    The other arguments are those of the foot in `_move_chain`.
+    """
+    spin, relative = work_array(3), work_array(3)
+    spin[:], relative[:] = 0.0, 0.0
+    cross_add(omega, arm, spin)
+    cross_add(turning, arm, relative)
+    cross_add(omega, spin, relative)
+    for i in range(3):
+        result[i] = -drift[i] - relative[i]
+
+
+@njit
+def _add_point(
+    J: Array, J_root: Array, wanted: Array, level: float, upright: float, offset: Array, response: Array, normal: Array
+) -> None:
+    """Add a point, with its weights along the floor and upwards, to the normal equations and their right sides."""
+    for k in range(N_LEG):
+        for i in range(3):
+            weight = level if i < 2 else upright
+            offset[k] += weight * J[i, k] * wanted[i]
+            for m in range(6):
+                response[k, m] -= weight * J[i, k] * J_root[i, m]
+            for m in range(k + 1):
+                normal[k, m] += weight * J[i, k] * J[i, m]
+
+
+@njit
 def stance_response(
     bodies: IntArray, points: Array, share: Array, near: Array, xpos: Array, xmat: Array, v: Array, a: Array,
     offset: Array, response: Array,
@@ -73,58 +156,15 @@ def stance_response(
     for k in range(N_LEG):
         normal[k] = 0.0
         normal[k, k] = 1.0
-    J, J_root, wanted = work_array((3, N_LEG)), work_array((3, 6)), work_array(3)
-    axis, relative, arm, spin = work_array(3), work_array(3), work_array(3), work_array(3)
-    # Of root, thigh, shank, foot: angular velocity ω, and the linear and angular acceleration due to velocities alone.
+    J, J_root, wanted, arm = work_array((3, N_LEG)), work_array((3, 6)), work_array(3), work_array(3)
     omega, drift, turning = work_array((4, 3)), work_array((4, 3)), work_array((4, 3))
-    omega[:], drift[:], turning[:] = 0.0, 0.0, 0.0
-    for level in range(4):
-        body = 0 if level == 0 else bodies[level - 1]
-        for i in range(3):
-            relative[i] = 0.0
-            for k in range(3):
-                relative[i] += xmat[body, 3 * i + k] * v[3 + 3 * body + k]
-        if level > 0:
-            above = 0 if level == 1 else bodies[level - 2]
-            omega[level] = omega[level - 1]
-            turning[level] = turning[level - 1]
-            cross_add(omega[level - 1], relative, turning[level])
-            _difference(xpos[body], xpos[above], arm)
-            drift[level] = drift[level - 1]
-            cross_add(turning[level - 1], arm, drift[level])
-            spin[:] = 0.0
-            cross_add(omega[level - 1], arm, spin)
-            cross_add(omega[level - 1], spin, drift[level])
-        for i in range(3):
-            omega[level, i] += relative[i]
+    _move_chain(bodies, xpos, xmat, v, omega, drift, turning)
     for p in range(share.shape[0]):
         if near[p] <= 0.0:
             continue
         _difference(points[p], xpos[bodies[2]], arm)
-        spin[:] = 0.0
-        cross_add(omega[3], arm, spin)
-        for i in range(3):
-            wanted[i] = -drift[3, i]
-        relative[:] = 0.0
-        cross_add(turning[3], arm, relative)
-        cross_add(omega[3], spin, relative)
-        for i in range(3):
-            wanted[i] -= relative[i]
-        for level in range(4):
-            body = 0 if level == 0 else bodies[level - 1]
-            _difference(points[p], xpos[body], arm)
-            for k in range(3):
-                for i in range(3):
-                    axis[i] = xmat[body, 3 * i + k]
-                spin[:] = 0.0
-                cross_add(axis, arm, spin)
-                if level == 0:
-                    J_root[:, 3 + k] = spin
-                else:
-                    J[:, 3 * (level - 1) + k] = spin
-        for i in range(3):
-            J_root[i, :3] = 0.0
-            J_root[i, i] = 1.0
+        _resist_drift(arm, omega[3], drift[3], turning[3], wanted)
+        _differentiate_point(bodies, points[p], xpos, xmat, J, J_root)
         for i in range(3):
             for k in range(6):
                 wanted[i] -= J_root[i, k] * (_SETTLING * v[k] + a[k])
@@ -132,14 +172,8 @@ def stance_response(
                 t = 3 + 3 * bodies[k // 3] + k % 3
                 wanted[i] -= J[i, k] * (_SETTLING * v[t] + a[t])
         wanted[2] -= (0.5 * _SETTLING) ** 2 * max(0.0, points[p, 2])
-        for k in range(N_LEG):
-            for i in range(3):
-                weight = _ADHERENCE * near[p] * (min(1.0, share[p]) if i < 2 else loaded)
-                offset[k] += weight * J[i, k] * wanted[i]
-                for m in range(6):
-                    response[k, m] -= weight * J[i, k] * J_root[i, m]
-                for m in range(k + 1):
-                    normal[k, m] += weight * J[i, k] * J[i, m]
+        adherence = _ADHERENCE * near[p]
+        _add_point(J, J_root, wanted, adherence * min(1.0, share[p]), adherence * loaded, offset, response, normal)
     factor(normal)
     substitute(normal, offset)
     for m in range(6):

@@ -7,7 +7,7 @@ import numpy as np
 from numba import typeof, types
 
 from controllers.fields.instructions import VECTOR
-from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS
@@ -21,7 +21,7 @@ from sim.compilation.units import Unit
 from sim.errors import SimError
 from sim.reference.reference_state import CompiledReference
 from sim.reference.stylus_filter import turn_rate
-from sim.reference.transition import make_transition
+from sim.reference.transition import Transition, make_transition
 from sim.reference.update import update_reference, update_river_reference
 
 _MATRIX = types.Array(types.float64, 2, "C")
@@ -47,6 +47,14 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
         Written, shape (n, 75).
     """
     _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
+
+
+def map_poses(haptic_map: HapticMap, points: Array, memory: Array | None = None) -> Array:
+    """Poses (n, nq) of a map along a path of the stylus (n, 7); a memory is updated, by default that of a new run."""
+    kind, params, fresh = haptic_map.compiled()
+    poses = np.empty((len(points), haptic_map.nq))
+    poses_along(kind, params, fresh if memory is None else memory, points, poses)
+    return poses
 
 
 def poses_unit() -> Unit:
@@ -79,9 +87,10 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
     poses : Array
         Written, shape (n, 75).
     """
+    linked = reference._replace(units=map_units([(reference.kind, reference.params)]))
     # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
     points, traces = np.ascontiguousarray(points), np.ascontiguousarray(traces)
-    _reference_along(update_unit(reference).address(), reference, points, traces, poses)
+    _reference_along(update_unit(linked).address(), linked, points, traces, poses)
 
 
 def along_unit(reference: CompiledReference) -> Unit:
@@ -135,7 +144,9 @@ def make_reference(
     limbs: Array | None = None,
     clip_seconds: float = 0.0,
 ) -> CompiledReference:
-    """The reference of a run, before its first update.
+    """The reference of a run, before its first update, without the addresses of the map's kernels.
+
+    So nothing need be compiled yet: `reference_along` and `sim.loop.servo.Servo.linked` fill them in.
 
     Parameters
     ----------
@@ -160,32 +171,12 @@ def make_reference(
     SimError
         As `check_reference`.
     """
-    reference = unlinked_reference(figure_model, compiled, period, bandwidth, blend, limbs, clip_seconds)
-    return reference._replace(units=map_units([(compiled.kind, compiled.params)]))
-
-
-def unlinked_reference(
-    figure_model: mujoco.MjModel,
-    compiled: CompiledMap,
-    period: float,
-    bandwidth: float,
-    blend: float = 0.0,
-    limbs: Array | None = None,
-    clip_seconds: float = 0.0,
-) -> CompiledReference:
-    """`make_reference` without the addresses of the map's kernels, so that nothing need be compiled yet."""
     check_reference(period, bandwidth, blend)
-    kind, params, memory = compiled
-    legs = np.zeros((0, LIMB)) if limbs is None else limbs
     nq, nv = figure_model.nq, figure_model.nv
-    return CompiledReference(
+    transition = make_transition(nq, nv, blend, np.zeros((0, LIMB)) if limbs is None else limbs)
+    return _at_rest(compiled, (nq, nv), transition)._replace(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
-        units=np.zeros(0, dtype=np.int64), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
-        trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
-        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
-        velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs),
-        clip_seconds=clip_seconds, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
-        before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+        clip_seconds=clip_seconds,
     )  # fmt: skip
 
 
@@ -195,12 +186,18 @@ NO_MAP = -1
 
 def no_reference(compiled: CompiledMap | None = None) -> CompiledReference:
     """The empty reference of a servo without a figure; `compiled` is a haptic map that its field uses, if any."""
-    kind, params, memory = compiled or CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
+    nothing = CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
+    return _at_rest(compiled or nothing, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
+
+
+def _at_rest(compiled: CompiledMap, sizes: tuple[int, int], transition: Transition) -> CompiledReference:
+    """State of a reference before its first update, of a body with poses of nq and tangents of nv numbers."""
+    (kind, params, memory), (nq, nv) = compiled, sizes
     return CompiledReference(
         figure_model=0, smoothing=0.0, period=1.0, units=np.zeros(0, dtype=np.int64), kind=kind, params=params,
         memory=memory, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
-        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(0),
-        velocity=np.zeros(0), acceleration=np.zeros(0), transition=make_transition(0, 0, 0.0, np.zeros((0, LIMB))),
-        clip_seconds=0.0, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
-        before=np.zeros(0), after=np.zeros(0), to_before=np.zeros(0), to_after=np.zeros(0),
+        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
+        velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=transition, clip_seconds=0.0,
+        settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq),
+        after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

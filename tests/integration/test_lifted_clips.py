@@ -16,7 +16,7 @@ from models.mocap.library import embedded, embedded_names, load_clip
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.own_bvh import write_bvh
 from models.world.scene import SceneConfig
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 from sim.world.world import World
 
 TURN = 2.0 * np.pi
@@ -43,13 +43,11 @@ def lifted(clips):
 
 def worst_at_frames(h_map):
     """Largest difference [m, rad] between h along the curves and the clips, at all frames."""
-    kind, params, _ = h_map.compiled()
     worst = 0.0
     for i, (poses, fps) in enumerate(h_map.clips):
         points = h_map.curve(i).point(np.arange(len(poses)) / fps)
         stylus = np.hstack([points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))])
-        shown = np.empty_like(poses)
-        poses_along(kind, params, h_map.compiled().memory, stylus, shown)
+        shown = map_poses(h_map, stylus)
         worst = max(worst, float(np.abs(pose_difference(h_map.placed(i), shown)).max()))
         # Moved over the ground as a whole, and not changed otherwise.
         joints = pose_difference(poses, h_map.placed(i))

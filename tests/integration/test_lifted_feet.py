@@ -9,7 +9,7 @@ from controllers.motion.lap import MEMORY
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.in_betweens import measure_motion
 from experiments.lifting.lift import lift_clips
-from experiments.lifting.map_quality import in_between, neighbours
+from experiments.lifting.map_quality import in_between
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
@@ -52,7 +52,7 @@ def test_feet_stand_though_the_mixture_changes():
 @pytest.mark.parametrize("names", [("walk", "run", "jump", "backflip"), tuple(embedded_names())], ids=["four", "all"])
 def test_in_betweens_of_lifted_neighbours_do_not_slide_nor_sink(names):
     layout = lift_clips(names, Room()).layout()
-    for i, j in neighbours(layout.sites):
+    for i, j in layout.neighbours():
         found = measure_motion(in_between(layout, i, j))
         # Half way between a walk and a figure that turns over, which is said to be no motion, feet slide 10.6 cm: 0.4
         # to 10.6 in rooms from 20 to 45 mm; all others 1.5 cm but angry with jump, 8.2 cm from 45 mm.

@@ -113,6 +113,13 @@ class Task:
             found.append((at.first, at.second, cubic_steps(away / WINDOW)))
         return found
 
+    def hand_motion(self, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
+        """Velocity and acceleration of the hand in the directions of r, θ and z, each (3, SAMPLES, n); see `on_lap`."""
+        r, dr, dz, ddr, ddz = q[..., 0], dq[..., 0], dq[..., 1], ddq[..., 0], ddq[..., 1]
+        w, a = self.rate, self.change
+        velocity = np.stack([w * dr, w * r, w * dz])
+        return velocity, np.stack([w * w * (ddr - r) + a * dr, 2.0 * w * w * dr + a * r, w * w * ddz + a * dz])
+
 
 class _Splines(NamedTuple):
     """Value and derivatives by θ at the samples, of periodic cubic B-splines: matrices (SAMPLES, ROWS)."""
@@ -173,16 +180,13 @@ class Energy:
         stiff = _BEND / _UNIT * (1.0 + (task.rate[..., None] / _SLOW) ** 4)
         bend, g_ddq = (stiff * ddq**2).sum(), 2.0 * stiff * ddq
         slant, g_slant = self._slant(dq)
-        r, dr, dz, ddr, ddz = q[..., 0], dq[..., 0], dq[..., 1], ddq[..., 0], ddq[..., 1]
         w, a = task.rate, task.change
-        # Velocity and acceleration in the directions of r, θ and z.
-        v = np.stack([w * dr, w * r, w * dz])
-        u = np.stack([w * w * (ddr - r) + a * dr, 2.0 * w * w * dr + a * r, w * w * ddz + a * dz])
+        v, u = task.hand_motion(q, dq, ddq)
         fast, g_v = _excess(v, task.speed / _MARGIN)
         hard, g_u = _excess(u, task.acceleration / _MARGIN)
         g_dq = np.stack([w * g_v[0] + a * g_u[0] + 2.0 * w * w * g_u[1], w * g_v[2] + a * g_u[2]], axis=-1)
         g_dq = g_dq + g_slant
-        g_q = g_q + np.stack([w * g_v[1] - w * w * g_u[0] + a * g_u[1], np.zeros_like(r)], axis=-1)
+        g_q = g_q + np.stack([w * g_v[1] - w * w * g_u[0] + a * g_u[1], np.zeros_like(w)], axis=-1)
         g_ddq = g_ddq + np.stack([w * w * g_u[0], w * w * g_u[2]], axis=-1)
         gradient = np.zeros((ROWS, controls.shape[1] * 2))
         for matrix, g in zip(_SPLINES, (g_q, g_dq, g_ddq), strict=True):
@@ -224,11 +228,11 @@ def _excess(v: Array, most: float) -> tuple[float, Array]:
     return _LIMIT * float((over**2).sum()) / SAMPLES, 2.0 * _LIMIT / SAMPLES * (over / (most * size)) * v
 
 
-def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Array, Array]:
+def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
     """Control points (ROWS, n, 2) of the arrangement, and of the first initial guess.
 
     The energy is minimised (L-BFGS-B) from positions that reproduce the motions' mean distances, from a lattice, and
-    from perturbations of the first; the result of least energy that keeps the curves apart is taken. If none does, the
+    from a perturbation of the first; the result of least energy that keeps the curves apart is taken. If none does, the
     lattice is taken.
 
     Parameters
@@ -236,15 +240,13 @@ def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Arra
     task : Task
         The rectangle must have room: at least as many points on `lattice` as clips.
     rng : numpy.random.Generator
-    starts : int
-        Number of initial guesses, two or more.
     """
     n = task.distance.shape[1]
     rectangle = task.rectangle
     first = scaled(task.scale * task.distance.mean(axis=0), task.rate.mean(axis=0), rectangle)
     kept = on_lattice(first, rectangle, task.separation)
     jitter = 0.1 * (rectangle.high - rectangle.low)
-    layouts = [first, kept, *(first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter for _ in range(starts - 2))]
+    layouts = [first, kept, first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter]
     energy = Energy(task)
     bounds = list(zip(np.tile(rectangle.low, ROWS * n), np.tile(rectangle.high, ROWS * n), strict=True))
     best, least = np.tile(kept, (ROWS, 1, 1)), np.inf

@@ -74,19 +74,9 @@ def measure(task: Task, controls: Array) -> ArrangementMeasure:
     q, dq, ddq = on_lap(controls)
     n = q.shape[1]
     angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
-    r, z, rate, change = q[..., 0], q[..., 1], task.rate, task.change
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    r, z, c, s = q[..., 0], q[..., 1], np.cos(angle)[:, None], np.sin(angle)[:, None]
     points = np.stack([r * c, r * s, z], axis=-1)
-    # Velocity and acceleration in the directions of r, θ and z.
-    v = np.stack([rate * dq[..., 0], rate * r, rate * dq[..., 1]], axis=-1)
-    u = np.stack(
-        [
-            rate**2 * (ddq[..., 0] - r) + change * dq[..., 0],
-            2.0 * rate**2 * dq[..., 0] + change * r,
-            rate**2 * ddq[..., 1] + change * dq[..., 1],
-        ],
-        axis=-1,
-    )
+    v, u = (np.moveaxis(part, 0, -1) for part in task.hand_motion(q, dq, ddq))
     speed, pull = np.linalg.norm(v, axis=-1), np.linalg.norm(u, axis=-1)
     bend = np.linalg.norm(np.cross(v, u), axis=-1) / speed**3
     curves = [

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
+from controllers.motion.channels import closing_signs, normalise, signed_like
 from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
 from controllers.state import Array
 
@@ -121,9 +122,8 @@ def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array
 def closing_gap(poses: Array) -> float:
     """Largest difference of the last from the first remainder of a clip (n, nq), in a position or quaternion."""
     ends = remainder(poses, np.linspace(0.0, 1.0, len(poses)), drift_of(poses))[[0, -1]]
-    rotations = ends[:, 3:].reshape(2, -1, 4)
-    signs = np.where((rotations[0] * rotations[1]).sum(axis=1) < 0.0, -1.0, 1.0)
-    turned_back = np.abs(rotations[1] * signs[:, None] - rotations[0]).max()
+    first, last = ends[:, 3:].reshape(2, -1, 4)
+    turned_back = np.abs(signed_like(last, first) - first).max()
     return float(max(turned_back, np.abs(ends[1, :3] - ends[0, :3]).max()))
 
 
@@ -141,18 +141,15 @@ class PlacedClip:
         Whether the last frame is the first of the next lap.
     drift : Array, shape (3,)
         ξ of a lap.
-    duration : float
-        Duration of the clip [s].
     """
 
     poses: Array
     angles: Array
     closed: bool
     drift: Array
-    duration: float
 
     @staticmethod
-    def of(poses: Array, fps: float, angles: Array, closed: bool) -> "PlacedClip":
+    def of(poses: Array, angles: Array, closed: bool) -> "PlacedClip":
         """Clip from poses that passed `checked_clip` and angles that passed `checked_angles`."""
         placed = placed_at_origin(poses, (angles - angles[0]) / _TURN)
         drift = drift_of(placed)
@@ -160,7 +157,7 @@ class PlacedClip:
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
         placed[:, :2] = turned(heading, placed[:, :2]) + shift
         placed[:, 3:7] = yawed(heading, placed[:, 3:7])
-        return PlacedClip(placed, angles, closed, drift, (len(poses) - 1) / fps)
+        return PlacedClip(placed, angles, closed, drift)
 
     @property
     def remainder(self) -> Array:
@@ -187,10 +184,7 @@ def lap_spline(angles: Array, channels: Array, rotations: int, closed: bool) -> 
         Angles of a lap, with the first one plus 2π at the end.
     values, slopes : Array, shape (k + 1, channels)
     """
-    signs = np.ones(channels.shape[1])
-    for column in range(3, 3 + 4 * rotations, 4):
-        if channels[-1, column : column + 4] @ channels[0, column : column + 4] < 0.0:
-            signs[column : column + 4] = -1.0
+    signs = closing_signs(channels, rotations)
     if closed:
         knots, values = angles[:-1], channels[:-1]
     else:
@@ -218,9 +212,7 @@ def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array
     arriving = signs * channels[0] - rest_back[:, None] * back
     ease = smooth_steps(u)[:, None]
     values = (1.0 - ease) * leaving + ease * arriving
-    quaternions = values[:, 3 : 3 + 4 * rotations].reshape(len(u), rotations, 4)
-    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
-    values[:, 3 : 3 + 4 * rotations] = quaternions.reshape(len(u), -1)
+    normalise(values, rotations)
     return angles[-1] + gap * u, values
 
 

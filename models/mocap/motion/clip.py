@@ -39,6 +39,11 @@ class PlanarDisplacement:
         moved[..., 3:7] = quaternions.product(turn, moved[..., 3:7])
         return moved
 
+    def inverse(self) -> "PlanarDisplacement":
+        """The displacement back."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return PlanarDisplacement(-c * self.x - s * self.y, s * self.x - c * self.y, -self.yaw)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clip:

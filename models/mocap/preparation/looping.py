@@ -18,7 +18,7 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import CLOSES, Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.laps import lap_of, likeness
-from models.mocap.preparation.poses import inverse, plus, smoothed, sole_points
+from models.mocap.preparation.poses import plus, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
 # Largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3. Of 17 captures half of the
@@ -193,7 +193,7 @@ def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -
     opening, n = image(clip).poses, last - first
     poses = clip.poses
     there = Clip(np.vstack((opening[first], poses[last])), clip.fps, clip.name).displacement
-    back = inverse(there)
+    back = there.inverse()
     width = int(min(_FADE * clip.fps, n // 3))
     before, after = min(width, first), min(width, clip.n_frames - 1 - last)
     lap = poses[first : last + 1].copy()

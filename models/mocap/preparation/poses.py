@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, PlanarDisplacement
+from models.mocap.motion.clip import Clip
 
 _CORNER = 8.0  # cut-off of the low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in eight captures
 # A second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off, (√2 − 1)^¼ (Winter).
@@ -57,7 +57,7 @@ def around(clip: Clip, margin: int) -> tuple[Array, int]:
     The signs of its quaternions are continuous.
     """
     lap, there = clip.poses[:-1], clip.displacement
-    back = inverse(there)
+    back = there.inverse()
     rows, first = [clip.poses], 0
     before, after = lap, clip.poses
     while first < margin:
@@ -71,12 +71,6 @@ def around(clip: Clip, margin: int) -> tuple[Array, int]:
     turns = poses[:, 3:].reshape(len(poses), -1, 4)
     poses[:, 3:] = quaternions.sign_continuous(turns).reshape(len(poses), -1)
     return poses, margin
-
-
-def inverse(there: PlanarDisplacement) -> PlanarDisplacement:
-    """The inverse of a displacement over the floor."""
-    c, s = np.cos(there.yaw), np.sin(there.yaw)
-    return PlanarDisplacement(-c * there.x - s * there.y, s * there.x - c * there.y, -there.yaw)
 
 
 def sole_points(poses: Array) -> Array:

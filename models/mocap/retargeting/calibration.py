@@ -103,84 +103,113 @@ def calibrate(
     rest_frame : int or None
         A frame in which the body stands upright with level feet; without one, frames are weighted as above.
     """
-    n = len(rotations)
-    segments = np.empty((n, len(SEGMENTS), 4))
-    trunk, thighs = unit(lines.trunk), unit(unit(lines.knees - lines.hips).sum(axis=1))
-    bend = np.arccos(np.clip(-np.sum(trunk * thighs, axis=1), -1.0, 1.0))
-    least = float(np.min(bend, where=np.isfinite(bend), initial=np.pi))
-    straight = np.exp(-(((np.nan_to_num(bend, nan=np.pi) - least) / _STRAIGHT) ** 2) / 2.0)
-    if rest_frame is not None:
-        straight = np.zeros(n)
-        straight[rest_frame] = 1.0
-
-    def put(body: str, turned: Array) -> None:
-        segments[:, BODIES.index(body)] = turned
-
-    def of(body: str) -> Array:
-        return segments[:, BODIES.index(body)]
-
-    def joint(body: str) -> Array | None:
-        """Global rotations of a segment's source: the last joint before its end, since twist joints may lie between."""
-        index = roles.segments.get(body)
-        if index is None:
-            return None
-        end = roles.ends.get(body)
-        if end is not None and body != "foot" and index in ancestry(parents[end], parents):
-            index = parents[end]
-        return rotations[:, index]
-
-    hips = unit(lines.left)
-    shoulders = unit(lines.shoulders[:, 0] - lines.shoulders[:, 1]) if lines.has_arms else hips
-    own_trunk = _own_trunk(lines.has_arms)
-    for body, left in (("pelvis", hips), ("abdomen", unit(hips + shoulders)), ("chest", shoulders)):
-        source = joint(body)
-        if source is None:
-            put(body, of("pelvis"))
-            continue
-        wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
-        turned = _carried(source, wanted, straight)
-        if body == "pelvis":
-            # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
-            turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
-        put(body, turned)
-    if "abdomen" not in roles.segments:
-        put("abdomen", quaternions.slerped(of("pelvis"), of("chest"), 0.5))
-    for body in ("left_clavicle", "right_clavicle"):
-        source = joint(body)
-        put(body, of("chest") if source is None else _carried(source, of("chest"), straight))
-    source = joint("head")
-    put("head", of("chest") if source is None else _head(source, of("chest"), up, straight))
+    body, (least, straight) = _Body(roles, parents, rotations), _straightness(lines, rest_frame)
+    _put_trunk(body, lines, straight)
+    _put_head(body, up, straight)
     if lines.has_arms:
         clavicled = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
-        _set_lines(segments, trunk, shoulders, clavicled)
+        _set_lines(body.segments, unit(lines.trunk), _across(lines)[1], clavicled)
     counts: list[int] = []
-    for k, side in enumerate(SIDES):
-        sign = 1.0 - 2.0 * k
-        elbow = -sign * lines.elbow_normals()[:, k]
-        arm = ((f"{side}_clavicle", f"{side}_upper_arm", lines.shoulders, lines.elbows),
-               (f"{side}_upper_arm", f"{side}_forearm", lines.elbows, lines.wrists))  # fmt: skip
-        for parent, body, start, end in arm:
-            put(body, _limb(joint(body), (end - start)[:, k], elbow, of(parent), (1, sign), 2))
-        hand = joint(f"{side}_hand")
-        everywhere = np.ones(n)
-        put(
-            f"{side}_hand", of(f"{side}_forearm") if hand is None else _carried(hand, of(f"{side}_forearm"), everywhere)
-        )
-        knee = lines.knee_normals()[:, k]
-        leg = (("pelvis", f"{side}_thigh", lines.hips, lines.knees),
-               (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles))  # fmt: skip
-        for parent, body, start, end in leg:
-            put(body, _limb(joint(body), (end - start)[:, k], knee, of(parent), (2, -1.0), 1))
-        foot = joint(f"{side}_foot")
+    for k in range(len(SIDES)):
+        _put_limbs(body, lines, k)
+        foot = body.joint(f"{SIDES[k]}_foot")
         if foot is None:
-            put(f"{side}_foot", of(f"{side}_shank"))
+            body.put(f"{SIDES[k]}_foot", body.of(f"{SIDES[k]}_shank"))
             counts.append(0)
             continue
         flat = _flat(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
-        sole, used = _foot(foot, (lines.toes - lines.ankles)[:, k], of(f"{side}_shank"), up, flat, straight)
-        put(f"{side}_foot", sole)
+        shank = body.of(f"{SIDES[k]}_shank")
+        sole, used = _foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
+        body.put(f"{SIDES[k]}_foot", sole)
         counts.append(used)
-    return Calibration(segments, least, (counts[0], counts[1]))
+    return Calibration(body.segments, least, (counts[0], counts[1]))
+
+
+class _Body:
+    """Rotations of the figure's segments (n, 18, 4) as they are found, and those of the file's joints."""
+
+    def __init__(self, roles: Roles, parents: tuple[int, ...], rotations: Array) -> None:
+        self.segments = np.empty((len(rotations), len(SEGMENTS), 4))
+        self.roles, self._parents, self._rotations = roles, parents, rotations
+
+    def put(self, body: str, turned: Array) -> None:
+        """Set the rotations of a segment."""
+        self.segments[:, BODIES.index(body)] = turned
+
+    def of(self, body: str) -> Array:
+        """Rotations of a segment that was put."""
+        return self.segments[:, BODIES.index(body)]
+
+    def joint(self, body: str) -> Array | None:
+        """Global rotations of a segment's source: the last joint before its end, since twist joints may lie between."""
+        index = self.roles.segments.get(body)
+        if index is None:
+            return None
+        end = self.roles.ends.get(body)
+        if end is not None and body != "foot" and index in ancestry(self._parents[end], self._parents):
+            index = self._parents[end]
+        return self._rotations[:, index]
+
+
+def _straightness(lines: BodyLines, rest_frame: int | None) -> tuple[float, Array]:
+    """Least angle between trunk and thighs [rad], and the weight (n,) of each frame by how near it is to that."""
+    trunk, thighs = unit(lines.trunk), unit(unit(lines.knees - lines.hips).sum(axis=1))
+    bend = np.arccos(np.clip(-np.sum(trunk * thighs, axis=1), -1.0, 1.0))
+    least = float(np.min(bend, where=np.isfinite(bend), initial=np.pi))
+    if rest_frame is not None:
+        straight = np.zeros(len(bend))
+        straight[rest_frame] = 1.0
+        return least, straight
+    return least, np.exp(-(((np.nan_to_num(bend, nan=np.pi) - least) / _STRAIGHT) ** 2) / 2.0)
+
+
+def _across(lines: BodyLines) -> tuple[Array, Array]:
+    """Directions to the left of the hips and of the shoulders; without arms, of the hips twice."""
+    hips = unit(lines.left)
+    return hips, unit(lines.shoulders[:, 0] - lines.shoulders[:, 1]) if lines.has_arms else hips
+
+
+def _put_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
+    """Pelvis, abdomen, chest and clavicles: along the trunk line and across hips and shoulders, on average."""
+    trunk, (hips, shoulders), own_trunk = unit(lines.trunk), _across(lines), _own_trunk(lines.has_arms)
+    for name, left in (("pelvis", hips), ("abdomen", unit(hips + shoulders)), ("chest", shoulders)):
+        source = body.joint(name)
+        if source is None:
+            body.put(name, body.of("pelvis"))
+            continue
+        wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
+        turned = _carried(source, wanted, straight)
+        if name == "pelvis":
+            # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
+            turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
+        body.put(name, turned)
+    if "abdomen" not in body.roles.segments:
+        body.put("abdomen", quaternions.slerped(body.of("pelvis"), body.of("chest"), 0.5))
+    chest = body.of("chest")
+    for name in ("left_clavicle", "right_clavicle"):
+        source = body.joint(name)
+        body.put(name, chest if source is None else _carried(source, chest, straight))
+
+
+def _put_head(body: _Body, up: Array, straight: Array) -> None:
+    source, chest = body.joint("head"), body.of("chest")
+    body.put("head", chest if source is None else _head(source, chest, up, straight))
+
+
+def _put_limbs(body: _Body, lines: BodyLines, k: int) -> None:
+    """Arm, hand and leg of a side, whose bones and hinges the lines show."""
+    side, sign = SIDES[k], 1.0 - 2.0 * k
+    elbow, knee = -sign * lines.elbow_normals()[:, k], lines.knee_normals()[:, k]
+    bones = (
+        (f"{side}_clavicle", f"{side}_upper_arm", lines.shoulders, lines.elbows, elbow, (1, sign), 2),
+        (f"{side}_upper_arm", f"{side}_forearm", lines.elbows, lines.wrists, elbow, (1, sign), 2),
+        ("pelvis", f"{side}_thigh", lines.hips, lines.knees, knee, (2, -1.0), 1),
+        (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles, knee, (2, -1.0), 1),
+    )
+    for parent, name, start, end, hinge, along, across in bones:
+        body.put(name, _limb(body.joint(name), (end - start)[:, k], hinge, body.of(parent), along, across))
+    hand, forearm = body.joint(f"{side}_hand"), body.of(f"{side}_forearm")
+    body.put(f"{side}_hand", forearm if hand is None else _carried(hand, forearm, np.ones(len(forearm))))
 
 
 def _own_trunk(has_arms: bool) -> Array:

@@ -67,5 +67,17 @@ def test_neighbours_are_those_with_no_other_between_them_anywhere_round_the_lap(
     assert neighbouring_pairs(np.zeros((4, 1, 2))) == []
 
 
+def test_neighbours_for_a_share_of_the_lap_have_no_other_between_them_that_long():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    assert neighbouring_pairs(np.tile(square, (96, 1, 1)), 0.5) == [(0, 1), (0, 2), (1, 3), (2, 3)]
+    line = np.tile([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], (96, 1, 1))
+    assert neighbouring_pairs(line, 0.5) == [(0, 1), (1, 2)]
+    aside = line.copy()
+    aside[:47, 1] = 0.5, 3.0
+    assert (0, 2) not in neighbouring_pairs(aside, 0.5)
+    aside[:48, 1] = 0.5, 3.0
+    assert (0, 2) in neighbouring_pairs(aside, 0.5)
+
+
 def test_without_limbs_nothing_is_corrected():
     assert pair_channels(packed_pairs(CLIPS[..., :REST], DRIFTS, [], PAIRS)) == 0

@@ -6,7 +6,8 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.motion.captures import Capture, lap_signs, low_passed
+from controllers.motion.captures import Capture, low_passed
+from controllers.motion.channels import closing_signs
 
 N, DURATION = 256, 1.25
 
@@ -47,7 +48,7 @@ def test_a_rotation_that_comes_back_with_the_opposite_sign_is_one() -> None:
     # Followed continuously, one turn ends at −q.
     turning[turning[:, 3] < 0.0] *= -1.0
     lap = np.concatenate([np.zeros((N, 3)), turning], axis=1)
-    assert lap_signs(lap, 1).tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+    assert closing_signs(lap, 1).tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
     passed = Rotation.from_quat(low_passed(lap, DURATION, 5.0)[:, 3:], scalar_first=True)
     difference = passed * Rotation.from_quat(turning, scalar_first=True).inv()
     assert difference.magnitude().max() < 1e-6

@@ -59,7 +59,6 @@ def test_who_turns_round_as_he_goes_is_not_pulled_shut_over_the_seam(turns):
     s = np.linspace(0.0, 1.0, len(poses))
     poses[:, 3:7] = yawed((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
     loop = _loop(poses)
-    assert loop.gap < 1e-6
     assert loop.drift[2] == pytest.approx(-0.24, abs=1e-9)
     made = loop.channels(s, s)
     np.testing.assert_allclose(made[:, 2], poses[:, 2], atol=1e-6)
@@ -89,7 +88,7 @@ def test_an_open_clip_is_closed_smoothly_at_its_ends_only():
     poses = whole[:140]
     # So fast that its ends are in the middle of the motion: it is not played there and back.
     loop = closed_loop(checked_clip(poses, 240.0, "clip"), 240.0)
-    assert np.degrees(loop.gap) > 5.0
+    assert np.abs(poses[-1, 7:] - poses[0, 7:]).max() > 0.02
     s = np.arange(139) / 139
     found = loop.channels(s, np.zeros(139))
     inside = (s > 0.2) & (s < 0.8)
@@ -153,7 +152,6 @@ def test_an_open_clip_that_rests_is_played_there_and_back():
     np.testing.assert_allclose(folded[::-1], folded, atol=1e-12)
     np.testing.assert_allclose(folded[[0, len(folded) // 2, -1]], poses[[0, -1, 0]], atol=1e-6)
     loop = closed_loop(folded, 60.0)
-    assert loop.gap < 1e-6
     assert np.abs(loop.drift).max() < 1e-9
     # What is closed, or in the middle of a motion at an end, stays as it is.
     for clip, fps in ((folded, 60.0), (poses[:60], 240.0)):

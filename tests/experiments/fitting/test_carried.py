@@ -89,11 +89,11 @@ def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], m
 def test_the_hand_that_tries_a_map_sees_all_of_it(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     places: list[np.ndarray] = []
 
-    def seen(kind: int, params: np.ndarray, memory: np.ndarray, points: np.ndarray, poses: np.ndarray) -> None:
+    def seen(made: Cylindrical, points: np.ndarray) -> np.ndarray:
         places.append(points)
-        poses[:] = embedded("walk").poses[0]
+        return np.tile(embedded("walk").poses[0], (len(points), 1))
 
-    monkeypatch.setattr(rule, "poses_along", seen)
+    monkeypatch.setattr(rule, "map_poses", seen)
     toured(maps[1], LAP)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))

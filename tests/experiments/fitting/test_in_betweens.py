@@ -15,7 +15,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.balance import supported
 from models.mocap.dynamics.floor_forces import Floor, residual
 from models.mocap.motion.clip import pose_difference
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
 CONFIG = run_config(seconds=1.0)
@@ -45,9 +45,7 @@ def laps(h_map, r, z, rows=ROWS, count=1.0):
     radius = CONFIG.map.around.radius + r * reach
     x = np.zeros((len(angles), 7))
     x[:, 0], x[:, 1], x[:, 2], x[:, 3] = radius * np.cos(angles), radius * np.sin(angles), z * reach, 1.0
-    poses, (kind, params, memory) = np.empty((len(x), h_map.nq)), h_map.compiled()
-    poses_along(kind, params, memory.copy(), x, poses)
-    return poses
+    return map_poses(h_map, x)
 
 
 def soles(poses):

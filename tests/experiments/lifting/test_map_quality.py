@@ -8,15 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from experiments.lifting.in_betweens import measure_motion
-from experiments.lifting.map_quality import (
-    SAMPLES,
-    Layout,
-    body_weights,
-    in_between,
-    lap_times,
-    measure_map,
-    neighbours,
-)
+from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, in_between, lap_times, measure_map
 from models.humanoid.skeleton import JOINTS, N_TANGENT, figure_model, joint_range, rest_pose
 from models.mocap.motion.clip import Clip
 
@@ -117,18 +109,6 @@ def test_roughness_is_the_relative_change_of_the_derivative_in_a_millimetre():
     np.testing.assert_allclose(quality.roughness, (0.5e-3 * g, 0.9e-3 * g), rtol=0.1)
     smooth = measured(layout(lambda p: rows(np.eye(3), np.eye(3)), [[0.04, 0.0], [0.06, 0.01]]))
     assert smooth.roughness == (0.0, 0.0)
-
-
-def test_neighbours_have_no_other_clip_between_them_for_half_of_the_lap():
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    assert neighbours(np.tile(square, (SAMPLES, 1, 1))) == [(0, 1), (0, 2), (1, 3), (2, 3)]
-    line = np.tile([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], (SAMPLES, 1, 1))
-    assert neighbours(line) == [(0, 1), (1, 2)]
-    aside = line.copy()
-    aside[: SAMPLES // 2 - 1, 1] = 0.5, 3.0
-    assert (0, 2) not in neighbours(aside)
-    aside[: SAMPLES // 2, 1] = 0.5, 3.0
-    assert (0, 2) in neighbours(aside)
 
 
 def test_an_in_between_is_half_way_at_the_mean_of_the_paces():

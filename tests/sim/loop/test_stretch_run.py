@@ -23,7 +23,7 @@ from sim.loop.loop import Loop, groups
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 from sim.users.hand.arm import Arm
 
 MODE = Stretch(seek=150.0, rubber=150.0, tube_damping=14.0, rubber_tube=0.008, bump=0.5)
@@ -86,9 +86,8 @@ def test_the_rubber_pulls_the_hand_back(ran) -> None:
 def test_the_figure_shows_the_animation_under_the_held_point(ran) -> None:
     session, _, told = ran
     last = np.flatnonzero(told["switch"] > 0.0)[-1]
-    compiled, poses = session.haptic_map.compiled(), np.empty((2, session.haptic_map.nq))
     points = np.array([told["p"][last], session.curve.point(0.5)])
-    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(points), poses)
+    poses = map_poses(session.haptic_map, stylus_path(points))
     frame = int(last // session.servo.figure_ticks)
     under, before = (np.abs(pose_difference(told["shown"][frame : frame + 1], pose[None])[0, 6:]) for pose in poses)
     # The hand has been at rest for 0.4 s, so the stylus filter has caught up.

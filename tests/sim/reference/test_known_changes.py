@@ -21,7 +21,7 @@ from experiments.setups.rivers import river_bundle
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip, pose_difference
-from sim.reference.reference import make_reference, poses_along, reference_along
+from sim.reference.reference import make_reference, map_poses, reference_along
 from tests.experiments.own_process import RUNS, TELLS, compiled, process
 from tests.sim.gliding_hand import gliding_hand
 
@@ -76,10 +76,9 @@ def test_a_known_change_begins_at_its_gate_ends_in_the_other_clip_and_nothing_ju
     assert gain[:, 6:].max() < 1.5
     assert gain[:, :3].max() < 0.05
     after = round((passing[-1] + 0.2) / PERIOD)
-    kind, params, own = known.compiled()
+    own = known.compiled().memory
     own[RIVER] = own[COURSE] = 1.0
-    alone = np.empty((1, 75))
-    poses_along(kind, params, own, stylus_path(CURVES[1].point(t[after : after + 1] % LAP)), alone)
+    alone = map_poses(known, stylus_path(CURVES[1].point(t[after : after + 1] % LAP)), own)
     assert np.abs(pose_difference(alone, poses[after : after + 1])[0, 6:]).max() < 0.02
 
 
