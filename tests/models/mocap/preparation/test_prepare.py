@@ -308,7 +308,6 @@ def test_a_captured_dance_turns_on_its_feet(mocap, tmp_path):
     assert outcome.made.near
     assert outcome.made.fidelity.joints < OTHERWISE
     assert outcome.measures.skate < 0.005
-    assert outcome.measures.tilt < np.deg2rad(2.0)
     assert outcome.followed.stands
 
 
