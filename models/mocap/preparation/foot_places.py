@@ -10,6 +10,8 @@ As long as feet had one heading in a stance, snu/pirouette, whose foot turns by 
 instead of 3.7, and was followed with 12.3 instead of 7.2 % of weight (docs/validation/prepared-captures.md).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -31,7 +33,8 @@ _ENOUGH = 4  # frames in which a foot stands on heel and toes, from which its pl
 
 
 def place_foot(
-    points: Array, yaw: Array, sole: Array, parts: Mask, load: Array, fps: float, standing: Mask, places: Array
+    points: Array, yaw: Array, sole: Array, parts: Mask, turning: Sequence[tuple[int, int]],
+    standing: Mask, places: Array,
 ) -> None:  # fmt: skip
     """Write which of a foot's four spheres stand in a stance of n frames, and where.
 
@@ -45,16 +48,14 @@ def place_foot(
         Centres of the spheres in the frame of the foot, shape (4, 3) [m].
     parts : Mask
         Whether heel and toes stand, shape (n, 2).
-    load : Array
-        Vertical load of the motion, shape (n,) [body weights].
-    fps : float
-        Frame rate [1/s].
+    turning : sequence of (int, int)
+        Frames in which it turns, as `turns` gives them.
     standing : Mask
         Which spheres stand, shape (n, 4): written where the foot turns.
     places : Array
         Their centres on the floor, shape (n, 4, 3) [m]: written.
     """
-    turning, after, pivot = turns(yaw, load, fps), 0, None
+    after, pivot = 0, None
     for start, end in [*turning, (len(yaw), len(yaw))]:
         if start > after:
             lies = _flat(points[after:start], yaw[after:start], sole, parts[after:start])
@@ -71,24 +72,27 @@ def place_foot(
         places[:, :, :2] += np.median((points - places)[standing][:, :2], axis=0)
 
 
-def turns(yaw: Array, load: Array, fps: float) -> list[tuple[int, int]]:
+def turns(rate: Array, load: Array, fps: float) -> list[tuple[int, int]]:
     """Frames, from the first to that after the last, in which a standing foot turns by 45° or more under load.
 
     Parameters
     ----------
-    yaw, load, fps
-        As in `place_foot`.
+    rate : Array
+        Its angular velocity about the vertical, shape (n,) [rad/s]. The rate of its heading would not do: that leaps
+        where a runner's foot rolls over the toes until its sole is upright.
+    load : Array
+        Vertical load of the motion, shape (n,) [body weights].
+    fps : float
+        Frame rate [1/s].
     """
-    if len(yaw) < 2:
-        return []
-    rate = gaussian_filter1d(np.gradient(yaw), _SMOOTHING * fps) * fps
+    rate = gaussian_filter1d(rate, _SMOOTHING * fps)
     found: list[tuple[int, int]] = []
     for way in (-1.0, 1.0):
         rests = cleaned(way * rate <= _TURNING, 0, round(_FLAT * fps))
         found += (
             (start, end)
             for start, end in spans(~rests)
-            if way * (yaw[end - 1] - yaw[start]) > _TURN and load[start:end].mean() > LOADED
+            if way * rate[start:end].sum() / fps > _TURN and load[start:end].mean() > LOADED
         )
     found.sort()
     return [turn for k, turn in enumerate(found) if k == 0 or turn[0] >= found[k - 1][1]]

@@ -21,9 +21,10 @@ from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import WITH_HANDS, soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
+from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.motion.spans import cleaned, spans
-from models.mocap.preparation.foot_places import LOADED, heading, lying, place_foot
+from models.mocap.preparation.foot_places import LOADED, heading, lying, place_foot, turns
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
 
@@ -103,11 +104,13 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     standing, places = np.column_stack((_of_spheres(parts), hands)), np.full(points.shape, CONTACT_RADIUS)
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
-        yaw = np.unwrap(heading(turned[:, BODIES.index(f"{side}_foot")]))
+        own = turned[:, BODIES.index(f"{side}_foot")]
+        yaw, rate = np.unwrap(heading(own)), quaternions.rotated(own, quaternions.velocities(own, fps))[:, 2]
         for start, end in spans(np.any(parts[:, foot], axis=1)):
             stance = slice(start, end)
+            turning = turns(rate[stance], load[stance], fps)
             place_foot(
-                points[stance, mine], yaw[stance], soles()[mine], parts[stance, foot], load[stance], fps,
+                points[stance, mine], yaw[stance], soles()[mine], parts[stance, foot], turning,
                 standing[stance, mine], places[stance, mine],
             )  # fmt: skip
     for palm, bears in enumerate(hands.T, start=_N_SOLES):

@@ -26,7 +26,8 @@ def turning(angle: float, pivot: int):
 
 def placed(yaw, points, load=1.0):
     standing, places = np.ones((N, 4), bool), np.full((N, 4, 3), CONTACT_RADIUS)
-    place_foot(points, yaw, SOLE, np.ones((N, 2), bool), np.full(N, load), FPS, standing, places)
+    turned = turns(np.gradient(yaw) * FPS, np.full(N, load), FPS)
+    place_foot(points, yaw, SOLE, np.ones((N, 2), bool), turned, standing, places)
     return standing, places
 
 
@@ -63,8 +64,9 @@ def test_turns_one_after_the_other_hang_together():
     both, heads = np.concatenate((points, moved)), np.concatenate((yaw, there + yaw[-1] - there[0]))
     n = len(both)
     standing, places = np.ones((n, 4), bool), np.full((n, 4, 3), CONTACT_RADIUS)
-    assert len(turns(heads, np.ones(n), FPS)) == 2
-    place_foot(both, heads, SOLE, np.ones((n, 2), bool), np.ones(n), FPS, standing, places)
+    turned = turns(np.gradient(heads) * FPS, np.ones(n), FPS)
+    assert len(turned) == 2
+    place_foot(both, heads, SOLE, np.ones((n, 2), bool), turned, standing, places)
     np.testing.assert_allclose(places[standing], both[standing], atol=0.02)
     jumps = np.linalg.norm(np.diff(places, axis=0), axis=2)
     assert jumps[standing[1:] & standing[:-1]].max() < 1e-12
