@@ -126,7 +126,8 @@ def changes(made: Prepared) -> tuple[str, ...]:
             "where their palms were captured"
         )
     lines.append(
-        f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.moved:.1f} cm RMS; "
+        f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.raised:.1f} cm in height and "
+        f"{100 * change.moved:.1f} cm over the floor RMS; "
         + made.fidelity.line()
     )
     return tuple(lines)
@@ -138,8 +139,8 @@ def advice(made: Prepared) -> tuple[str, ...]:
     if made.near:
         return ()
     return (
-        f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and moves the "
-        f"root {100 * change.moved:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
+        f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
+        f"lowers the root by {100 * change.raised:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
         "try --loop START:END for a part without what is not feasible, --loop open if it "
         "does not repeat, or a capture whose support is feet and hands alone",
     )

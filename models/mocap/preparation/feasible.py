@@ -100,8 +100,8 @@ class Feasible(NamedTuple):
         The motion.
     residual : float
         RMS of the remaining residual force [body weights].
-    moved : float
-        RMS of the change of the root's position [m].
+    moved, raised : float
+        RMS of the change of the root's place over the floor, and of its height [m].
     turned : float
         RMS over joints and time of the change of rotations [rad].
     costs : tuple of float
@@ -111,6 +111,7 @@ class Feasible(NamedTuple):
     clip: Clip
     residual: float
     moved: float
+    raised: float
     turned: float
     costs: tuple[float, ...]
 
@@ -165,13 +166,13 @@ def feasible(
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
     sizes = change.size(points)
-    places = np.linalg.norm(sizes[:, :3], axis=1)
     turns = np.linalg.norm(sizes[:, 6:].reshape(len(sizes), -1, 3), axis=2)
     force = np.linalg.norm(problem.errors(x, False).residual[:, :3], axis=1) / problem.floor.body_weight
     return Feasible(
         change.changed(points, fps),
         _rms(force),
-        _rms(places),
+        _rms(np.linalg.norm(sizes[:, :2], axis=1)),
+        _rms(sizes[:, 2]),
         _rms(turns),
         tuple(costs),
     )

@@ -311,6 +311,20 @@ def test_a_captured_dance_turns_on_its_feet(mocap, tmp_path):
     assert outcome.followed.stands
 
 
+@pytest.mark.slow
+def test_a_body_whose_root_wanders_over_standing_feet_has_a_feasible_motion_near(tmp_path):
+    # Feet that drift with the root at up to 0.26 m/s stand, so the root is brought back over them.
+    cheer = embedded("cheer")
+    poses = np.concatenate((cheer.poses, cheer.poses[1:]))
+    poses[:, 0] += 0.25 * np.sin(np.linspace(0.0, 2 * np.pi, len(poses)))
+    write_bvh(Clip(poses, cheer.fps, "wanders"), tmp_path / "wanders.bvh")
+    made = prepared(tmp_path / "wanders.bvh")
+    assert made.near
+    assert made.feasible.moved > 0.15
+    assert np.rad2deg(made.fidelity.joints) < 0.5
+    assert not well_formed(made.clip).faults()
+
+
 @pytest.fixture
 def long_walk(tmp_path):
     """More than two minutes of walking, open at its ends."""
