@@ -1,4 +1,4 @@
-"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm, velocities, continuous signs, slerp."""
+"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm and its derivative, velocities, slerp."""
 
 import numpy as np
 
@@ -47,6 +47,32 @@ def logarithm(q: Array) -> Array:
     # Near zero, s is half the angle to first order, so the ratio of angle to s is 2.
     scale = np.where(s > 1e-12, 2.0 * np.arctan2(s, q[..., :1]) / np.maximum(s, 1e-12), 2.0)
     return scale * q[..., 1:]
+
+
+def logarithm_derivative(v: Array) -> Array:
+    r"""Derivative of rotation vectors by a rotation δ in the rotated frame, log(exp(v) exp(δ)): shape (..., 3, 3).
+
+    The inverse of the right Jacobian of SO(3) (Solà, Deray and Atchuthan 2018, arXiv:1812.01537, eq. 144),
+
+    .. math:: J_r^{-1}(v) = I + \tfrac12 [v]_\times
+        + \left(\frac1{\theta^2} - \frac{1 + \cos\theta}{2\theta\sin\theta}\right) [v]_\times^2 , \theta = |v| < \pi .
+
+    Parameters
+    ----------
+    v : Array
+        Rotation vectors, shape (..., 3) [rad].
+    """
+    across = cross_matrix(v)
+    half = np.maximum(np.linalg.norm(v, axis=-1)[..., None, None], 2e-3) / 2.0  # below it the share is that of 0, 1/12
+    share = (1.0 - half / np.tan(half)) / (4.0 * half**2)
+    return np.eye(3) + across / 2.0 + share * (across @ across)
+
+
+def cross_matrix(w: Array) -> Array:
+    """Matrices [w]× of vectors, shape (..., 3) → (..., 3, 3)."""
+    zero = np.zeros(w.shape[:-1])
+    rows = ((zero, -w[..., 2], w[..., 1]), (w[..., 2], zero, -w[..., 0]), (-w[..., 1], w[..., 0], zero))
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def velocities(q: Array, fps: float) -> Array:

@@ -26,7 +26,7 @@ from models.mocap.dynamics.spacetime import MARGIN
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.change import DEGREE, Change, Normal
-from models.mocap.preparation.inverse_dynamics import InverseDynamics, cross_matrix
+from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
 
 _STRONG = 0.75  # share of the torque limits of the legs beyond which torque is penalised
@@ -293,12 +293,15 @@ class _Problem:
         arms = np.zeros((m, 6, N_TANGENT))
         for sphere in range(k):
             # Moments of the contact forces change with their lever arms.
-            arms[:, 3:] -= cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
+            arms[:, 3:] -= quaternions.cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
         moving[:, 0] -= arms
         jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
         jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
         jacobian[:, 0, depths] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        jacobian[:, 0, depths.stop :][:, :, 6:] = w.limit * (excess != 0)[:, :, None] * np.eye(51)
+        rates = w.limit * quaternions.logarithm_derivative(vectors.reshape(m, 17, 3))
+        for joint in range(17):
+            of = slice(3 * joint, 3 * joint + 3)
+            jacobian[:, 0, depths.stop :][:, of, 6:][:, :, of] = rates[:, joint] * (excess[:, of, None] != 0)
         hot = np.flatnonzero(np.any(strain != 0, axis=1))
         if len(hot):
             gain = w.strain * (strain[hot] != 0) / torque_limit()

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
 from models.mocap.dynamics.floor_forces import Demand, carriers
+from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
 
 _ANGLE, _RATE = 1e-5, 1e-4  # steps of the finite differences [rad], [rad/s]
@@ -144,10 +145,3 @@ def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
         mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
     except TypeError:
         mujoco.mj_fullM(model, full, data.qM)  # pyright: ignore[reportCallIssue, reportArgumentType, reportAttributeAccessIssue]
-
-
-def cross_matrix(w: Array) -> Array:
-    """Matrices [w]× of vectors, shape (..., 3) → (..., 3, 3)."""
-    zero = np.zeros(w.shape[:-1])
-    rows = ((zero, -w[..., 2], w[..., 1]), (w[..., 2], zero, -w[..., 0]), (-w[..., 1], w[..., 0], zero))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
