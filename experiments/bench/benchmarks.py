@@ -15,8 +15,8 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.map_feed import feed_maps, feed_rows
-from controllers.fields.program import Compiled, evaluate
+from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, HandState, IntArray

@@ -9,7 +9,7 @@ from controllers.certificates.loop.executed import Seen, looked_at
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.run_config import RunConfig
 from experiments.setups.parts import Parts

@@ -13,7 +13,7 @@ import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
 from controllers.state import Array

@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
 from controllers.state import HAND_SWITCH, POSITION, Array
 from experiments.config.run_config import RunConfig

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from controllers.errors import ControllerError
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
 from experiments.live.board import Board

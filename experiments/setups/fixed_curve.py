@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.law import Law, Program
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.orientation import Orientation
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter

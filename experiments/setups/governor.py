@@ -6,8 +6,8 @@ import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.governor import Governor
-from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import Array

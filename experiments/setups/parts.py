@@ -7,8 +7,8 @@ from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.bundle import RiverBundle
-from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.law import Law
 from controllers.fields.river import River
 from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Rivers

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.law import Law
+from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
 from experiments.setups.devices import recorded_as

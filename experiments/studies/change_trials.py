@@ -13,7 +13,7 @@ import numpy as np
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import smooth_steps
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import Array
 from experiments.fitting.figure_legs import figure_legs, packed_legs

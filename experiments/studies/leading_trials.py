@@ -18,7 +18,7 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from controllers.fields.leading import Leading
 from controllers.state import HandState
 from controllers.walking.gait import Gait

@@ -12,11 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.easing import smooth_step
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
+from controllers.fields.algebra.law import Program
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
-from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
 from controllers.state import VELOCITY, Array

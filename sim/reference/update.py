@@ -6,7 +6,7 @@ figure is shown in (`sim.reference.river_changes`). Only such a map needs that c
 
 from numba import njit
 
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import (
     COURSE,
@@ -41,8 +41,8 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
     stylus : Array
         Measured position in H and orientation wxyz, shape (7,).
     trace : Array
-        Trace of the field, with the active river and the hand's phase on it (see `controllers.fields.instructions`).
-        Not read; see `update_river_reference`.
+        Trace of the field, with the active river and the hand's phase on it (see
+        `controllers.fields.algebra.instructions`). Not read; see `update_river_reference`.
     """
     _smooth(reference, stylus)
     look_around(reference, reference.hand)

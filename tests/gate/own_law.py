@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra import Weight
+from controllers.fields.algebra.weights import Weight
 from controllers.fields.follow import Follow
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.python_law import PythonLaw
 from controllers.state import HandState
 from experiments.config.words import run_config
 from sim.loop.loop import groups, record_into

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER
-from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.fields.program import evaluate
+from controllers.fields.algebra.program import evaluate
 from controllers.safety.limiter import limit_force
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.python_law import PythonLaw
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
 from experiments.config.words import run_config
 from experiments.setups.clips import load_clips

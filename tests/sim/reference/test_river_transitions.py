@@ -8,7 +8,7 @@ import pytest
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.fitting.balance import nearest_supported
 from experiments.fitting.figure_legs import figure_legs, packed_legs

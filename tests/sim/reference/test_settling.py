@@ -6,7 +6,7 @@ import pytest
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs, packed_legs

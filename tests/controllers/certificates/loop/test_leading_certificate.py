@@ -11,9 +11,9 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
-from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading, leading_wrench
-from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HandState
 from controllers.walking.gait import Gait
 from controllers.walking.walker import walker_at

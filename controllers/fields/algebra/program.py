@@ -10,8 +10,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ControllerError
-from controllers.fields.algebra import blend, gate, limit
-from controllers.fields.instructions import (
+from controllers.fields.algebra.instructions import (
     LAW_ARGUMENTS,
     OP_CODE,
     OP_CURVE,
@@ -22,6 +21,7 @@ from controllers.fields.instructions import (
     TRACE_ROW,
     Join,
 )
+from controllers.fields.algebra.weights import blend, gate, limit
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array

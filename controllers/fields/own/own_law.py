@@ -7,9 +7,9 @@ from typing import Any, overload
 import numpy.typing as npt
 
 from controllers.errors import ParameterError
-from controllers.fields.compiled_law import CompiledLaw
-from controllers.fields.function_law import place_of
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.compiled_law import CompiledLaw
+from controllers.fields.own.function_law import place_of
+from controllers.fields.own.python_law import PythonLaw
 
 _Function = Callable[..., npt.ArrayLike]
 

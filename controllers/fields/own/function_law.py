@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.errors import ControllerError, ParameterError
-from controllers.fields.description import code_digest
-from controllers.fields.law import Law
+from controllers.fields.algebra.description import code_digest
+from controllers.fields.algebra.law import Law
 from controllers.state import Array, HandState, Wrench
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FunctionLaw(Law):
-    """Field F(hand; parameters), computed by a function; made by `controllers.fields.own_law.law`.
+    """Field F(hand; parameters), computed by a function; made by `controllers.fields.own.own_law.law`.
 
     The object is a law with its current parameters; calling it with keyword arguments gives the same law with those
     parameters replaced.

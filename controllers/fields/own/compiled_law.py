@@ -11,9 +11,9 @@ from numba.core.errors import NumbaError
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from controllers.errors import ParameterError
-from controllers.fields.function_law import FunctionLaw, place_of
-from controllers.fields.instructions import Kernel
-from controllers.fields.law import Program
+from controllers.fields.algebra.instructions import Kernel
+from controllers.fields.algebra.law import Program
+from controllers.fields.own.function_law import FunctionLaw, place_of
 from controllers.state import Array, HandState, hand_state
 
 _NUMBER = types.float64

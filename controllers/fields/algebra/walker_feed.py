@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.fields.instructions import LAW_ARGUMENTS
+from controllers.fields.algebra.instructions import LAW_ARGUMENTS
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
 from controllers.walking.walking import Walking
@@ -90,7 +90,7 @@ def feed_walkers(walkers: Walkers, params: Array, memory: Array, hand: Array) ->
     walkers : Walkers
         Linked; their state is written.
     params, memory, hand
-        As in `controllers.fields.program.evaluate`.
+        As in `controllers.fields.algebra.program.evaluate`.
     """
     rows = walkers.feeds
     for n in range(rows.shape[0]):

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from numba import njit
 
-from controllers.fields.function_law import FunctionLaw
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.law import Program, PythonFeed
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.law import Program, PythonFeed
+from controllers.fields.own.function_law import FunctionLaw
 from controllers.state import Array
 
 

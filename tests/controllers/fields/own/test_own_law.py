@@ -6,16 +6,16 @@ import threading
 import casadi
 import numpy as np
 import pytest
-from field_probes import run_over
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
-from controllers.fields.algebra import Weight
-from controllers.fields.compiled_law import CompiledLaw
-from controllers.fields.description import code_digest
+from controllers.fields.algebra.description import code_digest
+from controllers.fields.algebra.weights import Weight
 from controllers.fields.follow import Follow
-from controllers.fields.own_law import law
+from controllers.fields.own.compiled_law import CompiledLaw
+from controllers.fields.own.own_law import law
 from controllers.state import HandState
+from tests.controllers.fields.field_probes import run_over
 
 RNG = np.random.default_rng(7)
 SOFTNESS = 1e-3

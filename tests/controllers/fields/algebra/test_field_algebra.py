@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.algebra import Weight
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.weights import Weight
 from controllers.fields.follow import Follow
-from controllers.fields.law import Program
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
+from tests.controllers.fields.field_probes import force_of, largest_jump
 
 A = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0, 0.03).program()
 B = Follow(Trajectory.circle(0.03, 2.0), 100.0, 1.0, 0.028).program()

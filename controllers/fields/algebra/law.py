@@ -11,9 +11,8 @@ import numpy as np
 from controllers.checks import checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.algebra import WEIGHT_SIZE, Weight
-from controllers.fields.description import parts_of
-from controllers.fields.instructions import (
+from controllers.fields.algebra.description import parts_of
+from controllers.fields.algebra.instructions import (
     LAW_ARGUMENTS,
     OP_CODE,
     OP_MEMORY,
@@ -24,8 +23,9 @@ from controllers.fields.instructions import (
     Kernel,
     empty_trace,
 )
-from controllers.fields.program import Compiled, evaluate
-from controllers.fields.walker_feed import WalkerFeed, Walkers, feed_walkers, fresh_walkers
+from controllers.fields.algebra.program import Compiled, evaluate
+from controllers.fields.algebra.walker_feed import WalkerFeed, Walkers, feed_walkers, fresh_walkers
+from controllers.fields.algebra.weights import WEIGHT_SIZE, Weight
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
 from controllers.state import HAND_POSITION, Array, HandState, IntArray, Wrench
@@ -148,7 +148,7 @@ class Program(Law):
     Parameters
     ----------
     ops : IntArray, shape (n, 4)
-        Instructions, see `controllers.fields.instructions`.
+        Instructions, see `controllers.fields.algebra.instructions`.
     params : Array
         Gains and packed curves; never written.
     memory : Array

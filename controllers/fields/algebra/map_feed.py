@@ -6,7 +6,7 @@ The servo calls `feed_maps` before `evaluate`, so the kernels of the laws do not
 import numpy as np
 from numba import njit
 
-from controllers.fields.law import MapFeed
+from controllers.fields.algebra.law import MapFeed
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.state import HAND_POSITION, Array, IntArray
@@ -32,7 +32,7 @@ def feed_maps(units: IntArray, feeds: IntArray, params: Array, memory: Array, ha
     feeds : IntArray
         See `feed_rows`.
     params, memory, hand
-        As in `controllers.fields.program.evaluate`.
+        As in `controllers.fields.algebra.program.evaluate`.
     """
     stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
     for n in range(feeds.shape[0]):

@@ -9,7 +9,7 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
-from controllers.fields.window import window
+from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
