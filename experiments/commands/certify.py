@@ -128,7 +128,7 @@ class Command:
         from experiments.files.certificate_files import clip_inputs, verify_certificate
 
         if self.clip is not None:
-            from experiments.setups.clips import load_clips
+            from experiments.setups.parts.clips import load_clips
 
             inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
         else:

@@ -25,7 +25,7 @@ from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_
 from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
 from sim.devices.hardware_list import check_there

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import RunConfig
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 
 
 class Gain(NamedTuple):

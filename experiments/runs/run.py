@@ -35,7 +35,7 @@ from experiments.results.measures import summarise
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import SpeedSummary
 from experiments.setups.default_animation import default_poses
-from experiments.setups.parts import Measuring
+from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks

@@ -37,11 +37,11 @@ from experiments.fitting.pushed_off import followed_map
 from experiments.fitting.rests import with_rests
 from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
-from experiments.setups.hands import river_pushes
-from experiments.setups.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
-from experiments.setups.pace import course_of, reached
-from experiments.setups.parts import ClipMapParts
-from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
+from experiments.setups.modes.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
+from experiments.setups.modes.rivers import SLOWEST, default_choice, river_bundle
+from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.pace import course_of, reached
+from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder

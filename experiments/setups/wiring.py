@@ -14,11 +14,11 @@ from controllers.state import STYLUS_POSE, Array, HandState
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
-from experiments.setups.defaults import resolved
-from experiments.setups.devices import DeviceOf, device_of
-from experiments.setups.eyes import POSES, with_eyes
-from experiments.setups.hands import Beginning, beginning
-from experiments.setups.parts import MapParts, Parts, Settings
+from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.devices import DeviceOf, device_of
+from experiments.setups.parts.eyes import POSES, with_eyes
+from experiments.setups.parts.hands import Beginning, beginning
+from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import rest_pose

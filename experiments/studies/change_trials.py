@@ -19,8 +19,8 @@ from controllers.state import Array
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rests import with_rests
 from experiments.results.soles import Soles
-from experiments.setups.clips import load_clips
-from experiments.setups.rivers import river_bundle
+from experiments.setups.modes.rivers import river_bundle
+from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.motion.clip import pose_difference
 from models.mocap.preparation.poses import sole_points

@@ -24,8 +24,8 @@ from controllers.state import HAND_POSITION, HAND_QUATERNION, Array
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
-from experiments.setups.defaults import river_gains
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
+from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
 from models.world.scene import PHANTOM, SceneConfig
 from sim.users.hand.actions import Push

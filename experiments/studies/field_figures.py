@@ -21,7 +21,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River, integrate
 from controllers.state import Array, HandState
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]

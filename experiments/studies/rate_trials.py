@@ -22,8 +22,8 @@ from controllers.haptic_map.animation import ClipMap
 from controllers.state import VELOCITY, Array
 from experiments.config.words import run_config
 from experiments.results.figures import STYLE
-from experiments.setups.governor import speeds_along
-from experiments.setups.rivers import GATE, HYSTERESIS, SIGMA
+from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
+from experiments.setups.parts.governor import speeds_along
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose

@@ -24,7 +24,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.results.figures import STYLE
-from experiments.setups.rivers import ADMISSION, SIGMA
+from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
 
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] pushes that are tried on every crossing, up to 4 N

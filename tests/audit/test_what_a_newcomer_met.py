@@ -343,7 +343,7 @@ def test_figures_of_slow_commands_are_printed_as_json(tmp_path: Path, capsys: py
 def test_what_was_chosen_by_default_is_in_the_resolved_configuration(run: Path, tmp_path: Path) -> None:
     """Pushes and grabs of a hand that none were given for; a run of that file has them again."""
     from experiments.config.run_config import load_config
-    from experiments.setups.defaults import resolved
+    from experiments.setups.parts.defaults import resolved
 
     out = tmp_path / "pushed"
     assert main(["run", "--figure", "none", "--user", "push", "--lap", "0.5", "--seconds", "1", "--out", str(out)]) == 0

@@ -14,7 +14,7 @@ from experiments.config.maps import MapFile
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.config.words import run_config
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.code_hash import code_hash
 from experiments.trials.design.design import Condition, Meeting, conditions, meetings
 from experiments.trials.design.errors import StudyError

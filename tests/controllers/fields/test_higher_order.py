@@ -14,7 +14,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.state import HandState
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 from experiments.studies.field_figures import SPEED, crossing, eight, straight_river
 from tests.controllers.fields.field_probes import force_of, largest_jump, mass_in, run_over
 

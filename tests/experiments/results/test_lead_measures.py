@@ -17,8 +17,7 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
 from experiments.results.lead_measures import LeadSummary, _Retrace, support_at
 from experiments.results.soles import Soles
-from experiments.setups import clips
-from experiments.setups.lead import (
+from experiments.setups.modes.lead import (
     gait_remark,
     lead_parts,
     leading,
@@ -29,6 +28,7 @@ from experiments.setups.lead import (
     s_curve,
     walker_argument,
 )
+from experiments.setups.parts import clips
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.dynamics.contacts import contacts

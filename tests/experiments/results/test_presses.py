@@ -16,11 +16,11 @@ from experiments.results import stretch_measures
 from experiments.results.phases import EditingSummary, PerformanceSummary, PressSummary
 from experiments.results.stretch_measures import press_summaries
 from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
-from experiments.setups.defaults import resolved
-from experiments.setups.hands import edited_until
-from experiments.setups.parts import Parts
+from experiments.setups.modes.stretch import stretch_grabs
+from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.hands import edited_until
+from experiments.setups.parts.part_types import Parts
 from experiments.setups.setups import map_parts, parts_of
-from experiments.setups.stretch import stretch_grabs
 from models.humanoid.skeleton import figure_model
 from sim.body.residual import Residual
 from sim.recording.recorder import Group, Recorder

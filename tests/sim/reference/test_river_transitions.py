@@ -13,8 +13,8 @@ from controllers.haptic_map.river_clips import RiverClips
 from experiments.fitting.balance import nearest_supported
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rests import with_rests
-from experiments.setups.clips import load_clips
-from experiments.setups.rivers import river_bundle
+from experiments.setups.modes.rivers import river_bundle
+from experiments.setups.parts.clips import load_clips
 from experiments.studies.change_trials import (
     BLEND,
     LAP,

@@ -10,9 +10,9 @@ from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.setups.clips import load_clips
-from experiments.setups.hands import edited_until
-from experiments.setups.stretch import flight_remarks
+from experiments.setups.modes.stretch import flight_remarks
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.hands import edited_until
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.motion.clip import pose_difference

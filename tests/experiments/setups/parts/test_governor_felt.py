@@ -7,8 +7,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from experiments.config.words import run_config
 from experiments.flights.ballistics import clip_ballistics
-from experiments.setups.clips import load_clips
-from experiments.setups.governor import Governed, animation_along
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.governor import Governed, animation_along
 from experiments.setups.wiring import wire
 from experiments.studies.rate_trials import DRAG, Bench
 from models.mocap.library import embedded

@@ -14,10 +14,10 @@ from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMomen
 from experiments.config.run_config import RunConfig
 from experiments.results.measures import trace_summary
 from experiments.results.summary import RunSummary
-from experiments.setups.budget import tank_for
-from experiments.setups.hands import handled, resolved_user, turning_remark, user_hand
-from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
-from experiments.setups.walls import figure_walls
+from experiments.setups.parts.budget import tank_for
+from experiments.setups.parts.hands import handled, resolved_user, turning_remark, user_hand
+from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
+from experiments.setups.parts.walls import figure_walls
 from sim.users.hand.actions import Push
 
 TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own

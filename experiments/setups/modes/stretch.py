@@ -18,11 +18,12 @@ from experiments.config.run_config import Replay, RunConfig, User
 from experiments.results.stretch_measures import editing_summary, performance_summary
 from experiments.results.stretch_summary import stretch_summary
 from experiments.results.summary import RunSummary
-from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.clips import BLINK
-from experiments.setups.defaults import tube_gains
-from experiments.setups.fixed_curve import with_walls
-from experiments.setups.hands import (
+from experiments.setups.modes.fixed_curve import with_walls
+from experiments.setups.modes.lifted_runs import HELD_GAINS
+from experiments.setups.parts.budget import SPAN, fastest, tank_for
+from experiments.setups.parts.clips import BLINK
+from experiments.setups.parts.defaults import tube_gains
+from experiments.setups.parts.hands import (
     PAUSE,
     edited_until,
     first_pushed_lap,
@@ -31,8 +32,7 @@ from experiments.setups.hands import (
     turning_remark,
     user_hand,
 )
-from experiments.setups.lifted_runs import HELD_GAINS
-from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
+from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.spans import spans

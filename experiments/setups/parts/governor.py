@@ -12,7 +12,7 @@ from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
-from experiments.setups.parts import ClipMapParts
+from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 

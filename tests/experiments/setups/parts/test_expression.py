@@ -11,9 +11,9 @@ from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
 from experiments.config.modes import OrientationMoment
 from experiments.config.words import run_config
-from experiments.setups.clips import load_clips
-from experiments.setups.expression import expressive_figure
-from experiments.setups.fixed_curve import with_moment
+from experiments.setups.modes.fixed_curve import with_moment
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.expression import expressive_figure
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded, embedded_names

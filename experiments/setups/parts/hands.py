@@ -7,7 +7,7 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 from experiments.config.run_config import User
-from experiments.setups.expression import lap_turns
+from experiments.setups.parts.expression import lap_turns
 from sim.users.hand.actions import Grab, Push
 from sim.users.hand.arm import Arm
 from sim.users.intents import (

@@ -9,7 +9,7 @@ from controllers.state import Array
 from experiments.config.run_config import Replay
 from experiments.files.device_files import linkage_of
 from experiments.results.folder import RECORDING
-from experiments.setups.parts import Settings
+from experiments.setups.parts.part_types import Settings
 from sim.devices.device import DeviceState
 from sim.devices.replayed import ReplayedHand, recorded_hand, replayed_hand
 from sim.errors import SimError

@@ -12,9 +12,9 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers
 from experiments.config.words import run_config
-from experiments.setups.defaults import resolved, river_gains
-from experiments.setups.parts import Parts
-from experiments.setups.rivers import river_time
+from experiments.setups.modes.rivers import river_time
+from experiments.setups.parts.defaults import resolved, river_gains
+from experiments.setups.parts.part_types import Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.hand.arm import hand_force

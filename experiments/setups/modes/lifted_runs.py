@@ -9,12 +9,12 @@ from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
 from experiments.config.modes import Rivers
-from experiments.setups.budget import fastest
-from experiments.setups.defaults import river_gains
-from experiments.setups.hands import NEAR
-from experiments.setups.pace import paced, reached
-from experiments.setups.parts import RiverChoice
-from experiments.setups.rivers import BESIDE, river_time
+from experiments.setups.modes.rivers import BESIDE, river_time
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.defaults import river_gains
+from experiments.setups.parts.hands import NEAR
+from experiments.setups.parts.pace import paced, reached
+from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
 from sim.users.hand.actions import Push
 

@@ -24,10 +24,10 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.led_balance import balanced_on_ground, led_gains
 from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
-from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.clips import BLINK, load_clips
-from experiments.setups.hands import participant
-from experiments.setups.parts import MapParts, Measuring, Notes, Parts
+from experiments.setups.parts.budget import SPAN, fastest, tank_for
+from experiments.setups.parts.clips import BLINK, load_clips
+from experiments.setups.parts.hands import participant
+from experiments.setups.parts.part_types import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.motion.clip import CLOSES, Clip

@@ -7,10 +7,10 @@ from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Bunny
 from experiments.config.run_config import RunConfig
-from experiments.setups.budget import fastest
-from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
-from experiments.setups.governor import governed
-from experiments.setups.parts import ClipMapParts, Notes, Parts
+from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.governor import governed
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 
 
 def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:

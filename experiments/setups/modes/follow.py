@@ -5,10 +5,10 @@ from controllers.fields.follow import Follow as FollowLaw
 from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Follow
 from experiments.config.run_config import RunConfig
-from experiments.setups.budget import fastest
-from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
-from experiments.setups.governor import governed
-from experiments.setups.parts import ClipMapParts, Notes, Parts
+from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.governor import governed
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 
 
 def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:

@@ -5,8 +5,8 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from experiments.config.words import run_config
-from experiments.setups import pace
-from experiments.setups.pace import friction_along, inertia_along, paced
+from experiments.setups.parts import pace
+from experiments.setups.parts.pace import friction_along, inertia_along, paced
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
 from models.phantom.dynamics import mass_matrix

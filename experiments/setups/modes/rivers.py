@@ -12,12 +12,12 @@ from controllers.fields.river import River
 from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.setups.budget import fastest
-from experiments.setups.defaults import river_gains
-from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
-from experiments.setups.governor import governed, speeds_along
-from experiments.setups.pace import paced
-from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
+from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.defaults import river_gains
+from experiments.setups.parts.governor import governed, speeds_along
+from experiments.setups.parts.pace import paced
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
 
 # In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
 # a hand that crosses at a right angle is not: the difference is √2. Without hysteresis rivers chatter after 4 ms.

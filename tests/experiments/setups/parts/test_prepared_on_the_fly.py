@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import prepare
