@@ -11,10 +11,10 @@ import numpy as np
 
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
-from experiments.live.engine_process import EngineProcess
-from experiments.live.gain_verdict import GainVerdict
-from experiments.live.gains import with_gain
-from experiments.live.messages import (
+from experiments.live.session.engine_process import EngineProcess
+from experiments.live.session.gain_verdict import GainVerdict
+from experiments.live.session.gains import with_gain
+from experiments.live.session.messages import (
     Build,
     Built,
     GoBack,
@@ -30,7 +30,7 @@ from experiments.live.messages import (
     Stop,
     Undo,
 )
-from experiments.live.workers import Uploaded, Worker, preparation, verdicts
+from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from sim.errors import SimError
 
 REMEMBERED = 60.0  # [s] of history that can be looked at again

@@ -12,9 +12,9 @@ from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
-from experiments.live.board import Board
-from experiments.live.engine import Drag, Engine
-from experiments.live.messages import (
+from experiments.live.session.board import Board
+from experiments.live.session.engine import Drag, Engine
+from experiments.live.session.messages import (
     COURSE_POINTS,
     HELD,
     SHOWN,
@@ -35,8 +35,8 @@ from experiments.live.messages import (
     Stop,
     Undo,
 )
-from experiments.live.takes import Take
-from experiments.live.workers import PageProcess
+from experiments.live.session.takes import Take
+from experiments.live.session.workers import PageProcess
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire

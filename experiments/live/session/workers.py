@@ -114,7 +114,7 @@ def newest(asked: Any) -> Any:
 
 def verdicts(asked: Any, told: Any) -> None:
     """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
-    from experiments.live.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
+    from experiments.live.session.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
 
     found = GainVerdicts()
     while (config := newest(asked)) is not None:

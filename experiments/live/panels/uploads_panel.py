@@ -5,8 +5,8 @@ from typing import Any
 
 import viser
 
-from experiments.live.clock_panel import Acts
-from experiments.live.desk import MOST_BYTES, Desk
+from experiments.live.panels.clock_panel import Acts
+from experiments.live.session.desk import MOST_BYTES, Desk
 
 
 class UploadsPanel:

@@ -7,7 +7,7 @@ import viser
 from viser import uplot
 
 from controllers.state import Array
-from experiments.live.desk import numbers
+from experiments.live.session.desk import numbers
 from sim.viewer.palette import FIELD, TUBE, USER
 
 SECONDS = 12.0  # [s] that are plotted

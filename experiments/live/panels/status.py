@@ -3,7 +3,7 @@
 import html
 
 from controllers.state import Array
-from experiments.live.desk import Desk
+from experiments.live.session.desk import Desk
 
 FIRST_STEPS = """
 - **Drag the orange ball**: it is your hand on the stylus. The stylus lags behind it as a hand feels the field: the

@@ -8,7 +8,7 @@ from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config.part import to_dict, to_json
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
-from experiments.live.engine import Engine, take_session
+from experiments.live.session.engine import Engine, take_session
 from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
 from experiments.results.measures import summarise
 from experiments.results.stretch_summary import stretch_summary

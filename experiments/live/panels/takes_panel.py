@@ -11,10 +11,10 @@ import viser
 
 from controllers.errors import ParameterError
 from controllers.state import Array
-from experiments.live.clock_panel import Acts
-from experiments.live.desk import Desk
-from experiments.live.run_panel import configuration_text
-from experiments.live.take_mix import FPS, Region, TakeData, mixed
+from experiments.live.panels.clock_panel import Acts
+from experiments.live.panels.run_panel import configuration_text
+from experiments.live.session.desk import Desk
+from experiments.live.session.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh

@@ -6,10 +6,10 @@ from typing import Any
 
 import viser
 
-from experiments.live.clock_panel import Acts
-from experiments.live.desk import Desk
-from experiments.live.gain_verdict import GainVerdict
-from experiments.live.gains import Gain, gains_of
+from experiments.live.panels.clock_panel import Acts
+from experiments.live.session.desk import Desk
+from experiments.live.session.gain_verdict import GainVerdict
+from experiments.live.session.gains import Gain, gains_of
 
 COLORS = {"certified": "#1d8a3a", "refuted": "#c02020", "unknown": "#a8700a"}
 _WORDS = {"certified": "stable", "refuted": "unstable", "unknown": "unknown"}
