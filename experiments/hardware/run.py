@@ -184,7 +184,8 @@ def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
-        from experiments.results.hardware_report import write_hardware_report  # imported late, as it loads matplotlib
+        # Imported late, as it loads matplotlib.
+        from experiments.results.pages.hardware_report import write_hardware_report
 
         with Recording(out / RECORDING) as recording:
             write_hardware_report(out, recording, outcome.lines())

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights
-from experiments.results.soles import Soles
+from experiments.results.measures.soles import Soles
 from models.humanoid.skeleton import N_JOINTS, joint_range, rest_pose
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
@@ -21,7 +21,7 @@ class MotionMeasure(NamedTuple):
     limits : float
         Excess of a joint over its limits [rad].
     slide : float
-        Foot skate (`experiments.results.soles`) [m].
+        Foot skate (`experiments.results.measures.soles`) [m].
     penetration : float
         Depth of the body below the floor [m].
     ballistic : float

@@ -22,8 +22,8 @@ from experiments.paper_figures.sources import (
     ticks,
 )
 from experiments.paper_figures.space import arrows, path, workspace
-from experiments.results.figures import PALE_TUBE
 from experiments.results.folder import config_of
+from experiments.results.pages.figures import PALE_TUBE
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -21,7 +21,7 @@ from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
 from controllers.state import VELOCITY, Array
 from experiments.config.words import run_config
-from experiments.results.figures import STYLE
+from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
 from experiments.setups.parts.governor import speeds_along
 from experiments.setups.session import Session

@@ -23,7 +23,7 @@ from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle
 from experiments.certify.crossing_simulation import simulated_course
-from experiments.results.figures import STYLE
+from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
 

@@ -181,7 +181,7 @@ def test_no_command_line_ends_in_a_traceback(
 ) -> None:
     """Random options with random values: what runs is of one tick, without a figure and a page."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.results.report_of.write_report_of", lambda folder: None)
+    monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)
     for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify", "arm"):
         monkeypatch.setattr(command_class(name), "__call__", lambda self: 0)  # what is typed is read, and no more
     chance = random.Random(seed)

@@ -10,9 +10,9 @@ from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
 from experiments.live.session.engine import Engine, take_session
 from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
-from experiments.results.measures import summarise
-from experiments.results.stretch_summary import stretch_summary
-from experiments.results.summary_parts import SpeedSummary
+from experiments.results.measures.run_measures import summarise
+from experiments.results.measures.stretch_summary import stretch_summary
+from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
 from experiments.setups.default_animation import default_poses
 from sim.errors import SimError

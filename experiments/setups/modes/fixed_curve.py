@@ -12,8 +12,8 @@ from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
 from experiments.config.run_config import RunConfig
-from experiments.results.measures import trace_summary
-from experiments.results.summary import RunSummary
+from experiments.results.measures.run_measures import trace_summary
+from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import tank_for
 from experiments.setups.parts.hands import handled, resolved_user, turning_remark, user_hand
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts

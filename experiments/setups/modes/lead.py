@@ -22,8 +22,8 @@ from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.led_balance import balanced_on_ground, led_gains
-from experiments.results.lead_measures import lead_summary
-from experiments.results.summary import RunSummary
+from experiments.results.measures.lead_measures import lead_summary
+from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.clips import BLINK, load_clips
 from experiments.setups.parts.hands import participant

@@ -15,9 +15,9 @@ from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.modes import Stretch, StretchThenFollow
 from experiments.config.run_config import Replay, RunConfig, User
-from experiments.results.stretch_measures import editing_summary, performance_summary
-from experiments.results.stretch_summary import stretch_summary
-from experiments.results.summary import RunSummary
+from experiments.results.measures.stretch_measures import editing_summary, performance_summary
+from experiments.results.measures.stretch_summary import stretch_summary
+from experiments.results.measures.summary import RunSummary
 from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
 from experiments.setups.parts.budget import SPAN, fastest, tank_for

@@ -16,7 +16,7 @@ from controllers.state import Array
 from controllers.walking.walking import Walking
 from experiments.config.modes import Rivers
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
-from experiments.results.summary import RunSummary
+from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.expression import expressive_figure
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig

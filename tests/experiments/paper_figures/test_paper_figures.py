@@ -55,7 +55,7 @@ def test_all_eight_are_drawn_from_their_runs_as_pdf_and_png(tmp_path: Path, monk
         pytest.skip(str(error))
     monkeypatch.setattr("experiments.paper_figures.draw.DPI", 60)
     # Faster: nobody looks at the pages of these runs, and their figures are only shown.
-    monkeypatch.setattr("experiments.results.report_of.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.results.pages.report_of.write_report", lambda *_: None)
     shown = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
     monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: shown)
     files = draw_all(tmp_path, time.perf_counter())

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from controllers.state import Array
-from experiments.results.summary_parts import FigureSummary
+from experiments.results.measures.summary_parts import FigureSummary
 from models.humanoid.skeleton import N_TANGENT
 from sim.body.falls import UP
 from sim.body.residual import SUPPORTS, ResidualMeasure

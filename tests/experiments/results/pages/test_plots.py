@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.results.plots import POINTS, plots_html
+from experiments.results.pages.plots import POINTS, plots_html
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 

@@ -15,8 +15,8 @@ from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
-from experiments.results.lead_measures import LeadSummary, _Retrace, support_at
-from experiments.results.soles import Soles
+from experiments.results.measures.lead_measures import LeadSummary, _Retrace, support_at
+from experiments.results.measures.soles import Soles
 from experiments.setups.modes.lead import (
     gait_remark,
     lead_parts,

@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 
 from experiments.files.html_page import html_page, image
-from experiments.results.plots import plots_html
+from experiments.results.pages.plots import plots_html
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER

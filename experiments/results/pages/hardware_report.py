@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from experiments.results.figures import AXES, POINTS, STYLE
 from experiments.results.folder import FIGURES, REPORT
+from experiments.results.pages.figures import AXES, POINTS, STYLE
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.results.blocks import ROWS
+from experiments.results.measures.blocks import ROWS
 from sim.recording.recording import Recording
 from sim.reference.transition import DWELL
 

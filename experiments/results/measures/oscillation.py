@@ -18,7 +18,7 @@ import numpy as np
 
 from controllers.safety.oscillation import OscillationDetector, shaken
 from controllers.state import Array, Mask
-from experiments.results.blocks import BLOCK_ROWS
+from experiments.results.measures.blocks import BLOCK_ROWS
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 

@@ -12,10 +12,10 @@ from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE,
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
 from experiments.config.words import run_config
-from experiments.results import stretch_measures
-from experiments.results.phases import EditingSummary, PerformanceSummary, PressSummary
-from experiments.results.stretch_measures import press_summaries
-from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
+from experiments.results.measures import stretch_measures
+from experiments.results.measures.phases import EditingSummary, PerformanceSummary, PressSummary
+from experiments.results.measures.stretch_measures import press_summaries
+from experiments.results.measures.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
 from experiments.setups.modes.stretch import stretch_grabs
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.hands import edited_until

@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from experiments.results.smoothness import CUTOFF, RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
+from experiments.results.measures.smoothness import (
+    CUTOFF,
+    RATE,
+    log_dimensionless_jerk,
+    spectral_arc_length,
+    speed_profile,
+)
 
 
 def reach(seconds: float, rate: float = 100.0, way: float = 1.0) -> np.ndarray:

@@ -4,8 +4,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from experiments.results.figures import STYLE
-from experiments.results.lead_figure import lead_figure
+from experiments.results.pages.figures import STYLE
+from experiments.results.pages.lead_figure import lead_figure
 from models.humanoid.skeleton import rest_pose
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.results import changes
-from experiments.results.changes import RiverChange, river_changes
+from experiments.results.measures import changes
+from experiments.results.measures.changes import RiverChange, river_changes
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import cast
 
 from experiments.files.curve_files import CURVE_FILE
-from experiments.results.figures import draw_figures
 from experiments.results.folder import FIGURES, RECORDING, REPORT, SUMMARY, world_of
-from experiments.results.hardware_report import write_hardware_report
-from experiments.results.lead_figure import draw_lead
-from experiments.results.report import write_report
-from experiments.results.stretch_figure import draw_stretch
+from experiments.results.pages.figures import draw_figures
+from experiments.results.pages.hardware_report import write_hardware_report
+from experiments.results.pages.lead_figure import draw_lead
+from experiments.results.pages.report import write_report
+from experiments.results.pages.stretch_figure import draw_stretch
 from sim.recording.recording import Recording
 
 

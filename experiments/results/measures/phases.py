@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
+from experiments.results.measures.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
 
 Doing = Literal["held", "pushed", "undo", "redo", "nothing"]
 

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from experiments.results.changes import RiverChange
-from experiments.results.lead_measures import LeadSummary
-from experiments.results.oscillation import OscillationSummary
-from experiments.results.phases import EditingSummary, PerformanceSummary
-from experiments.results.stretch_summary import StretchSummary
-from experiments.results.summary_parts import (
+from experiments.results.measures.changes import RiverChange
+from experiments.results.measures.lead_measures import LeadSummary
+from experiments.results.measures.oscillation import OscillationSummary
+from experiments.results.measures.phases import EditingSummary, PerformanceSummary
+from experiments.results.measures.stretch_summary import StretchSummary
+from experiments.results.measures.summary_parts import (
     AnimationSummary,
     FigureSummary,
     PathSummary,

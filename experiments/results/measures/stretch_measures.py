@@ -8,9 +8,9 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
 from controllers.state import Array
-from experiments.results.blocks import ROWS
-from experiments.results.measures import Span, measured
-from experiments.results.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
+from experiments.results.measures.blocks import ROWS
+from experiments.results.measures.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
+from experiments.results.measures.run_measures import Span, measured
 from sim.recording.recording import Channel, Recording
 
 _CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")

@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.results.pose_distance import geodesic_distance, seen_distance, segment_places
+from experiments.results.measures.pose_distance import geodesic_distance, seen_distance, segment_places
 from models.humanoid.skeleton import BODIES, N_TANGENT, figure_model, rest_pose
 
 

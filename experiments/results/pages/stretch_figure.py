@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from controllers.state import Array
 from experiments.files.curve_files import CURVE_FILE, load_curve
-from experiments.results.figures import STYLE
+from experiments.results.pages.figures import STYLE
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 

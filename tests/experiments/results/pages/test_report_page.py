@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from experiments.results import report
+from experiments.results.pages import report
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.viewer.palette import RIVERS

@@ -9,8 +9,8 @@ from controllers.state import Array, IntArray
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from controllers.walking.walker import walker_at
-from experiments.results.blocks import BLOCK_FRAMES
-from experiments.results.soles import Soles
+from experiments.results.measures.blocks import BLOCK_FRAMES
+from experiments.results.measures.soles import Soles
 from models.humanoid.skeleton import N_POSE
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from controllers.state import Array, Mask
-from experiments.results.blocks import BLOCK_FRAMES, BLOCK_ROWS
-from experiments.results.changes import river_changes
-from experiments.results.faults import fault_lines
-from experiments.results.figure_measure import FigureMeasure, MeanSquare
 from experiments.results.folder import scene_of
-from experiments.results.oscillation import oscillation_summary
-from experiments.results.soles import Soles
-from experiments.results.summary import RunSummary
-from experiments.results.summary_parts import (
+from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
+from experiments.results.measures.changes import river_changes
+from experiments.results.measures.faults import fault_lines
+from experiments.results.measures.figure_measure import FigureMeasure, MeanSquare
+from experiments.results.measures.oscillation import oscillation_summary
+from experiments.results.measures.soles import Soles
+from experiments.results.measures.summary import RunSummary
+from experiments.results.measures.summary_parts import (
     AnimationSummary,
     FigureSummary,
     PathSummary,

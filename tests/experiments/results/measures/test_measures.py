@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.results import measures
-from experiments.results.measures import summarise
-from experiments.results.summary import RunSummary
-from experiments.results.summary_parts import SpeedSummary
+from experiments.results.measures import run_measures as measures
+from experiments.results.measures.run_measures import summarise
+from experiments.results.measures.summary import RunSummary
+from experiments.results.measures.summary_parts import SpeedSummary
 from models.humanoid.skeleton import rest_pose
 from sim.body.residual import Residual
 from sim.recording.recorder import Group, Recorder

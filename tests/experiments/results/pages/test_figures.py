@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments.results import figures
-from experiments.results.changes import RiverChange
-from experiments.results.figures import (
+from experiments.results.measures.changes import RiverChange
+from experiments.results.pages import figures
+from experiments.results.pages.figures import (
     POINTS,
     STYLE,
     deviation_figure,
@@ -250,7 +250,7 @@ def test_no_display_is_needed(tmp_path):
     record(tmp_path / "run.h5").close()
     script = (
         "import sys; from pathlib import Path; from sim.recording.recording import Recording; "
-        "from experiments.results.figures import draw_figures; "
+        "from experiments.results.pages.figures import draw_figures; "
         "draw_figures(Recording(Path(sys.argv[1])), Path(sys.argv[2])); "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from controllers.state import Array, Mask
-from experiments.results.changes import river_changes
+from experiments.results.measures.changes import river_changes
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses

@@ -3,7 +3,7 @@
 import numpy as np
 
 from controllers.safety.faults import Fault, LatchedFault
-from experiments.results.blocks import ROWS
+from experiments.results.measures.blocks import ROWS
 from sim.recording.recording import Recording
 
 
