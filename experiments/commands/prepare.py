@@ -37,7 +37,7 @@ class Command:
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
         from experiments.preparation.command import prepare_file, summary
-        from models.mocap.retargeting.retarget import Hints
+        from models.mocap.retargeting.hints import Hints
 
         with working("preparing"):
             hints = Hints(self.up, self.rest_frame, self.roles)

@@ -15,7 +15,7 @@ from models.mocap.library import check_target, writing
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 from models.mocap.readers.own_bvh import write_bvh
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.hints import Hints
 
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
 
