@@ -12,6 +12,7 @@ from controllers.walking.walker import walker_at
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.soles import Soles
 from models.humanoid.skeleton import N_POSE
+from models.mocap.motion.quaternions import heading
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
 
@@ -130,9 +131,7 @@ class _Retrace:
         if len(s) == 0:
             return
         front = np.maximum.accumulate(np.concatenate(([farthest], s)))
-        w, x, y, z = poses[:, 3:7].T
-        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        rows = np.stack([s, poses[:, 0], poses[:, 1], yaw], axis=1)
+        rows = np.stack([s, poses[:, 0], poses[:, 1], heading(poses[:, 3:7])], axis=1)
         new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
         self._way = np.concatenate([self._way, rows[new]])[-_REMEMBERED:]
         for place, ahead in zip(rows, front[1:], strict=True):
