@@ -170,7 +170,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 @contextlib.contextmanager
 def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
-    page = context.Process(target=show_status, args=(config, run.status, run.told), name="page", daemon=True)
+    page = context.Process(target=show_status, args=(config, run.status, run.recorder_status), name="page", daemon=True)
     page.start()
     try:
         yield
