@@ -6,9 +6,9 @@ from typing import Any
 import viser
 
 from experiments.config.modes import StretchThenFollow
+from experiments.live.panels.acts import Acts
 from experiments.live.session.desk import REMEMBERED, Desk
 
-Acts = Callable[[Callable[[Any], None]], Callable[[Any], None]]
 PACES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import viser
 
-from experiments.live.panels.clock_panel import Acts
+from experiments.live.panels.acts import Acts
 from experiments.live.session.desk import Desk
 from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import Gain, gains_of
