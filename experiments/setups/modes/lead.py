@@ -10,7 +10,7 @@ from controllers.easing import cubic_steps
 from controllers.errors import ParameterError
 from controllers.fields.leading import Leading
 from controllers.haptic_map.led import Led
-from controllers.legs.grounded import runs
+from controllers.legs.cyclic_runs import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
 from controllers.safety.limiter import ForceLimiter
