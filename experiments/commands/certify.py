@@ -15,8 +15,8 @@ from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
 from experiments.config.words import Options, RunOptions, config_of_options
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import tyro
 
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 
 
 @dataclass(frozen=True)

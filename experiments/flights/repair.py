@@ -11,7 +11,7 @@ from controllers.certificates.flight.repair import RepairPlan, RepairTask, repai
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
-from experiments.flights.conserved import with_constant_momentum
+from experiments.flights.conserved_momentum import with_constant_momentum
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body

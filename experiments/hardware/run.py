@@ -15,7 +15,7 @@ from controllers.safety.gate import Gate
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compile_once
-from experiments.console.saying import say
+from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.attend import attend

@@ -14,8 +14,8 @@ from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compile_once
-from experiments.console.foresight import SIMULATING, check_length, foreseen
-from experiments.console.working import keep_seconds, simulating
+from experiments.console.estimates import SIMULATING, check_length, foreseen
+from experiments.console.progress import keep_seconds, simulating
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
 from experiments.results.folder import (

@@ -12,8 +12,8 @@ from controllers.curves.trajectory import Trajectory
 from experiments.config.part import to_dict
 from experiments.config.run_config import ArmConfig
 from experiments.console.compiling import compile_once
-from experiments.console.foresight import check_length
-from experiments.console.working import simulating
+from experiments.console.estimates import check_length
+from experiments.console.progress import simulating
 from experiments.files.json_text import json_text
 from experiments.results.folder import RECORDING, REPORT, SUMMARY, check_folder, check_holds, claimed
 from experiments.results.measures.arm_summary import ArmSummary, arm_summary

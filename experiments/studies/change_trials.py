@@ -17,7 +17,7 @@ from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TR
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import Array
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.fitting.rests import with_rests
+from experiments.fitting.rest_phases import with_rests
 from experiments.results.measures.soles import Soles
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips

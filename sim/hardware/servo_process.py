@@ -28,10 +28,10 @@ from sim.compilation.memory_access import items
 from sim.compilation.sequence_lock import read_whole, write_whole
 from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
+from sim.hardware.duration_histogram import Quantiles, Spread, count_time
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers, append_row
-from sim.hardware.spread import Quantiles, Spread, count_time
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end

@@ -249,15 +249,15 @@ def test_two_runs_do_not_write_into_one_folder(run: Path, capsys: pytest.Capture
 
 
 def test_a_run_of_a_day_says_first_what_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.console import foresight
+    from experiments.console import estimates
     from sim.recording.recorder import Group
 
-    monkeypatch.setattr(foresight, "expected_seconds", lambda what: 0.25)
+    monkeypatch.setattr(estimates, "expected_seconds", lambda what: 0.25)
     groups = {"ticks": Group(1000.0, {"x": (100,)})}
-    said = foresight.foreseen(tmp_path, 86400.0 / 24, groups)
+    said = estimates.foreseen(tmp_path, 86400.0 / 24, groups)
     assert said is not None
     assert said.startswith("3600 s of simulated time take about 15 minutes at the pace of the last run, and 2.88 GB of")
-    assert foresight.foreseen(tmp_path, 10.0, groups) is None
+    assert estimates.foreseen(tmp_path, 10.0, groups) is None
 
 
 def test_a_certificate_of_something_else_is_not_replaced_unasked(

@@ -14,7 +14,7 @@ from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
 from experiments.config.words import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.fitting.rests import with_rests
+from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.verdict import Verdict
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips

@@ -12,7 +12,7 @@ from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TR
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.fitting.balance import nearest_supported
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.fitting.rests import with_rests
+from experiments.fitting.rest_phases import with_rests
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
 from experiments.studies.change_trials import (

@@ -14,7 +14,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
 from controllers.state import Array
-from experiments.files.kept import kept_array
+from experiments.files.array_cache import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder

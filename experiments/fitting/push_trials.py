@@ -3,7 +3,7 @@
 Curves lie some 10 mm apart, and 2.5 N push a hand by 8: at any moment of the lap, not only where motions agree, and
 within 0.15 s. Where the figure does not follow the whole map, or feet skate on it, its legs and trunk stay with the
 curve's own clip, and it carries as large a share of the others' arms as it can, as on the cylinder
-(`experiments.fitting.carried`).
+(`experiments.fitting.leg_choice`).
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
-from experiments.fitting.carried import EVERY, SHARES, WELL, is_sound, push_profile
+from experiments.fitting.leg_choice import EVERY, SHARES, WELL, is_sound, push_profile
 from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses

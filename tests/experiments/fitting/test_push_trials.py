@@ -10,8 +10,8 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting import pushed_off
-from experiments.fitting.alike import arms
+from experiments.fitting import push_trials
+from experiments.fitting.similarity import arms
 from experiments.fitting.verdict import Verdict
 from experiments.lifting.lift import lift_clips
 from experiments.setups.setups import map_parts
@@ -27,9 +27,9 @@ def lifted() -> Lifted:
 
 def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
-    shown = pushed_off.toured(lifted, curve, True).poses
-    monkeypatch.setattr(pushed_off, "_PUSHED", 0.0)
-    alone = pushed_off.toured(lifted, curve, True).poses
+    shown = push_trials.toured(lifted, curve, True).poses
+    monkeypatch.setattr(push_trials, "_PUSHED", 0.0)
+    alone = push_trials.toured(lifted, curve, True).poses
     apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
     times = np.arange(len(shown)) / 120.0
     assert apart[times < 1.69].max() < 1e-9
@@ -40,7 +40,7 @@ def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, mo
 def test_a_hand_whose_field_does_not_keep_its_pace_is_late_outside_and_early_inside(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    late = np.arange(360) / 120.0 - pushed_off._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    late = np.arange(360) / 120.0 - push_trials._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
     assert np.abs(late[:61]).max() < 1e-12
     # On radii of 40 to 60 mm.
     assert 8.0 / 68.0 < late[180] < 8.0 / 48.0
@@ -79,20 +79,20 @@ def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it
         part = show()
         return verdicts["whole" if part.legs_of is None else part.share]
 
-    monkeypatch.setattr(pushed_off, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(pushed_off, "tried", tried)
-    monkeypatch.setattr(pushed_off, "is_sound", lambda *_: True)
-    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
+    monkeypatch.setattr(push_trials, "tried", tried)
+    monkeypatch.setattr(push_trials, "is_sound", lambda *_: True)
+    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, told) == (legs, share, said)
 
 
 def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_though_it_would_bear_it(
     lifted: Lifted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pushed_off, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(pushed_off, "tried", lambda *_: Verdict(0.01, np.inf))
-    monkeypatch.setattr(pushed_off, "is_sound", lambda *_: False)
-    part, told = pushed_off.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
+    monkeypatch.setattr(push_trials, "tried", lambda *_: Verdict(0.01, np.inf))
+    monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
+    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
     assert "feet skate" in told[0]
 
@@ -101,7 +101,7 @@ def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lift
     curve = lifted.curve(1)
     kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
     alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
-    pushed, own = (pushed_off.toured(part, curve, True).poses for part in (kept, alone))
+    pushed, own = (push_trials.toured(part, curve, True).poses for part in (kept, alone))
     apart = np.abs(pose_difference(pushed, own))
     upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
     assert apart[:, upper].max() > 0.01

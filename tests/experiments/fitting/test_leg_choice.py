@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from experiments.fitting import carried as rule
-from experiments.fitting.alike import arms
-from experiments.fitting.carried import carried, sound, toured, verdict_on
+from experiments.fitting import leg_choice as rule
 from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.leg_choice import carried, sound, toured, verdict_on
+from experiments.fitting.similarity import arms
 from experiments.fitting.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded

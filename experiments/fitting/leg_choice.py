@@ -19,8 +19,8 @@ from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
-from experiments.files.kept import kept_array
-from experiments.fitting.alike import SKATES, motion_of
+from experiments.files.array_cache import kept_array
+from experiments.fitting.similarity import SKATES, motion_of
 from experiments.fitting.verdict import BEARABLE, FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges

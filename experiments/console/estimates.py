@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers.errors import ParameterError
-from experiments.console.working import expected_seconds
+from experiments.console.progress import expected_seconds
 from sim.recording.recorder import MARGIN, Group
 
 SIMULATING = "a simulated second"
