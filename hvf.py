@@ -14,13 +14,13 @@ The public interface: it re-exports the parts of a simulation and what can be do
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
-from controllers.fields.algebra import Weight
+from controllers.fields.algebra.law import Law
+from controllers.fields.algebra.weights import Weight
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.law import Law
-from controllers.fields.own_law import law
+from controllers.fields.own.own_law import law
 from controllers.fields.river import River
 from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.haptic_map.base import HapticMap

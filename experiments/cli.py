@@ -1,6 +1,6 @@
 """The ``hvf`` command: haptic vector fields from the command line."""
 
-from experiments.console import started  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
+from experiments.console import startup  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
 
 # isort: split
 

@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from experiments.console import started  # noqa: F401 - before NumPy is imported
+from experiments.console import startup  # noqa: F401 - before NumPy is imported
 
 # isort: split
 from hypothesis import settings

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from controllers.fields.law import Law
+from controllers.fields.algebra.law import Law
 from controllers.safety.energy_tank import EnergyTank
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session

@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.law import Law, Program
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.river import River
 from controllers.state import Array
 

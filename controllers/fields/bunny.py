@@ -9,9 +9,9 @@ from numba import njit
 from controllers.checks import checked, one_of
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
+from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import leave_trace
-from controllers.fields.law import Law, Program
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, LONGEST_STEP, Array
 
 

@@ -13,11 +13,11 @@ from numba import njit
 from controllers.checks import checked, one_of
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
-from controllers.fields.law import Law, Program
 from controllers.fields.river import River, river_flow
-from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
 from controllers.work_array import work_array
 

@@ -9,9 +9,9 @@ from numba import njit
 from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
-from controllers.fields.instructions import leave_trace
-from controllers.fields.law import Law, Program
-from controllers.fields.window import window
+from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
 

@@ -11,9 +11,9 @@ from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
-from controllers.fields.instructions import leave_trace
-from controllers.fields.law import Law, Program
-from controllers.fields.window import window
+from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
 _SPEEDS = 3  # offset of the pairs of speeds, which follow `GovernorGains`

@@ -12,11 +12,11 @@ from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
 from controllers.fields.admissible import admissible_speeds
+from controllers.fields.algebra.instructions import TRACE_RIVER, leave_trace
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import TRACE_RIVER, leave_trace
-from controllers.fields.law import Law, Program
-from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 from controllers.work_array import work_array
 

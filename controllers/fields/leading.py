@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import checked
-from controllers.fields.instructions import TRACE_SIZE, leave_place
-from controllers.fields.law import Law, Program
-from controllers.fields.walker_feed import WalkerFeed
+from controllers.fields.algebra.instructions import TRACE_SIZE, leave_place
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.walker_feed import WalkerFeed
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 from controllers.walking.walking import FOLLOWED, Walking, followed_at
 

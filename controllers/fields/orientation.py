@@ -10,9 +10,9 @@ from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import leave_trace
-from controllers.fields.law import Law, Program
-from controllers.fields.window import window
+from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.rotations import logarithm, multiply
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array
 

@@ -14,9 +14,9 @@ from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.admissible import checked_speeds
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.window import window
 from controllers.fields.follow import Follow
-from controllers.fields.law import Law, Program
-from controllers.fields.window import window
 from controllers.state import Array
 
 __all__ = ["Course", "River", "integrate", "settling_time", "window"]

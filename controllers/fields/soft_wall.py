@@ -10,7 +10,7 @@ with U'(e) = 0 for e < 0, k e²/2m for e up to m and k (e − m/2) beyond: a spr
 the limit itself. The first part is conservative: −∇(P∘h) returns the energy that it stored. The second is dissipative,
 with power −Σ d (|ω_j| − ω_max)_+ |ω_j|.
 
-h and h_* at the stylus are written to the law's memory before it is evaluated (`controllers.fields.map_feed`).
+h and h_* at the stylus are written to the law's memory before it is evaluated (`controllers.fields.algebra.map_feed`).
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from numba import njit
 
 from controllers.checks import checked
 from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.law import Law, MapFeed, Program
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.law import Law, MapFeed, Program
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.rotations import logarithm, rotation_vector_rate
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array

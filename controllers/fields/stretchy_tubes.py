@@ -26,9 +26,9 @@ from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import TRACE_SIZE, leave_trace
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import Follow, FollowGains, follow_wrench
-from controllers.fields.instructions import TRACE_SIZE, leave_trace
-from controllers.fields.law import Law, Program
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
 
 CLICK_DISTANCE = 1e-3  # [m] a press during which the stylus moves less than this is a click, not an edit

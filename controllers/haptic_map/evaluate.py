@@ -12,7 +12,7 @@ from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express
 from controllers.haptic_map.led import LED, led_map
-from controllers.haptic_map.lifted import LIFTED, lifted_map
+from controllers.haptic_map.lifted_kernel import LIFTED, lifted_map
 from controllers.haptic_map.own_map import OWN, own_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map

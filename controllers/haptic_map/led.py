@@ -22,7 +22,8 @@ from numba import njit
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, KernelMap
-from controllers.legs.grounded import grounded, hastened, runs
+from controllers.legs.cyclic_runs import runs
+from controllers.legs.grounded import grounded, hastened
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends

@@ -4,17 +4,8 @@ The tool's pose is the stylus's, displaced, scaled and saturated at the edge of 
 
 .. math:: p_T = p_0 + \kappa\, f(p_H), \qquad R_T = \exp f(\log R_H)\; R_0
 
-The joints follow by closed-form inverse kinematics of a spherical shoulder (axes z, y, z), an elbow (y) and a spherical
-wrist (z, y, z). With x the vector from shoulder to wrist, of length D, azimuth a and angle e from the vertical, and
-l_1, l_2 the lengths of upper arm and forearm,
-
-.. math:: \cos q_4 = \frac{D^2 - l_1^2 - l_2^2}{2 l_1 l_2}, \quad
-          \beta = \operatorname{atan2}(l_2 \sin q_4,\, l_1 + l_2 \cos q_4), \quad
-          R_{03} = R_z(a)\,R_y(e)\,R_z(\psi)\,R_y(-\beta)
-
-and the angles of shoulder and wrist are those of R_03 and R_04ᵀ R_T. The redundant degree of freedom is the arm angle ψ
-(Kreutz-Delgado, Long & Seraji 1992), the turn of the elbow about x away from the vertical plane; it is kept constant,
-so that a closed path of the tool is a closed path of the joints. h_* differentiates the same steps.
+The joints follow by closed-form inverse kinematics (`arm_kinematics`) at a constant arm angle, so that a closed path of
+the tool is a closed path of the joints. h_* differentiates the same steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,8 +15,9 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.errors import ParameterError
+from controllers.haptic_map.arm_kinematics import arm_rates, bend_arm
 from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, KernelMap
-from controllers.motion.vectors import Quaternion, Vector, cross, product, turned, turned_back
+from controllers.motion.vectors import Vector, cross, product, turned
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import saturate_vector
 from controllers.state import Array
@@ -39,35 +31,20 @@ _LEAST_BEND = np.radians(8.0)  # least distance from the singularities of should
 
 
 @njit
-def _about_y(angle: float) -> Quaternion:
-    return np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0
+def _led_turning(stylus: Array, turn: Array, turn_slope: Array, axis: int) -> Vector:
+    """Angular velocity of the tool for a stylus that turns about an axis of H.
 
-
-@njit
-def _about_z(angle: float) -> Quaternion:
-    return np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
-
-
-@njit
-def _wrapped(angle: float) -> float:
-    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-
-
-@njit
-def _zyz(q: Quaternion, sign: float) -> Vector:
-    """Angles a, b, c of R_z(a) R_y(b) R_z(c), with b of a given sign; at b = 0 only a + c is defined."""
-    w, x, y, z = q
-    total, difference = np.arctan2(z, w), np.arctan2(-sign * x, sign * y)
-    b = 2.0 * np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
-    return _wrapped(total + difference), sign * b, _wrapped(total - difference)
-
-
-@njit
-def _zyz_rates(a: float, b: float, omega: Vector) -> Vector:
-    """Rates of the three angles for an angular velocity in the fixed frame of the first rotation."""
-    sine, cosine = np.sin(a), np.cos(a)
-    rate_c = (cosine * omega[0] + sine * omega[1]) / np.copysign(max(abs(np.sin(b)), 1e-9), b)
-    return omega[2] - np.cos(b) * rate_c, cosine * omega[1] - sine * omega[0], rate_c
+    `stylus` and `turn` are the rotation vectors of the stylus before and after saturation, `turn_slope` its derivative.
+    """
+    unit = 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
+    # Angular velocities are in the fixed frame here, not the local one, hence the minus signs.
+    rate = rotation_vector_rate(-stylus[0], -stylus[1], -stylus[2], unit[0], unit[1], unit[2])
+    led_rate = (
+        turn_slope[0, 0] * rate[0] + turn_slope[0, 1] * rate[1] + turn_slope[0, 2] * rate[2],
+        turn_slope[1, 0] * rate[0] + turn_slope[1, 1] * rate[1] + turn_slope[1, 2] * rate[2],
+        turn_slope[2, 0] * rate[0] + turn_slope[2, 1] * rate[1] + turn_slope[2, 2] * rate[2],
+    )
+    return angular_velocity(-turn[0], -turn[1], -turn[2], led_rate[0], led_rate[1], led_rate[2])
 
 
 @njit
@@ -83,70 +60,21 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     home = params[_ORIENTATION], params[_ORIENTATION + 1], params[_ORIENTATION + 2], params[_ORIENTATION + 3]
     tool = product(led, home)
     base, upper, fore, hand = params[_LENGTHS], params[_LENGTHS + 1], params[_LENGTHS + 2], params[_LENGTHS + 3]
-    lever = turned(tool, (0.0, 0.0, hand))
-
-    scale = params[_SCALE]
-    px = params[_HOME] + scale * place[0] - lever[0]
-    py = params[_HOME + 1] + scale * place[1] - lever[1]
-    pz = params[_HOME + 2] + scale * place[2] - lever[2] - base
-    flat2 = px * px + py * py
-    flat, square = np.sqrt(flat2), flat2 + pz * pz
-    azimuth, elevation = np.arctan2(py, px), np.arctan2(flat, pz)
-    cosine = (square - upper * upper - fore * fore) / (2.0 * upper * fore)
-    # Out of reach the arm is stretched straight; `RobotArm` rejects a domain where that happens.
-    cosine = min(1.0, max(-1.0, cosine))
-    sine = np.sqrt(1.0 - cosine * cosine)
-    elbow = np.arctan2(sine, cosine)
-    beta = np.arctan2(fore * sine, upper + fore * cosine)
-    to_wrist = product(_about_z(azimuth), _about_y(elevation))
-    plane = product(to_wrist, _about_z(params[_ARM_ANGLE]))
-    shoulder = product(plane, _about_y(-beta))
-    arm = product(shoulder, _about_y(elbow))
-    wrist = product((arm[0], -arm[1], -arm[2], -arm[3]), tool)
-    pose[0], pose[1], pose[2] = _zyz(shoulder, 1.0)
-    pose[3] = elbow
-    pose[4], pose[5], pose[6] = _zyz(wrist, -1.0)
-
-    y_elevation, y_beta = turned(_about_z(azimuth), (0.0, 1.0, 0.0)), turned(plane, (0.0, 1.0, 0.0))
-    y_elbow = turned(shoulder, (0.0, 1.0, 0.0))
+    lever, scale = turned(tool, (0.0, 0.0, hand)), params[_SCALE]
+    wrist = (
+        params[_HOME] + scale * place[0] - lever[0],
+        params[_HOME + 1] + scale * place[1] - lever[1],
+        params[_HOME + 2] + scale * place[2] - lever[2] - base,
+    )
+    posture = bend_arm(wrist, tool, upper, fore, params[_ARM_ANGLE], pose)
     for j in range(STYLUS_TANGENT if jacobian.shape[0] > 0 else 0):
-        v, w_tool = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if j < 3:
             v = scale * place_slope[0, j], scale * place_slope[1, j], scale * place_slope[2, j]
+            arm_rates(posture, pose, v, (0.0, 0.0, 0.0), jacobian[:, j])
         else:
-            unit = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
-            # Angular velocities are in the fixed frame here, not the local one, hence the minus signs.
-            rate = rotation_vector_rate(-stylus[0], -stylus[1], -stylus[2], unit[0], unit[1], unit[2])
-            led_rate = (
-                turn_slope[0, 0] * rate[0] + turn_slope[0, 1] * rate[1] + turn_slope[0, 2] * rate[2],
-                turn_slope[1, 0] * rate[0] + turn_slope[1, 1] * rate[1] + turn_slope[1, 2] * rate[2],
-                turn_slope[2, 0] * rate[0] + turn_slope[2, 1] * rate[1] + turn_slope[2, 2] * rate[2],
-            )
-            w_tool = angular_velocity(-turn[0], -turn[1], -turn[2], led_rate[0], led_rate[1], led_rate[2])
-            swing = cross(w_tool, lever)
-            v = -swing[0], -swing[1], -swing[2]
-        rate_azimuth = (px * v[1] - py * v[0]) / flat2
-        rate_flat = (px * v[0] + py * v[1]) / flat
-        rate_elevation = (pz * rate_flat - flat * v[2]) / square
-        rate_cosine = (px * v[0] + py * v[1] + pz * v[2]) / (upper * fore)
-        rate_elbow = -rate_cosine / max(sine, 1e-9)
-        # β = atan2(s, c) with s² + c² = D²: β' = (c s' − s c')/D².
-        along = upper + fore * cosine
-        rate_beta = (along * fore * cosine * rate_elbow - fore * sine * fore * rate_cosine) / square
-        w_shoulder = (
-            rate_elevation * y_elevation[0] - rate_beta * y_beta[0],
-            rate_elevation * y_elevation[1] - rate_beta * y_beta[1],
-            rate_azimuth + rate_elevation * y_elevation[2] - rate_beta * y_beta[2],
-        )
-        w_wrist = (
-            w_tool[0] - w_shoulder[0] - rate_elbow * y_elbow[0],
-            w_tool[1] - w_shoulder[1] - rate_elbow * y_elbow[1],
-            w_tool[2] - w_shoulder[2] - rate_elbow * y_elbow[2],
-        )
-        jacobian[0, j], jacobian[1, j], jacobian[2, j] = _zyz_rates(pose[0], pose[1], w_shoulder)
-        jacobian[3, j] = rate_elbow
-        in_arm = turned_back(arm, w_wrist)
-        jacobian[4, j], jacobian[5, j], jacobian[6, j] = _zyz_rates(pose[4], pose[5], in_arm)
+            omega = _led_turning(stylus, turn, turn_slope, j - 3)
+            swing = cross(omega, lever)
+            arm_rates(posture, pose, (-swing[0], -swing[1], -swing[2]), omega, jacobian[:, j])
 
 
 class RobotArm(KernelMap):

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
 
 from controllers.curves.splines import round_lap
+from controllers.legs.cyclic_runs import runs
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import extension, shortfall
 from controllers.motion.channels import signed_like
@@ -26,17 +27,6 @@ from controllers.state import Array, Mask
 # flight lowers the pelvis by 7 cm more (docs/validation/led-figures.md).
 _AFTER, _BEFORE = 0.5, 0.6
 _LOWEST = 0.3  # [m] largest lowering of the root; a leap that needs more is no step: CMU 02_03's needs 0.26, SNU's 0.83
-
-
-def runs(mask: Mask) -> list[tuple[int, int]]:
-    """First sample of each run of True in a cyclic mask, and the first sample after it, which may exceed the length.
-
-    A mask that is constant has no runs.
-    """
-    n = len(mask)
-    first = np.flatnonzero(mask & ~np.roll(mask, 1))
-    last = np.flatnonzero(mask & ~np.roll(mask, -1)) + 1
-    return [(int(start), int(np.append(last, last + n)[np.append(last, last + n) > start][0])) for start in first]
 
 
 def grounded(

@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 
 from controllers.curves.splines import round_lap
 from controllers.easing import smooth_steps
+from controllers.legs.cyclic_runs import runs
 from controllers.legs.footfalls import CATCH_UP, gap
-from controllers.legs.grounded import runs
 from controllers.legs.limb_ends import SHARP, contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import END, Limb
 from controllers.legs.reaching import reached, shortfall

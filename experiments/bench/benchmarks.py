@@ -15,8 +15,8 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.map_feed import feed_maps, feed_rows
-from controllers.fields.program import Compiled, evaluate
+from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, HandState, IntArray
@@ -32,9 +32,9 @@ from experiments.config.modes import JointWalls
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.walls import figure_walls
 from experiments.setups.session import Session
-from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names

@@ -6,10 +6,10 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.law import Program
-from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
 from controllers.state import Array, HandState

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import viser
 
-from experiments.live.messages import SLICE_SIDE
+from experiments.live.session.messages import SLICE_SIDE
 from experiments.setups.session import Session
 from models.world.scene import P_WH
 from sim.viewer.courses import courses

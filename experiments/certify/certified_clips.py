@@ -11,7 +11,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
 from experiments.results.folder import RECORDING, clips_of, config_of
-from experiments.results.measures import SETTLING
+from experiments.results.measures.run_measures import SETTLING
 from experiments.setups.setups import clips_for
 from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording

@@ -21,7 +21,7 @@ from experiments.config.run_config import RunConfig, phantom_of
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
 from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, left_out
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
@@ -37,7 +37,7 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach it, or there is no such map.
     """
-    from experiments.setups.pace import course_of
+    from experiments.setups.parts.pace import course_of
 
     stiffness, drag = leading_gains(config)
     return MAP_CURVES[config.map.kind](config, config.map, partial(course_of, drag=drag, stiffness=stiffness))
@@ -59,7 +59,8 @@ def _as_given(curve: Trajectory) -> Trajectory:
 
 
 def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajectory]:
-    from experiments.setups.lead import s_curve  # imported late: loads splines, which a check of gains does not need
+    # Imported late: loads splines, which a check of gains does not need.
+    from experiments.setups.modes.lead import s_curve
 
     return {"": s_curve()}
 
@@ -72,7 +73,7 @@ def _circle(
 
 def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str, Trajectory]:
     from experiments.files.map_files import Lifted, load_map
-    from experiments.setups.lifted_runs import curve_number, lifted_curve
+    from experiments.setups.modes.lifted_runs import curve_number, lifted_curve
 
     found = load_map(Path(part.file))
     if not isinstance(found, Lifted):

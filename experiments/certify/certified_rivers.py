@@ -26,8 +26,8 @@ from experiments.certify.certified_field import given_curves
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.setups.lifted_runs import lifted_river, side_by_side
-from experiments.setups.rivers import default_choice, law_of
+from experiments.setups.modes.lifted_runs import lifted_river, side_by_side
+from experiments.setups.modes.rivers import default_choice, law_of
 
 
 class Meeting(NamedTuple):

@@ -37,8 +37,8 @@ from experiments.files.device_files import linkage_of
 from experiments.files.json_text import json_text
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, left_out
-from experiments.setups.clips import load_clips
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.defaults import resolved
 from models.mocap.motion.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"

@@ -14,13 +14,13 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict, hash_of
 from controllers.errors import ControllerError
+from controllers.fields.algebra.instructions import Join
+from controllers.fields.algebra.law import Law
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
-from controllers.fields.function_law import FunctionLaw
 from controllers.fields.governor import Governor
-from controllers.fields.instructions import Join
-from controllers.fields.law import Law
 from controllers.fields.orientation import Orientation
+from controllers.fields.own.function_law import FunctionLaw
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.executed_field import seen
 from experiments.config.run_config import phantom_of

@@ -6,9 +6,9 @@ import numpy as np
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.switching.switching_search import Course, Push
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER
-from controllers.fields.program import evaluate
 from controllers.state import POSITION, Array
 from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame

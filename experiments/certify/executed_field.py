@@ -9,10 +9,10 @@ from controllers.certificates.loop.executed import Seen, looked_at
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.run_config import RunConfig
-from experiments.setups.parts import Parts
+from experiments.setups.parts.part_types import Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.mocap.motion.clip import Clip
 from sim.world.world import World

@@ -13,7 +13,7 @@ from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
 from experiments.setups.certified_law import governor_drag, left_out
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import kept_folder
 
 _LEAD = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"

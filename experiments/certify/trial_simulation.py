@@ -19,10 +19,10 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import Compiled, evaluate
+from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
 from controllers.fields.follow import Follow
-from controllers.fields.law import Program
-from controllers.fields.program import Compiled, evaluate
-from controllers.fields.walker_feed import Walkers, feed_walkers
 from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.run_config import ArmConfig
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 
 
 @dataclass(frozen=True)

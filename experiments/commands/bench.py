@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from experiments.console.saying import Json
-from experiments.console.working import working
+from experiments.console.output import Json
+from experiments.console.progress import working
 
 
 @dataclass(frozen=True)

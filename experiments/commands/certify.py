@@ -15,8 +15,8 @@ from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
 from experiments.config.words import Options, RunOptions, config_of_options
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
@@ -128,7 +128,7 @@ class Command:
         from experiments.files.certificate_files import clip_inputs, verify_certificate
 
         if self.clip is not None:
-            from experiments.setups.clips import load_clips
+            from experiments.setups.parts.clips import load_clips
 
             inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
         else:

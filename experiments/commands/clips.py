@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 
 
 @dataclass(frozen=True)

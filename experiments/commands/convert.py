@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Command:
         from experiments.export.gltf import write_gltf
         from models.mocap.library import convert
         from models.mocap.readers.own_bvh import write_bvh
-        from models.mocap.retargeting.retarget import Hints
+        from models.mocap.retargeting.hints import Hints
 
         hints, writers = Hints(self.up, self.rest_frame, self.roles), {".bvh": write_bvh, ".glb": write_gltf}
         report = convert(self.source, self.target, self.overwrite, hints, writers).report

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.console.saying import Json, say
-from experiments.console.started import STARTED
+from experiments.console.output import Json, say
+from experiments.console.startup import STARTED
 
 
 @dataclass(frozen=True)

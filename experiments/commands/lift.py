@@ -8,8 +8,8 @@ from tyro.conf import Positional
 
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.part import part, whole
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 
 
 @part

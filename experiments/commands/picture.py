@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from experiments.console.working import working
+from experiments.console.progress import working
 
 
 @dataclass(frozen=True)

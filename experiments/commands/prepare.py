@@ -6,8 +6,8 @@ from typing import Annotated
 
 import tyro
 
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Command:
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
         from experiments.preparation.command import prepare_file, summary
-        from models.mocap.retargeting.retarget import Hints
+        from models.mocap.retargeting.hints import Hints
 
         with working("preparing"):
             hints = Hints(self.up, self.rest_frame, self.roles)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from experiments.config.part import above, at_least, part
-from experiments.console.saying import Json, say
+from experiments.console.output import Json, say
 from sim.body.figure_state import CLIP_GAINS
 
 

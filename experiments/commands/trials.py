@@ -6,7 +6,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import part, whole
-from experiments.console.saying import Json
+from experiments.console.output import Json
 from experiments.trials.execution.where import Where
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 from experiments.config.part import part, whole
-from experiments.console.saying import Json, say
-from experiments.console.working import working
+from experiments.console.output import Json, say
+from experiments.console.progress import working
 
 
 @part

@@ -18,7 +18,7 @@ import numpy as np
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.sole_heights import SWINGS
 from controllers.state import Array
-from experiments.files.kept import kept_array
+from experiments.files.array_cache import kept_array
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.compilation.sources import kept_folder

@@ -13,12 +13,12 @@ import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
 from controllers.state import Array
-from experiments.console.working import working
-from experiments.files.kept import is_kept, kept_array
+from experiments.console.progress import working
+from experiments.files.array_cache import is_kept, kept_array
 from experiments.fitting.figure_legs import packed_legs
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip

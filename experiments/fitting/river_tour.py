@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_steps
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
-from experiments.console.working import working
-from experiments.files.kept import kept_array
+from experiments.console.progress import working
+from experiments.files.array_cache import kept_array
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import FLYING
 from sim.compilation.sources import kept_folder

@@ -8,11 +8,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
-from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
-from experiments.flights.conserved import with_constant_momentum
+from experiments.flights.conserved_momentum import with_constant_momentum
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
@@ -83,7 +82,7 @@ def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired
     return repaired
 
 
-def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
+def repair_clip(clip: Clip) -> Repaired:
     """The nearest motion above the floor with the same contacts whose flights conserve momentum under gravity.
 
     A clip without refuted flights that is nowhere below the floor is returned unchanged.
@@ -93,9 +92,9 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
     RepairError
         If there is no feasible motion near it.
     """
-    before, lifted = clip_ballistics(clip, judging), over_the_floor(clip)
+    before, lifted = clip_ballistics(clip), over_the_floor(clip)
     n, closed = clip.n_frames, clip.closes()
-    found, clip = before if lifted is clip else clip_ballistics(lifted, judging), lifted
+    found, clip = before if lifted is clip else clip_ballistics(lifted), lifted
     spans = [(f.fit.start, f.fit.end) for f in found.flights if f.verdict != "unknown" and f.fit.end < n]
     refuted = [f.fit for f in found.flights if f.verdict == "refuted" and f.fit.end < n]
     if not refuted:
@@ -116,7 +115,7 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
         )
     )  # fmt: skip
     done = over_the_floor(_carried_out(clip, plan, first, touched, touching.loaded))
-    return Repaired(done, before, clip_ballistics(done, judging), plan)
+    return Repaired(done, before, clip_ballistics(done), plan)
 
 
 def _carried_out(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: Mask) -> Clip:

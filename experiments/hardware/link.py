@@ -79,15 +79,15 @@ def link_now(row: Mapping[str, Array]) -> str:
 
 def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
     """Measure the link for `seconds` [s] with commands that leave the motors off."""
-    reading, told = np.zeros(READING_SIZE), driver.telemetry
+    reading, telemetry = np.zeros(READING_SIZE), driver.telemetry
     times: list[Array] = []
-    begin, first = time.monotonic(), told.copy()
+    begin, first = time.monotonic(), telemetry.copy()
     while time.monotonic() - begin < seconds:
         driver.write(np.zeros(3), False)
         if driver.read(reading, 2.0 * PERIOD):
-            times.append(told[[ROUND_TRIP, JITTER, STALENESS]])
+            times.append(telemetry[[ROUND_TRIP, JITTER, STALENESS]])
         time.sleep(0.5 * PERIOD)  # limits the rate for devices that answer without waiting
-    counts = told - first
+    counts = telemetry - first
     return Link.of(
         time.monotonic() - begin,
         (counts[READ], counts[LOST], counts[BAD]),

@@ -18,7 +18,7 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from models.world.scene import P_WH
 from sim.hardware.gated_servo import ROW_SIZE, columns
-from sim.hardware.recorder_process import TOLD_FORCE, TOLD_SIZE
+from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
@@ -36,10 +36,10 @@ def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Sessio
     return wire(replace(config, figure=replace(config.figure, kind="kinematic")), ready=ready)
 
 
-def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -> None:
+def show_status(config: RunConfig, status: SharedNumbers, recorder_status: SharedNumbers) -> None:
     """Show a run until the parent process ends; the target of a process on which no other one waits.
 
-    The force of the hand is the twin's estimate (`told`, from the recorder). The figure is the animation h(p) itself; a
+    The force of the hand is the twin's estimate (`recorder_status`). The figure is the animation h(p) itself; a
     figure that is led is not shown, as its walker is in the servo's process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -48,15 +48,15 @@ def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -
     static = session.static()
     page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH, world.kind)
     linkage, parent = shown_phantom(world.model, world.data), os.getppid()
-    row, twin = np.zeros(ROW_SIZE), np.zeros(TOLD_SIZE)
+    row, twin = np.zeros(ROW_SIZE), np.zeros(RECORDER_SIZE)
     while os.getppid() == parent:
         if status.read(row):
             tick = {name: channel[0] for name, channel in columns(row[None]).items()}
             show_angles(linkage, tuple(tick["theta"]), tuple(tick["gimbal"]))
             pose = np.zeros(0) if led else _pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
             qpos = np.concatenate([world.data.qpos, pose])
-            told.read(twin)
-            hand = twin[TOLD_FORCE : TOLD_FORCE + 3].copy()
+            recorder_status.read(twin)
+            hand = twin[RECORDER_FORCE : RECORDER_FORCE + 3].copy()
             shown = Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan))
             page.show(shown, notes_of(tick))
         time.sleep(_PAUSE)

@@ -15,7 +15,7 @@ from controllers.safety.gate import Gate
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compile_once
-from experiments.console.saying import say
+from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.attend import attend
@@ -25,7 +25,7 @@ from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_
 from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
 from sim.devices.hardware_list import check_there
@@ -170,7 +170,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 @contextlib.contextmanager
 def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
-    page = context.Process(target=show_status, args=(config, run.status, run.told), name="page", daemon=True)
+    page = context.Process(target=show_status, args=(config, run.status, run.recorder_status), name="page", daemon=True)
     page.start()
     try:
         yield
@@ -184,7 +184,8 @@ def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
-        from experiments.results.hardware_report import write_hardware_report  # imported late, as it loads matplotlib
+        # Imported late, as it loads matplotlib.
+        from experiments.results.pages.hardware_report import write_hardware_report
 
         with Recording(out / RECORDING) as recording:
             write_hardware_report(out, recording, outcome.lines())

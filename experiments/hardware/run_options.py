@@ -7,7 +7,7 @@ import tyro
 
 from experiments.config.part import above, at_least, part
 from experiments.config.words import Options
-from experiments.console.saying import Json
+from experiments.console.output import Json
 
 EMULATED = "emulated"
 

@@ -8,7 +8,7 @@ from controllers.errors import ParameterError
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.live.gate import HERE, Gate
 from experiments.live.page import Page
-from experiments.live.run_panel import FOR_EVER
+from experiments.live.panels.run_panel import FOR_EVER
 from sim.errors import SimError
 
 LEAST_TOKEN = 16  # [characters] of a given token, so that it cannot be guessed

@@ -17,17 +17,17 @@ from controllers.state import Array
 from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import cap_there
-from experiments.live.clock_panel import ClockPanel
-from experiments.live.desk import Desk
 from experiments.live.driver import Driver
-from experiments.live.gains_panel import GainsPanel
-from experiments.live.hand_keys import add_hand_keys
-from experiments.live.messages import COURSE_POINTS, SLICE_SIDE
-from experiments.live.plots import Plots
-from experiments.live.run_panel import RunPanel
-from experiments.live.status import FIRST_STEPS, status_html
-from experiments.live.takes_panel import TakesPanel
-from experiments.live.uploads_panel import UploadsPanel
+from experiments.live.panels.clock_panel import ClockPanel
+from experiments.live.panels.gains_panel import GainsPanel
+from experiments.live.panels.hand_keys import add_hand_keys
+from experiments.live.panels.plots import Plots
+from experiments.live.panels.run_panel import RunPanel
+from experiments.live.panels.status import FIRST_STEPS, status_html
+from experiments.live.panels.takes_panel import TakesPanel
+from experiments.live.panels.uploads_panel import UploadsPanel
+from experiments.live.session.desk import Desk
+from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
 from models.errors import ModelError
 from models.world.scene import P_WH, SceneConfig
 from sim.devices.driver import DriverFault

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from experiments.paper_figures.sources import MILLIMETRES, RIVERS, recording_in, ticks
 from experiments.paper_figures.space import colored_path, path, workspace
-from experiments.results.changes import river_changes
+from experiments.results.measures.changes import river_changes
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, USER

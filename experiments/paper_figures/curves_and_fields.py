@@ -11,7 +11,7 @@ from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
 from controllers.state import Array
 from experiments.config.modes import Follow
-from experiments.paper_figures.silhouettes import Silhouettes, facing
+from experiments.paper_figures.silhouettes import Silhouettes
 from experiments.paper_figures.sources import (
     CYLINDER,
     MILLIMETRES,
@@ -22,8 +22,9 @@ from experiments.paper_figures.sources import (
     ticks,
 )
 from experiments.paper_figures.space import arrows, path, workspace
-from experiments.results.figures import PALE_TUBE
 from experiments.results.folder import config_of
+from experiments.results.pages.figures import PALE_TUBE
+from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
@@ -85,7 +86,7 @@ def field_and_map(runs: Path) -> Figure:
         place = MILLIMETRES * lap[row, :2]
         away = (place - middle) / np.linalg.norm(place - middle)
         foot = middle + size * away - np.array([0.0, 0.5 * 1.75 * STATURE])
-        people.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, facing(pose) + np.pi - 0.4)
+        people.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, float(heading(pose[3:7])) + np.pi - 0.4)
         ends = np.array([place + 4.0 * away, middle + (size - 0.42 * STATURE) * away])
         ax.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
         ax.plot(*place, "o", ms=3.5, color=CURVE, zorder=5)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from controllers.state import Array
 from experiments.config.maps import Cylindrical
-from experiments.paper_figures.silhouettes import Paint, Silhouettes, facing
+from experiments.paper_figures.silhouettes import Paint, Silhouettes
 from experiments.paper_figures.sources import (
     COMPOSITE,
     CYLINDER,
@@ -22,6 +22,7 @@ from experiments.paper_figures.sources import (
 from experiments.paper_figures.space import path, workspace
 from experiments.results.folder import clips_of, config_of
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 
@@ -105,7 +106,7 @@ def _strip(ax: Axes, poses: Array, words: list[str], paint: Paint | None = None)
     """Poses side by side on a floor, all seen from the side to which the first faces, with words below."""
     people = Silhouettes()
     for k, pose in enumerate(poses):
-        azimuth = facing(pose) + np.pi - 0.5
+        azimuth = float(heading(pose[3:7])) + np.pi - 0.5
         if paint is None:
             people.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth)
         else:

@@ -16,7 +16,7 @@ from experiments.paper_figures.curves_and_fields import field_and_map, trajector
 from experiments.paper_figures.cylinder import four_motion_cylinder, red_and_blue_inputs
 from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRETCH, configs, recording_in
 from experiments.paper_figures.stretching import rendered_result, stretching
-from experiments.results.figures import STYLE
+from experiments.results.pages.figures import STYLE
 from experiments.runs.run import run
 from sim.errors import SimError
 from sim.recording.recording import Recording

@@ -83,12 +83,6 @@ class Silhouettes:
             ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=zorder))
 
 
-def facing(pose: Array) -> float:
-    """Heading of a pose's root [rad]."""
-    w, x, y, z = (float(value) for value in pose[3:7])
-    return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-
-
 def _circle() -> Array:
     angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
     return np.column_stack((np.cos(angle), np.sin(angle)))

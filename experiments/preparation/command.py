@@ -15,7 +15,7 @@ from models.mocap.library import check_target, writing
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 from models.mocap.readers.own_bvh import write_bvh
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.hints import Hints
 
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
 
@@ -127,8 +127,7 @@ def changes(made: Prepared) -> tuple[str, ...]:
         )
     lines.append(
         f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.raised:.1f} cm in height and "
-        f"{100 * change.moved:.1f} cm over the floor RMS; "
-        + made.fidelity.line()
+        f"{100 * change.moved:.1f} cm over the floor RMS; " + made.fidelity.line()
     )
     return tuple(lines)
 

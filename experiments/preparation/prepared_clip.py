@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.state import Array
-from experiments.console.working import working
-from experiments.files.kept import is_kept, kept_array
+from experiments.console.progress import working
+from experiments.files.array_cache import is_kept, kept_array
 from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
 from sim.compilation.side_by_side import side_by_side

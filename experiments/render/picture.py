@@ -13,6 +13,7 @@ from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import PlanarDisplacement
+from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
@@ -77,8 +78,7 @@ def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas:
 
 def _facing_the_camera(pose: Array, place: Array) -> PlanarDisplacement:
     """The planar displacement that moves a pose to a place on the floor, facing +x."""
-    w, x, y, z = pose[3:7]
-    yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    yaw = float(heading(pose[3:7]))
     c, s = np.cos(-yaw), np.sin(-yaw)
     return PlanarDisplacement(
         float(place[0] - c * pose[0] + s * pose[1]), float(place[1] - s * pose[0] - c * pose[1]), -yaw

@@ -10,6 +10,7 @@ from controllers.state import Array, IntArray
 from experiments.render.shown_world import ShownWorld
 from experiments.results.folder import DEFAULT
 from models.mocap.library import load_clip
+from models.mocap.motion.quaternions import heading
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.framing import followed
@@ -107,8 +108,7 @@ def _ghost(recording: Recording, folder: Path, frames: IntArray, wanted: Ghost) 
 
 def _slow_heading(q: Array, fps: float) -> Array:
     """Averaged heading of root rotations (n, 4) [degrees]; the initial one if it turns too fast for the camera."""
-    w, x, y, z = q.T
-    turns = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    turns = np.unwrap(heading(q))
     window = int(TURN_SECONDS * fps) | 1
     padded = np.pad(turns, window // 2, mode="reflect", reflect_type="odd") if len(turns) > 1 else turns
     slow = np.convolve(padded, np.full(window, 1.0 / window), mode="valid") if len(turns) > 1 else turns

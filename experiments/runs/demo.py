@@ -2,7 +2,7 @@
 
 from experiments.config.maps import Circle
 from experiments.config.run_config import RunConfig, User
-from experiments.setups.hands import lap_pushes
+from experiments.setups.parts.hands import lap_pushes
 
 _LAP = Circle().lap
 _RELAXED = 2.2 * _LAP  # two laps: the device's friction makes them a little longer than the curve's own

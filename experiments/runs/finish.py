@@ -6,8 +6,8 @@ from rich.console import Console
 
 from experiments.console.compiling import compile_once
 from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
-from experiments.results.report_of import lines_of, write_report_of
-from experiments.results.summary_parts import SpeedSummary
+from experiments.results.measures.summary_parts import SpeedSummary
+from experiments.results.pages.report_of import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import measured, write_animations, write_summary
 from experiments.setups.wiring import wire

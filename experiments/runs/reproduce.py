@@ -12,9 +12,9 @@ from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
-from experiments.results.arm import arm_channels
 from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm
-from experiments.setups.devices import check_hand
+from experiments.runs.arm_recording import arm_channels
+from experiments.setups.parts.devices import check_hand
 from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from sim.errors import SimError

@@ -14,11 +14,10 @@ from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compile_once
-from experiments.console.foresight import SIMULATING, check_length, foreseen
-from experiments.console.working import keep_seconds, simulating
+from experiments.console.estimates import SIMULATING, check_length, foreseen
+from experiments.console.progress import keep_seconds, simulating
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
-from experiments.results.blocks import BLOCK_FRAMES
 from experiments.results.folder import (
     CONFIG,
     DEFAULT,
@@ -31,11 +30,12 @@ from experiments.results.folder import (
     claimed,
     clear_folder,
 )
-from experiments.results.measures import summarise
-from experiments.results.summary import RunSummary
-from experiments.results.summary_parts import SpeedSummary
+from experiments.results.measures.blocks import BLOCK_FRAMES
+from experiments.results.measures.run_measures import summarise
+from experiments.results.measures.summary import RunSummary
+from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.setups.default_animation import default_poses
-from experiments.setups.parts import Measuring
+from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
@@ -92,7 +92,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
-        from experiments.results.report_of import write_report_of  # matplotlib and viser: after the first tick
+        from experiments.results.pages.report_of import write_report_of  # matplotlib and viser: after the first tick
 
         write_report_of(out)
     others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())

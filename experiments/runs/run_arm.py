@@ -12,13 +12,15 @@ from controllers.curves.trajectory import Trajectory
 from experiments.config.part import to_dict
 from experiments.config.run_config import ArmConfig
 from experiments.console.compiling import compile_once
-from experiments.console.foresight import check_length
-from experiments.console.working import simulating
+from experiments.console.estimates import check_length
+from experiments.console.progress import simulating
 from experiments.files.json_text import json_text
-from experiments.results.arm import ArmSummary, arm_figure, arm_groups, arm_summary, record_arm
-from experiments.results.figures import STYLE
 from experiments.results.folder import RECORDING, REPORT, SUMMARY, check_folder, check_holds, claimed
-from experiments.results.report import write_report
+from experiments.results.measures.arm_summary import ArmSummary, arm_summary
+from experiments.results.pages.arm_figure import arm_figure
+from experiments.results.pages.figures import STYLE
+from experiments.results.pages.report import write_report
+from experiments.runs.arm_recording import arm_groups, record_arm
 from experiments.setups.robot_arm import HOME, SCALE, wire_arm
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import P_WH, ROBOT

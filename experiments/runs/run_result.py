@@ -15,7 +15,7 @@ from rich.console import Console
 from controllers.state import Array
 from experiments.files.json_text import json_text
 from experiments.results.folder import EDITED, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
-from experiments.results.summary import RunSummary
+from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations
 from experiments.setups.session import Session
@@ -112,7 +112,7 @@ class Run:
 
     def report(self) -> Path:
         """Draw page and figures of the run; returns the page."""
-        from experiments.results.report_of import write_report_of  # matplotlib takes long to import
+        from experiments.results.pages.report_of import write_report_of  # matplotlib takes long to import
 
         write_report_of(self.folder)
         return self.folder / REPORT

@@ -12,7 +12,7 @@ from rich.console import Console
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.law import Law
+from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
@@ -22,11 +22,11 @@ from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom,
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.runs.run_result import Run
-from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.devices import device_of
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
-from experiments.setups.hands import intent_of, participant
-from experiments.setups.parts import ClipMapParts, Notes, Parts
+from experiments.setups.parts.budget import SPAN, fastest, tank_for
+from experiments.setups.parts.devices import device_of
+from experiments.setups.parts.hands import intent_of, participant
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates
 from models.mocap.motion.clip import Clip

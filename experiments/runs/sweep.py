@@ -8,8 +8,8 @@ from dataclasses import replace as replaced
 from typing import Any, NamedTuple, cast
 
 from controllers.errors import ParameterError
-from controllers.fields.function_law import FunctionLaw
-from controllers.fields.law import Law, Program
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.own.function_law import FunctionLaw
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation
 

@@ -5,7 +5,7 @@ import time
 from rich.console import Console
 
 from experiments.console.compiling import compile_once
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, TrackingReport, track

@@ -10,7 +10,7 @@ from controllers.fields.bunny import felt_bunny
 from experiments.config.maps import Led, MapFile
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
-from experiments.setups.defaults import resolved, river_gains, tube_gains
+from experiments.setups.parts.defaults import resolved, river_gains, tube_gains
 
 
 class CertifiedLaw(NamedTuple):

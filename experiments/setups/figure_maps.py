@@ -26,22 +26,22 @@ from controllers.state import Array
 from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
 from experiments.config.modes import Follow, Rivers
 from experiments.config.run_config import RunConfig
-from experiments.files.kept import kept_array
+from experiments.files.array_cache import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
-from experiments.fitting.alike import arms, carries_alike, moves_alike, upper_joints
 from experiments.fitting.balance import balanced
 from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace, same
-from experiments.fitting.carried import carried
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.pushed_off import followed_map
-from experiments.fitting.rests import with_rests
+from experiments.fitting.leg_choice import carried
+from experiments.fitting.push_trials import followed_map
+from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
-from experiments.setups.hands import river_pushes
-from experiments.setups.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
-from experiments.setups.pace import course_of, reached
-from experiments.setups.parts import ClipMapParts
-from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
+from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
+from experiments.setups.modes.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
+from experiments.setups.modes.rivers import SLOWEST, default_choice, river_bundle
+from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.pace import course_of, reached
+from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder

@@ -13,8 +13,8 @@ from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, Array
 from experiments.config.run_config import ArmConfig
-from experiments.setups.budget import fastest, tank_for
-from experiments.setups.hands import lap_pushes
+from experiments.setups.parts.budget import fastest, tank_for
+from experiments.setups.parts.hands import lap_pushes
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
 from models.world.scene import PHANTOM
 from sim.body.robot import robot_state

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.law import Law
+from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
-from experiments.setups.devices import recorded_as
-from experiments.setups.parts import Parts, Settings
+from experiments.setups.parts.devices import recorded_as
+from experiments.setups.parts.part_types import Parts, Settings
 from models.humanoid.skeleton import N_POSE, standing_com
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5

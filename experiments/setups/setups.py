@@ -7,14 +7,14 @@ import mujoco
 
 from experiments.config.maps import Led, Map
 from experiments.config.run_config import RunConfig
-from experiments.setups.bunny import bunny_parts
-from experiments.setups.clips import load_clips
 from experiments.setups.figure_maps import MAP_SETUPS
-from experiments.setups.follow import follow_parts
-from experiments.setups.lead import lead_parts, led_clips, led_parts
-from experiments.setups.parts import MapParts, Parts
-from experiments.setups.rivers import rivers_parts
-from experiments.setups.stretch import stretch_parts, stretch_then_follow_parts
+from experiments.setups.modes.bunny import bunny_parts
+from experiments.setups.modes.follow import follow_parts
+from experiments.setups.modes.lead import lead_parts, led_clips, led_parts
+from experiments.setups.modes.rivers import rivers_parts
+from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.part_types import MapParts, Parts
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {

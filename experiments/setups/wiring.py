@@ -14,11 +14,11 @@ from controllers.state import STYLUS_POSE, Array, HandState
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
-from experiments.setups.defaults import resolved
-from experiments.setups.devices import DeviceOf, device_of
-from experiments.setups.eyes import POSES, with_eyes
-from experiments.setups.hands import Beginning, beginning
-from experiments.setups.parts import MapParts, Parts, Settings
+from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.devices import DeviceOf, device_of
+from experiments.setups.parts.eyes import POSES, with_eyes
+from experiments.setups.parts.hands import Beginning, beginning
+from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import rest_pose
@@ -43,7 +43,7 @@ from sim.reference.reference import (
     poses_along,
 )
 from sim.reference.reference_state import CompiledReference
-from sim.reference.settling import stood, stood_unit
+from sim.reference.settling import lower_start, lower_start_unit
 from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
 from sim.world.phantom_port import phantom_port, sense_in_motion
@@ -153,7 +153,7 @@ def check_rates(settings: Settings) -> None:
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     """Compilation units that a run needs."""
-    more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((stood_unit(),) if parts.bends else ())
+    more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((lower_start_unit(),) if parts.bends else ())
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
@@ -222,7 +222,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
-            stood(packed_legs(world.figure), poses[0])
+            lower_start(packed_legs(world.figure), poses[0])
         figure = _velocity(whole_map, argument[0], begin) if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:

@@ -22,7 +22,7 @@ from sim.errors import SimError
 
 FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
 LAP_SECONDS = 4.0  # duration of a lap of the rivers; hands are released with the curve standing still
-LEFT = 0.2  # remaining share of the slowest mode at the end of a simulation, unless that takes too long
+REMAINING = 0.2  # remaining share of the slowest mode at the end of a simulation, unless that takes too long
 LONGEST = 2000  # [ticks] longest simulation
 COUNTS = 5e-5  # [m] by which readings of a hand at rest change: one or two encoder counts
 ASSUMED = Conditions(16)
@@ -37,7 +37,7 @@ class Certified(NamedTuple):
     radius: float
 
 
-class Let(NamedTuple):
+class Release(NamedTuple):
     """Largest distance of a released hand from the curve, in the first nine tenths of the time and after them [m].
 
     Both are infinite if it went 5 cm away. With quantised encoders a hand held by friction moves by `slack` [m].
@@ -76,7 +76,7 @@ def _about(number: float, rng: np.random.Generator) -> tuple[float, float]:
     return float(number * rng.uniform(0.5, 1.0)), float(number * rng.uniform(1.0, 1.5))
 
 
-def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -> Let:
+def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -> Release:
     """Simulate a hand inside the intervals from a random state at a random phase."""
     river, device, clock = drawn.river, drawn.river.device, drawn.river.sampling
     hand = HandImpedance(*(float(rng.uniform(*getattr(drawn.hands, n))) for n in ("mass", "damping", "stiffness")))
@@ -96,13 +96,13 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
     rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
     torques = np.tile(loop.linear.weight_theta[0] @ theta, clock.whole_delay)
     state = np.concatenate([theta, rate, theta - clock.period * rate, rate, torques])
-    ticks = int(np.clip(np.log(LEFT) / np.log(drawn.radius), 200, LONGEST)) if drawn.radius < 1.0 else LONGEST
+    ticks = int(np.clip(np.log(REMAINING) / np.log(drawn.radius), 200, LONGEST)) if drawn.radius < 1.0 else LONGEST
     path = hand_path(trial, river.k_r, ticks, conditions, state)
     if len(path) < ticks:
-        return Let(np.inf, np.inf, 0.0)
+        return Release(np.inf, np.inf, 0.0)
     distance = closest_phases(drawn.still.packed(), path)[1]
     slack = COUNTS if conditions.rounded else 0.0
-    return Let(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
+    return Release(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
 
 
 def certified_trials(
@@ -120,24 +120,27 @@ def certified_trials(
         Seed of all random draws.
     """
     rng = np.random.default_rng(seed)
-    found: dict[str, list[Let]] = {"inside the assumptions": [], "with Coulomb friction and rounding": []}
+    found: dict[str, list[Release]] = {"inside the assumptions": [], "with Coulomb friction and rounding": []}
     clocks: list[float] = []
     for number in range(rivers):
         drawn = draw_certified(rng)
         clocks.append(drawn.river.sampling.period)
-        for told, conditions in zip(found.values(), (ASSUMED, EVERYTHING), strict=True):
-            told += [let_go(drawn, conditions, rng) for _ in range(hands)]
-        print(f"{number + 1}/{rivers}: {sum(let.diverges for told in found.values() for let in told)}", flush=True)
+        for releases, conditions in zip(found.values(), (ASSUMED, EVERYTHING), strict=True):
+            releases += [release(drawn, conditions, rng) for _ in range(hands)]
+        print(
+            f"{number + 1}/{rivers}: {sum(r.diverges for releases in found.values() for r in releases)}",
+            flush=True,
+        )
     lines = [
         f"{rivers} certified rivers, periods of {1e3 * min(clocks):.2f} to {1e3 * max(clocks):.2f} ms (seed {seed})",
         "",
         "| | simulations | diverge | distance at the end / largest, median | worst |",
         "|---|---|---|---|---|",
     ]
-    for name, told in found.items():
-        shares = np.array([let.after / let.before if np.isfinite(let.before) else np.inf for let in told])
-        diverge = sum(let.diverges for let in told)
-        lines.append(f"| {name} | {len(told)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
+    for name, releases in found.items():
+        shares = np.array([r.after / r.before if np.isfinite(r.before) else np.inf for r in releases])
+        diverge = sum(r.diverges for r in releases)
+        lines.append(f"| {name} | {len(releases)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
     out.mkdir(parents=True, exist_ok=True)
     (out / "certified.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     print("\n".join(lines))

@@ -13,19 +13,19 @@ from numba import njit
 
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER
-from controllers.fields.law import Program
-from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
 from controllers.state import HAND_POSITION, HAND_QUATERNION, Array
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
-from experiments.setups.defaults import river_gains
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
+from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
 from models.world.scene import PHANTOM, SceneConfig
 from sim.users.hand.actions import Push

@@ -12,16 +12,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.bunny import Bunny
 from controllers.fields.edited import Edited, performance
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.law import Law
-from controllers.fields.program import evaluate
 from controllers.fields.river import River, integrate
 from controllers.state import Array, HandState
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]

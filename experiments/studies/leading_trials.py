@@ -18,7 +18,7 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from controllers.fields.leading import Leading
 from controllers.state import HandState
 from controllers.walking.gait import Gait
@@ -26,7 +26,7 @@ from controllers.walking.walked_path import STEP
 from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP, Conditions, Trial
-from experiments.setups.lead import s_curve
+from experiments.setups.modes.lead import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.hand.arm import Arm
 

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifting.room import Room
 from experiments.fitting.figure_legs import figure_legs
-from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.lift import LiftedClips, lift_clips
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, measure_map
+from experiments.lifting.motion_measure import MotionMeasure
 from models.humanoid.skeleton import figure_model
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -20,8 +20,8 @@ from controllers.curves.stylus import stylus_path
 from controllers.rotations import logarithm, multiply, rotate
 from controllers.state import Array
 from experiments.config.words import run_config
-from experiments.results.figures import AXES, STYLE
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
+from experiments.results.pages.figures import AXES, STYLE
 from experiments.runs.run import run
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE

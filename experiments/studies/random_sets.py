@@ -24,8 +24,8 @@ from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.alike import motion_of
 from experiments.fitting.blendable import grounded, led_by, not_blendable, off_pace
+from experiments.fitting.similarity import motion_of
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clips

@@ -12,18 +12,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.easing import smooth_step
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
+from controllers.fields.algebra.law import Program
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
-from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
 from controllers.state import VELOCITY, Array
 from experiments.config.words import run_config
-from experiments.results.figures import STYLE
-from experiments.setups.governor import speeds_along
-from experiments.setups.rivers import GATE, HYSTERESIS, SIGMA
+from experiments.results.pages.figures import STYLE
+from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
+from experiments.setups.parts.governor import speeds_along
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose

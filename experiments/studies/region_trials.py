@@ -24,7 +24,7 @@ from experiments.certify.certify import certified_rivers
 from experiments.certify.trial_simulation import EVERYTHING, Trial, hand_path
 from experiments.config.run_config import RunConfig
 
-CONFIG, HANDS = RunConfig(), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
+HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400
 
 
@@ -35,10 +35,10 @@ class Outcome(NamedTuple):
     last: float
 
 
-def certified_region(config: RunConfig = CONFIG, hands: HandRange = HANDS) -> tuple[River, Verdict]:
-    """The river of a run and the verdict on its region."""
-    river = certified_rivers(config)[""]
-    return river, region(river, hands, ForceLimiter(river.sampling.period).peak, Verdict("certified", "not asked"))
+def certified_region() -> tuple[River, Verdict]:
+    """The river of the default run and the verdict on its region, for `HANDS`."""
+    river = certified_rivers(RunConfig())[""]
+    return river, region(river, HANDS, ForceLimiter(river.sampling.period).peak, Verdict("certified", "not asked"))
 
 
 def simulate_from(

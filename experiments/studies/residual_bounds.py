@@ -14,7 +14,7 @@ import numpy as np
 
 from controllers.state import Array
 from experiments.config.words import run_config
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
 from models.humanoid.skeleton import DEFAULT_MASS

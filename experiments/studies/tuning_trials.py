@@ -61,7 +61,7 @@ def t_interval(values: Array) -> tuple[float, float]:
 
 
 def _chosen(one: Tuned) -> str:
-    (best,) = [c for c in one.candidates if c.state == "tried" and c.values == one.values][:1]
+    best = next(c for c in one.candidates if c.state == "tried" and c.values == one.values)
     margin = "no margin" if best.margin is None else f"margin {best.margin:.3g}"
     values = ", ".join(f"{word} {value:.4g}" for word, value in one.values.items())
     return f"{one.folder.name}: {values}; {best.verdict}, {margin}"

@@ -20,7 +20,7 @@ from controllers.certificates.flight.tolerance import JUDGING
 from controllers.gravity import GRAVITY
 from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.motion.clip import Clip
 

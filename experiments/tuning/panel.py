@@ -9,19 +9,19 @@ from controllers.state import Array
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.participants import participants
 from experiments.trials.design.plan import key_of
 from experiments.trials.design.study_config import Users
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import Executor
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning.tune_config import MARGIN, TuneConfig
+from sim.users.person.population import population
 
 
 def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[list[RunConfig]]:
     """Runs of a candidate by user, with the same seeds for every candidate, so that differences are the candidates'."""
     runs: list[list[RunConfig]] = []
-    for number, person in enumerate(participants(users)):
+    for number, person in enumerate(population(users.number, users.seed)):
         own: list[RunConfig] = []
         for k, does in enumerate(config.tasks or (users.does,)):
             user = User(does=does, person=person)  # pyright: ignore[reportArgumentType]

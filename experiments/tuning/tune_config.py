@@ -1,7 +1,6 @@
 """Configuration of a tuning, read from a TOML file."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -11,9 +10,9 @@ from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.participants import participants
 from experiments.trials.design.study_config import Users, Words, read_toml
 from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
+from sim.users.person.population import population
 
 MARGIN = "margin"
 """Objective that is not a measure of trials: the certificate's margin (critical k_r)/k_r − 1, to be maximised."""
@@ -105,7 +104,7 @@ class TuneConfig:
         """The run of a candidate, without a person at the stylus or, given a task, with the panel's first user."""
         words: Words = self.run | dict(values) | {"seconds": self.seconds}
         if does is not None:
-            words |= {"user": does, "person": participants(replace(self.users, number=1))[0]}
+            words |= {"user": does, "person": population(1, self.users.seed)[0]}
         return run_config(**words)
 
 

@@ -94,9 +94,7 @@ class Tuned:
         return json_text(told | {"comparisons": comparisons, "candidates": candidates})
 
 
-def run_tuning(
-    config: TuneConfig, out: Path, text: str = "", where: Where | None = None, console: Console | None = None
-) -> Tuned:
+def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | None = None) -> Tuned:
     """Search, compare the chosen candidate with others, certify it, and write a report.
 
     Parameters
@@ -109,15 +107,13 @@ def run_tuning(
         Text of the tuning's file, as the report shows it.
     where : Where, optional
         Where trials run; by default on as many threads as there are processors.
-    console : Console, optional
-        Where progress is shown; by default stderr.
 
     Raises
     ------
     ModelError, ControllerError, SimError, OSError
         If it contradicts itself, or cannot go on; completed trials are kept.
     """
-    console, text = console or Console(stderr=True), text or to_json(config)
+    console, text = Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
         warm(panel_runs(config, config.config({}), replace(config.users, number=1))[0], SHELF, console)

@@ -14,7 +14,9 @@ from models.mocap.readers.deepmimic import read_deepmimic
 from models.mocap.readers.motion_file import MotionFileError, numbered_lines
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.retarget import Hints, RetargetReport, retarget
+from models.mocap.retargeting.hints import Hints
+from models.mocap.retargeting.retarget import retarget
+from models.mocap.retargeting.retarget_report import RetargetReport
 from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 

@@ -19,7 +19,7 @@ from numba import njit
 
 from controllers.state import Array
 from controllers.work_array import work_array
-from sim.body.stance import factor, substitute
+from sim.body.cholesky import factor, substitute
 
 N_EDGES = 4  # edges of a linearised friction cone
 _STEPS = 40  # most Newton steps; a handful is usual

@@ -10,7 +10,7 @@ import numpy as np
 from numba import typeof
 from numba.extending import overload
 
-from controllers.fields.instructions import VECTOR
+from controllers.fields.algebra.instructions import VECTOR
 from controllers.kernel_call import call_as_given
 from controllers.lent import Lent, lend
 from controllers.state import Array, IntArray

@@ -19,8 +19,9 @@ from numba import njit
 from controllers.rotations import rotate
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from sim.body.cholesky import factor, substitute
 from sim.body.figure_state import N_FOOT, FigureState
-from sim.body.stance import N_LEG, cross_add, factor, substitute
+from sim.body.stance import N_LEG, cross_add
 
 _CLOSENESS = 300.0  # κ [1/m²]: within 1 % of the displacement, and δ stays bounded where a leg is straight
 _ASIDE, _UNDER = 0.5, 0.9

@@ -159,21 +159,29 @@ class TrackingReport:
         )
 
 
+class _Log(NamedTuple):
+    """What `_simulate` writes: the fields of the same names of `TrackedMotion`."""
+
+    poses: Array
+    reports: Array
+    contacts: Array
+    ground: Array
+
+
 @entry_point
 def _simulate(
-    drive: int, s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
-    poses: Array, reports: Array, contacts: Array, ground: Array, contact_force: Array,
-) -> None:  # fmt: skip
-    for k in range(q.shape[0]):
-        poses[k] = s.qpos
-        call_as_given(drive, (lend(s), q[k], v[k], a[k]))
+    drive: int, s: FigureState, control_steps: int, reference: ClipMotion, contact_force: Array, log: _Log
+) -> None:
+    for k in range(reference.poses.shape[0]):
+        log.poses[k] = s.qpos
+        call_as_given(drive, (lend(s), reference.poses[k], reference.velocities[k], reference.accelerations[k]))
         for c in range(s.points.shape[0]):
-            contacts[k, c] = s.contact_pos[s.contact[c]]
-            contacts[k, c, 2] -= s.radius
-        reports[k] = s.report
+            log.contacts[k, c] = s.contact_pos[s.contact[c]]
+            log.contacts[k, c, 2] -= s.radius
+        log.reports[k] = s.report
         for _ in range(control_steps):
             mj_step(s.model, s.data)
-            ground[k] += contact_force / control_steps
+            log.ground[k] += contact_force / control_steps
 
 
 def floor_world(config: TrackingConfig) -> mujoco.MjModel:
@@ -207,23 +215,17 @@ def tracked_motion(
     reference = clip_motion(clip, period * np.arange(n, dtype=np.float64))
     data.qpos[:], data.qvel[:] = reference.poses[0], reference.velocities[0]
     mujoco.mj_forward(model, data)
-    poses, reports = np.empty((n, model.nq)), np.empty((n, REPORT_SIZE))
-    contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
+    log = _Log(np.empty((n, model.nq)), np.empty((n, REPORT_SIZE)), np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3)))
     # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
-    motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
-    numbers: tuple[Any, ...] = (
-        figure.state, config.control_steps, *motion, poses, reports, contacts, ground, data.qfrc_constraint[:3],
-    )  # fmt: skip
+    motion = ClipMotion(*map(np.ascontiguousarray, reference))
+    numbers: tuple[Any, ...] = (figure.state, config.control_steps, motion, data.qfrc_constraint[:3], log)
     drive = drive_unit(figure.state)
     ready((drive, Unit.of(_simulate, types.int64, *(typeof(number) for number in numbers))))
     _simulate(drive.address(), *numbers)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
         reference,
-        poses,
-        reports,
-        contacts,
-        ground,
+        *log,
         figure.state.weight,
         standing_com(config.stature, config.mass),
         warnings,

@@ -3,6 +3,7 @@
 from numba import njit
 
 from controllers.work_array import work_array
+from sim.body.cholesky import factor, substitute
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
 from sim.body.feedback import shorten, wanted_acceleration
@@ -18,7 +19,7 @@ from sim.body.figure_state import (
 )
 from sim.body.foot_placement import place_feet
 from sim.body.mass_matrix import inertia, inertial_force
-from sim.body.stance import N_LEG, factor, stance_response, substitute
+from sim.body.stance import N_LEG, stance_response
 from sim.body.support import find_support
 
 # [m] lever arm that converts moment to force in the cost of the residual, which trades one for the other: the RMS

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from controllers.fields.instructions import LAW_ARGUMENTS
-from controllers.fields.law import Program
-from controllers.fields.walker_feed import Walkers
+from controllers.fields.algebra.instructions import LAW_ARGUMENTS
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.walker_feed import Walkers
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
 from controllers.state import Array, IntArray

@@ -120,9 +120,9 @@ def is_sound(path: Path) -> bool:
     return _read(path) is not None
 
 
-def remove_forgotten(folder: Path, now: float | None = None) -> None:
+def remove_forgotten(folder: Path) -> None:
     """Remove the units of a folder that were neither written nor loaded for two months."""
-    now = time.time() if now is None else now
+    now = time.time()
     for path in folder.glob(f"*{_SUFFIX}*"):
         with suppress(OSError):
             if now - path.stat().st_mtime > _FORGOTTEN:

@@ -61,8 +61,8 @@ DHD = VendorLibrary(
 
 _IN_LOOP = "dhdGetPositionAndOrientationFrame", "dhdGetButton", "dhdSetForce", "dhdEnableForce"
 _GET_POSE, _GET_BUTTON, _SET_FORCE, _ENABLE_FORCE = range(len(_IN_LOOP))
-TOLD_RESULT, TOLD_FAULT, TOLD_VALUE, TOLD_ENABLE, TOLD_ENABLED, TOLD_SIZE = range(6)
-"""Places in `DhdMemory.told`: the library's result, negative for an error; the fault of a pose or a torque, with its
+IO_RESULT, IO_FAULT, IO_VALUE, IO_ENABLE, IO_ENABLED, IO_SIZE = range(6)
+"""Places in `DhdMemory.io`: the library's result, negative for an error; the fault of a pose or a torque, with its
 value; 1 if the motors are to be on; 1 if they are on."""
 
 
@@ -83,8 +83,8 @@ class DhdMemory(NamedTuple):
         The last valid reading, of `READING_SIZE`.
     torque : Array
         Joint torques to be commanded [N m], shape (3,).
-    told : Array
-        Results of the kernels, see `TOLD_RESULT`.
+    io : Array
+        Results of the kernels, see `IO_RESULT`.
     """
 
     functions: IntArray
@@ -93,23 +93,23 @@ class DhdMemory(NamedTuple):
     frame: Array
     reading: Array
     torque: Array
-    told: Array
+    io: Array
 
 
 @entry_point
 def take_pose(dhd: DhdMemory) -> None:
     """Ask the library for pose and button, and write them into the reading."""
-    told, pose, number = dhd.told, dhd.pose, np.int32(dhd.number)
-    told[TOLD_FAULT] = 0.0
+    io, pose, number = dhd.io, dhd.pose, np.int32(dhd.number)
+    io[IO_FAULT] = 0.0
     x = pose.ctypes.data
-    told[TOLD_RESULT] = call_int(dhd.functions[_GET_POSE], (x, x + 8, x + 16, x + 24, number))
-    if told[TOLD_RESULT] < 0.0 or told[TOLD_RESULT] == _TIME_GUARD:
+    io[IO_RESULT] = call_int(dhd.functions[_GET_POSE], (x, x + 8, x + 16, x + 24, number))
+    if io[IO_RESULT] < 0.0 or io[IO_RESULT] == _TIME_GUARD:
         return
     for i in range(3):
         for j in range(3):
             dhd.frame[i, j] = _SIGNS[i] * pose[3 + 3 * i + j] * _SIGNS[j]
     p_P = vector_to_device_frame((_SIGNS[0] * pose[0], _SIGNS[1] * pose[1], _SIGNS[2] * pose[2]))
-    told[TOLD_FAULT], told[TOLD_VALUE] = place_stylus(dhd.reading, p_P, dhd.frame)
+    io[IO_FAULT], io[IO_VALUE] = place_stylus(dhd.reading, p_P, dhd.frame)
     pressed = call_int(dhd.functions[_GET_BUTTON], (np.int32(0), number)) == 1
     dhd.reading[READING_SWITCH] = 1.0 if pressed else 0.0
 
@@ -117,20 +117,20 @@ def take_pose(dhd: DhdMemory) -> None:
 @entry_point
 def send_force(dhd: DhdMemory) -> None:
     """Send the library the tip force equivalent to the torques; zero if the motors are off or a torque not finite."""
-    told, reading, torque, number = dhd.told, dhd.reading, dhd.torque, np.int32(dhd.number)
-    told[TOLD_VALUE] = first_not_finite(torque)
-    told[TOLD_FAULT] = 0.0 if told[TOLD_VALUE] == 0.0 else _FORCE_NOT_FINITE
-    enable = told[TOLD_ENABLE] if told[TOLD_FAULT] == 0.0 else 0.0
+    io, reading, torque, number = dhd.io, dhd.reading, dhd.torque, np.int32(dhd.number)
+    io[IO_VALUE] = first_not_finite(torque)
+    io[IO_FAULT] = 0.0 if io[IO_VALUE] == 0.0 else _FORCE_NOT_FINITE
+    enable = io[IO_ENABLE] if io[IO_FAULT] == 0.0 else 0.0
     force = 0.0, 0.0, 0.0
     if enable > 0.0:
         theta = (reading[READING_THETA], reading[READING_THETA + 1], reading[READING_THETA + 2])
         force = vector_to_hand_frame(tip_force(theta, (torque[0], torque[1], torque[2]), LARGEST))
-    told[TOLD_RESULT] = 0.0
-    if enable != told[TOLD_ENABLED]:
-        told[TOLD_RESULT] = call_int(dhd.functions[_ENABLE_FORCE], (np.int32(enable), number))
-        told[TOLD_ENABLED] = enable
+    io[IO_RESULT] = 0.0
+    if enable != io[IO_ENABLED]:
+        io[IO_RESULT] = call_int(dhd.functions[_ENABLE_FORCE], (np.int32(enable), number))
+        io[IO_ENABLED] = enable
     f_D = _SIGNS[0] * force[0], _SIGNS[1] * force[1], _SIGNS[2] * force[2], number
-    told[TOLD_RESULT] = min(told[TOLD_RESULT], call_int(dhd.functions[_SET_FORCE], f_D))
+    io[IO_RESULT] = min(io[IO_RESULT], call_int(dhd.functions[_SET_FORCE], f_D))
 
 
 class DhdDevice:
@@ -163,10 +163,10 @@ class DhdDevice:
         self.telemetry = fresh_telemetry()
         functions = np.array([address_of(getattr(library, name)) for name in _IN_LOOP], np.int64)
         memory = DhdMemory(
-            functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(TOLD_SIZE)
+            functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(IO_SIZE)
         )
         self._memory, self._off, self._taken = memory, np.zeros(3), 0.0
-        self._told, self._numbers, self._telemetry = items(memory.told), items(memory.reading), items(self.telemetry)
+        self._io, self._numbers, self._telemetry = items(memory.io), items(memory.reading), items(self.telemetry)
         self._take, self._send = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
 
     def _words(self) -> str:
@@ -185,14 +185,14 @@ class DhdDevice:
         DriverFault
             If the library reported an error, or the Phantom cannot reach the pose.
         """
-        told, numbers = self._told, self._numbers
+        io, numbers = self._io, self._numbers
         self._take()
-        if told[TOLD_RESULT] == _TIME_GUARD:
+        if io[IO_RESULT] == _TIME_GUARD:
             return False
-        if told[TOLD_RESULT] < 0.0:
+        if io[IO_RESULT] < 0.0:
             raise self._fault()
-        if told[TOLD_FAULT] != 0.0:
-            raise pose_fault(told[TOLD_FAULT], told[TOLD_VALUE])
+        if io[IO_FAULT] != 0.0:
+            raise pose_fault(io[IO_FAULT], io[IO_VALUE])
         self._taken += 1.0
         numbers[READING_CLOCK] = self._clock()
         numbers[READING_SEQUENCE] = self._telemetry[READ] = self._taken
@@ -207,19 +207,19 @@ class DhdDevice:
         DriverFault
             If the library reported an error, or a torque is not finite; the motors are then switched off.
         """
-        told = self._told
+        io = self._io
         np.copyto(self._memory.torque, torque)
-        told[TOLD_ENABLE] = enable
+        io[IO_ENABLE] = enable
         self._send()
-        if told[TOLD_FAULT] != 0.0:
-            raise DriverFault(Fault.FORCE_NOT_FINITE, told[TOLD_VALUE])
-        if told[TOLD_RESULT] < 0.0:
+        if io[IO_FAULT] != 0.0:
+            raise DriverFault(Fault.FORCE_NOT_FINITE, io[IO_VALUE])
+        if io[IO_RESULT] < 0.0:
             raise self._fault()
 
     def let_go(self) -> None:
         """Switch the motors off at once; never raises."""
         np.copyto(self._memory.torque, self._off)
-        self._told[TOLD_ENABLE], self._told[TOLD_ENABLED] = 0.0, _UNKNOWN
+        self._io[IO_ENABLE], self._io[IO_ENABLED] = 0.0, _UNKNOWN
         self._send()
 
     def close(self) -> None:

@@ -85,7 +85,7 @@ def fresh_telemetry() -> Array:
 
 
 @njit
-def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
+def note_arrival(telemetry: Array, clocks: Array, now: float, made: float) -> None:
     """Update jitter and staleness for a reading made at `made` by the device's clock, received at `now` [s].
 
     The two clocks have different origins and drift, so only changes of their difference are used, and the least
@@ -94,12 +94,12 @@ def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
     """
     delay = now - made
     if math.isnan(clocks[0]):
-        clocks[1], told[JITTER] = delay, 0.0
+        clocks[1], telemetry[JITTER] = delay, 0.0
     else:
-        told[JITTER] += (abs(delay - clocks[0]) - told[JITTER]) / 16.0
+        telemetry[JITTER] += (abs(delay - clocks[0]) - telemetry[JITTER]) / 16.0
         clocks[1] = min(delay, clocks[1] + DRIFT * (now - clocks[2]))
     clocks[0], clocks[2] = delay, now
-    told[STALENESS] = delay - clocks[1]
+    telemetry[STALENESS] = delay - clocks[1]
 
 
 class Driver(Protocol):

@@ -25,12 +25,12 @@ from sim.compilation.python_clock import clock_for_c
 from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.hdapi_frame import (
     FUNCTIONS,
+    IO_CODE,
+    IO_ENABLE,
+    IO_FAULT,
+    IO_NEW,
+    IO_VALUE,
     N_CLOSING,
-    TOLD_CODE,
-    TOLD_ENABLE,
-    TOLD_FAULT,
-    TOLD_NEW,
-    TOLD_VALUE,
     HdMemory,
     frame_for_c,
     send_force,
@@ -134,7 +134,7 @@ class HdapiDevice:
         functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
         addresses = [address_of(function) for function in functions]
         memory = HdMemory.fresh(addresses, self._device, self._nominal_force(), self.telemetry)
-        self._memory, self._told, self._off = memory, items(memory.told), np.zeros(3)
+        self._memory, self._io, self._off = memory, items(memory.io), np.zeros(3)
         self._take, self._send = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
         for ability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
             library.hdEnable(ability)
@@ -191,18 +191,18 @@ class HdapiDevice:
         DriverFault
             If the library reported an error, or the Phantom cannot reach the pose.
         """
-        told, take = self._told, self._take
+        io, take = self._io, self._take
         take()
         deadline = time.monotonic() + timeout
-        while told[TOLD_NEW] == 0.0 and told[TOLD_CODE] == 0.0 and time.monotonic() < deadline:
+        while io[IO_NEW] == 0.0 and io[IO_CODE] == 0.0 and time.monotonic() < deadline:
             time.sleep(_LOOK)
             take()
-        if told[TOLD_CODE] != 0.0:
-            code = int(told[TOLD_CODE])
-            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), told[TOLD_VALUE], _words(code))
-        if told[TOLD_FAULT] != 0.0:
-            raise pose_fault(told[TOLD_FAULT], told[TOLD_VALUE])
-        if told[TOLD_NEW] == 0.0:
+        if io[IO_CODE] != 0.0:
+            code = int(io[IO_CODE])
+            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), io[IO_VALUE], _words(code))
+        if io[IO_FAULT] != 0.0:
+            raise pose_fault(io[IO_FAULT], io[IO_VALUE])
+        if io[IO_NEW] == 0.0:
             return False
         np.copyto(reading, self._memory.reading)
         return True
@@ -215,17 +215,17 @@ class HdapiDevice:
         DriverFault
             If a torque is not finite; the force is then zero.
         """
-        told = self._told
+        io = self._io
         np.copyto(self._memory.torque, torque)
-        told[TOLD_ENABLE] = enable
+        io[IO_ENABLE] = enable
         self._send()
-        if told[TOLD_FAULT] != 0.0:
-            raise DriverFault(Fault.FORCE_NOT_FINITE, told[TOLD_VALUE])
+        if io[IO_FAULT] != 0.0:
+            raise DriverFault(Fault.FORCE_NOT_FINITE, io[IO_VALUE])
 
     def let_go(self) -> None:
         """Switch the motors off with the next callback; never raises."""
         np.copyto(self._memory.torque, self._off)
-        self._told[TOLD_ENABLE] = 0.0
+        self._io[IO_ENABLE] = 0.0
         self._send()
 
     def close(self) -> None:

@@ -52,8 +52,8 @@ SAMPLE_SIZE = 25
 [s], and the frame's number, from 1 on."""
 COMMAND_ENABLE, COMMAND_CLOCK, COMMAND_SIZE = 3, 4, 5
 """Places in a command, after the force in P [N]: 1 if the motors are to be on, and the time of the command [s]."""
-TOLD_NEW, TOLD_CODE, TOLD_FAULT, TOLD_VALUE, TOLD_ENABLE, TOLD_SIZE = range(6)
-"""Places in `HdMemory.told`: 1 if there is a new sample; the library's error; the fault of a pose or a torque; the
+IO_NEW, IO_CODE, IO_FAULT, IO_VALUE, IO_ENABLE, IO_SIZE = range(6)
+"""Places in `HdMemory.io`: 1 if there is a new sample; the library's error; the fault of a pose or a torque; the
 value of either; 1 if the motors are to be on."""
 
 
@@ -99,9 +99,9 @@ class HdMemory(NamedTuple):
         Owned by the callback: the force that it sends [N], and the motors' temperatures, shapes (3,) and (6,).
     error : Array
         See `ERROR_CODE`. Owned by the servo from when it is raised until it is taken, else by the callback.
-    frame, reading, torque, told, telemetry : Array
+    frame, reading, torque, io, telemetry : Array
         Owned by the servo: the stylus's orientation in H (3, 3), the last valid reading, the torques to be commanded
-        [N m], results of the kernels (see `TOLD_NEW`), and the driver's telemetry.
+        [N m], results of the kernels (see `IO_NEW`), and the driver's telemetry.
     """
 
     functions: IntArray
@@ -116,7 +116,7 @@ class HdMemory(NamedTuple):
     frame: Array
     reading: Array
     torque: Array
-    told: Array
+    io: Array
     telemetry: Array
 
     @classmethod
@@ -125,7 +125,7 @@ class HdMemory(NamedTuple):
         return cls(
             np.array(functions, np.int64), device, largest, np.zeros(N_SIZE, np.int64), Locked.fresh(SAMPLE_SIZE),
             Locked.fresh(COMMAND_SIZE), np.zeros(3), np.zeros(6), np.zeros(ERROR_SIZE), np.zeros((3, 3)),
-            np.zeros(READING_SIZE), np.zeros(3), np.zeros(TOLD_SIZE), telemetry,
+            np.zeros(READING_SIZE), np.zeros(3), np.zeros(IO_SIZE), telemetry,
         )  # fmt: skip
 
 
@@ -204,20 +204,20 @@ def frame_for_c() -> int:
 @entry_point
 def take_sample(hd: HdMemory) -> None:
     """Convert the newest sample into a reading, if there is a new one and the library raised no error."""
-    told, numbers, sample, reading = hd.told, hd.numbers, hd.sample.read, hd.reading
-    told[TOLD_NEW] = told[TOLD_CODE] = told[TOLD_FAULT] = 0.0
+    io, numbers, sample, reading = hd.io, hd.numbers, hd.sample.read, hd.reading
+    io[IO_NEW] = io[IO_CODE] = io[IO_FAULT] = 0.0
     last = reading[READING_SEQUENCE]
     read_whole(hd.sample.changes, hd.sample.shared, hd.sample.whole, sample)
     barrier()
     if numbers[N_RAISED] != numbers[N_HEARD]:
         barrier()
-        told[TOLD_CODE], told[TOLD_VALUE] = hd.error[ERROR_CODE], hd.error[ERROR_VALUE]
+        io[IO_CODE], io[IO_VALUE] = hd.error[ERROR_CODE], hd.error[ERROR_VALUE]
         barrier()
         numbers[N_HEARD] += 1
         return
     if sample[SAMPLE_NUMBER] == last:  # no new sample, or one that is half written
         return
-    told[TOLD_NEW], reading[READING_SEQUENCE] = 1.0, sample[SAMPLE_NUMBER]
+    io[IO_NEW], reading[READING_SEQUENCE] = 1.0, sample[SAMPLE_NUMBER]
     # x_P → −y_H, y_P → z_H, z_P → −x_H, of rows and of columns.
     for i in range(3):
         for j in range(3):
@@ -225,7 +225,7 @@ def take_sample(hd: HdMemory) -> None:
             entry = sample[SAMPLE_TRANSFORM + 4 * ((j + 2) % 3) + (i + 2) % 3]
             hd.frame[i, j] = entry if same else -entry
     p_P = 1e-3 * sample[SAMPLE_POSITION], 1e-3 * sample[SAMPLE_POSITION + 1], 1e-3 * sample[SAMPLE_POSITION + 2]
-    told[TOLD_FAULT], told[TOLD_VALUE] = place_stylus(reading, p_P, hd.frame)
+    io[IO_FAULT], io[IO_VALUE] = place_stylus(reading, p_P, hd.frame)
     reading[READING_SWITCH] = float(int(sample[SAMPLE_BUTTONS]) & 1)
     reading[READING_CLOCK] = sample[SAMPLE_CLOCK]
     hd.telemetry[READ] = sample[SAMPLE_NUMBER]
@@ -234,10 +234,10 @@ def take_sample(hd: HdMemory) -> None:
 @entry_point
 def send_force(hd: HdMemory) -> None:
     """Command the tip force equivalent to the torques; zero if the motors are off or a torque is not finite."""
-    told, command, torque = hd.told, hd.command.written, hd.torque
-    told[TOLD_VALUE] = first_not_finite(torque)
-    told[TOLD_FAULT] = 0.0 if told[TOLD_VALUE] == 0.0 else _FORCE_NOT_FINITE
-    enable = told[TOLD_ENABLE] > 0.0 and told[TOLD_FAULT] == 0.0
+    io, command, torque = hd.io, hd.command.written, hd.torque
+    io[IO_VALUE] = first_not_finite(torque)
+    io[IO_FAULT] = 0.0 if io[IO_VALUE] == 0.0 else _FORCE_NOT_FINITE
+    enable = io[IO_ENABLE] > 0.0 and io[IO_FAULT] == 0.0
     force = 0.0, 0.0, 0.0
     if enable:
         reading = hd.reading

@@ -23,17 +23,17 @@ from sim.devices import hid_protocol as protocol
 from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_THETA
 from sim.devices.hid_reports import (
+    IO_ENABLE,
+    IO_FAULT,
+    IO_GIVEN,
+    IO_NEW,
+    IO_NOW,
+    IO_SIZE,
+    IO_VALUE,
     N_BOOT,
     N_ENABLED,
     N_LAST,
     N_WATCHDOG,
-    TOLD_ENABLE,
-    TOLD_FAULT,
-    TOLD_GIVEN,
-    TOLD_NEW,
-    TOLD_NOW,
-    TOLD_SIZE,
-    TOLD_VALUE,
     WATCHDOG,
     HidMemory,
     judge_report,
@@ -85,7 +85,7 @@ class HidPhantom:
         self._hid = HidMemory.fresh(self.telemetry)
         self._take_identity()
         self._take_calibration()
-        self._told, self._reading, self._off = items(self._hid.told), items(self._hid.reading), np.zeros(3)
+        self._io, self._reading, self._off = items(self._hid.io), items(self._hid.reading), np.zeros(3)
         self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
         incoming = incoming[: protocol.REPORT_SIZE + 1]  # one byte more, so that a report that is too long shows
@@ -162,28 +162,28 @@ class HidPhantom:
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; readings are timestamped by the device's time since its power-up."""
-        told, taken, new = self._told, 0, False
+        io, taken, new = self._io, 0, False
         try:
             size = self._receive(math.ceil(timeout * 1e3))
             while size > 0:
-                told[TOLD_SIZE], told[TOLD_NOW] = size, self._clock()
+                io[IO_SIZE], io[IO_NOW] = size, self._clock()
                 self._judge()
-                if told[TOLD_FAULT] != 0.0:
+                if io[IO_FAULT] != 0.0:
                     self._refuse()
-                new, taken = told[TOLD_NEW] > 0.0 or new, taken + 1
+                new, taken = io[IO_NEW] > 0.0 or new, taken + 1
                 size = self._receive(0) if taken < _DRAIN else 0
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         if new:
             np.copyto(reading, self._hid.reading)
-            told[TOLD_GIVEN] = self._reading[READING_CLOCK]
+            io[IO_GIVEN] = self._reading[READING_CLOCK]
         return new
 
     def _refuse(self) -> None:
         """Raise the fault of a report; after a reset of the device, its identity is read again first."""
-        if self._told[TOLD_FAULT] == _RESET:
+        if self._io[IO_FAULT] == _RESET:
             self._judge_boot()
-        raise DriverFault(Fault(int(self._told[TOLD_FAULT])), self._told[TOLD_VALUE])
+        raise DriverFault(Fault(int(self._io[IO_FAULT])), self._io[IO_VALUE])
 
     def _judge_boot(self) -> None:
         """Read identity and calibration again after a reset of the device, in which it may have lost its zero.
@@ -213,12 +213,12 @@ class HidPhantom:
         DriverFault
             If the device is gone, or a torque is not finite; the motors are then switched off.
         """
-        told = self._told
+        io = self._io
         np.copyto(self._hid.torque, torque)
-        told[TOLD_ENABLE], told[TOLD_NOW] = enable, self._clock()
+        io[IO_ENABLE], io[IO_NOW] = enable, self._clock()
         self._make()
-        if told[TOLD_FAULT] != 0.0:
-            value = told[TOLD_VALUE]
+        if io[IO_FAULT] != 0.0:
+            value = io[IO_VALUE]
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, value)
         try:

@@ -32,9 +32,9 @@ N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_AGAIN, N_BOOT, N_WATCHDOG, N_SIZE =
 a wrong checksum; commands sent; number of the command that switched the motors on (−1: off); 1 if the watchdog switched
 them off during a gap, so that one command with motors off must precede the next with motors on; the device's boot
 number; and the watchdog's period [µs]."""
-TOLD_FAULT, TOLD_VALUE, TOLD_NEW, TOLD_SIZE, TOLD_NOW, TOLD_GIVEN, TOLD_ENABLE = range(7)
-TOLD_ASKED, TOLD_ASKED_MADE, TOLD_LENGTH = 7, 8, 9
-"""Places in `HidMemory.told`: fault of a report or a command, with its value; 1 if a report was a new reading; size of
+IO_FAULT, IO_VALUE, IO_NEW, IO_SIZE, IO_NOW, IO_GIVEN, IO_ENABLE = range(7)
+IO_ASKED, IO_ASKED_MADE, IO_LENGTH = 7, 8, 9
+"""Places in `HidMemory.io`: fault of a report or a command, with its value; 1 if a report was a new reading; size of
 the report [bytes]; time by the host's clock; time of the last reading handed out by the device's clock [s]; 1 if the
 motors are to be on; both times when the motors were last commanded on."""
 
@@ -108,8 +108,8 @@ class HidMemory(NamedTuple):
         The last input report, and the next output report.
     numbers : IntArray
         See `N_LAST`.
-    told : Array
-        Arguments and results of the kernels, see `TOLD_FAULT`.
+    io : Array
+        Arguments and results of the kernels, see `IO_FAULT`.
     zero, angle : Array
         Encoder counts at angle zero, and the angle of a count [rad], shape (6,).
     turns, peak : Array
@@ -127,7 +127,7 @@ class HidMemory(NamedTuple):
     incoming: Words
     outgoing: Words
     numbers: IntArray
-    told: Array
+    io: Array
     zero: Array
     angle: Array
     turns: Array
@@ -141,38 +141,38 @@ class HidMemory(NamedTuple):
     @classmethod
     def fresh(cls, telemetry: Array) -> "HidMemory":
         """Memory before the first report; identity and calibration of the device are not read yet."""
-        numbers, told = np.zeros(N_SIZE, np.int64), np.zeros(TOLD_LENGTH)
-        numbers[[N_LAST, N_ENABLED]], told[TOLD_GIVEN] = -1, math.nan
+        numbers, io = np.zeros(N_SIZE, np.int64), np.zeros(IO_LENGTH)
+        numbers[[N_LAST, N_ENABLED]], io[IO_GIVEN] = -1, math.nan
         return cls(
-            Words.fresh(), Words.fresh(), numbers, told, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
+            Words.fresh(), Words.fresh(), numbers, io, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
             np.zeros(3), np.full(_SENT, np.nan), np.zeros(READING_SIZE), telemetry, np.full(3, np.nan),
         )  # fmt: skip
 
 
 @njit
-def _fault(told: Array, code: int, value: float) -> None:
-    if told[TOLD_FAULT] == 0.0:
-        told[TOLD_FAULT], told[TOLD_VALUE] = code, value
+def _fault(io: Array, code: int, value: float) -> None:
+    if io[IO_FAULT] == 0.0:
+        io[IO_FAULT], io[IO_VALUE] = code, value
 
 
 @entry_point
 def judge_report(hid: HidMemory) -> None:
-    """Check the input report that was received; write its reading, and the result to `told`."""
-    told, numbers, telemetry, words = hid.told, hid.numbers, hid.telemetry, hid.incoming
-    told[TOLD_FAULT] = told[TOLD_NEW] = 0.0
-    if told[TOLD_SIZE] != _SIZE or words.u8[0] != _INPUT:
+    """Check the input report that was received; write its reading, and the result to `io`."""
+    io, numbers, telemetry, words = hid.io, hid.numbers, hid.telemetry, hid.incoming
+    io[IO_FAULT] = io[IO_NEW] = 0.0
+    if io[IO_SIZE] != _SIZE or words.u8[0] != _INPUT:
         telemetry[BAD] += 1.0
-        _fault(told, _MALFORMED, told[TOLD_SIZE])
+        _fault(io, _MALFORMED, io[IO_SIZE])
         return
     if checksum(words.u8) != np.int64(words.u32[_CRC]):
         telemetry[BAD] += 1.0
         numbers[N_BAD] += 1
         if numbers[N_BAD] >= _BAD_IN_ROW:
-            _fault(told, _CHECKSUM, numbers[N_BAD])
+            _fault(io, _CHECKSUM, numbers[N_BAD])
         return
     numbers[N_BAD] = 0
     if np.int64(words.u16[_BOOT]) != numbers[N_BOOT]:
-        _fault(told, _RESET, 0.0)
+        _fault(io, _RESET, 0.0)
         return
     answered, status = np.int64(words.u32[_ANSWERED]), np.int64(words.u16[_STATUS])
     if numbers[N_LAST] < 0:
@@ -192,10 +192,10 @@ def judge_report(hid: HidMemory) -> None:
     _measure(hid, made, answered)
     _judge_temperature(hid, status)
     if status & _ERRORS:
-        _fault(told, _REPORTED, float(status & _ERRORS))
-    if told[TOLD_FAULT] == 0.0:
+        _fault(io, _REPORTED, float(status & _ERRORS))
+    if io[IO_FAULT] == 0.0:
         _judge_motors(hid, made, answered, status)
-    told[TOLD_NEW] = 1.0 if told[TOLD_FAULT] == 0.0 else 0.0
+    io[IO_NEW] = 1.0 if io[IO_FAULT] == 0.0 else 0.0
 
 
 @njit
@@ -212,7 +212,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
     if ahead <= 0:
         telemetry[BAD] += 1.0
         if ahead < 0:
-            _fault(hid.told, _BACK, float(-ahead))
+            _fault(hid.io, _BACK, float(-ahead))
         return False
     telemetry[LOST] += ahead - 1.0
     telemetry[READ] += 1.0
@@ -223,7 +223,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
 @njit
 def _measure(hid: HidMemory, made: float, answered: np.int64) -> None:
     """Update the telemetry: temperatures, round trip, jitter and staleness."""
-    telemetry, now = hid.telemetry, hid.told[TOLD_NOW]
+    telemetry, now = hid.telemetry, hid.io[IO_NOW]
     for i in range(3):
         celsius = np.int64(hid.incoming.i16[_CELSIUS + i])
         telemetry[TEMPERATURE + i] = np.nan if celsius == _NO_CELSIUS else celsius * _CELSIUS_UNIT
@@ -241,7 +241,7 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
         if celsius > hottest:  # false for NaN, a motor without a sensor
             hottest = celsius
     if status & _STATUS_HOT or hottest >= HOTTEST:
-        _fault(hid.told, _HOT, hottest)
+        _fault(hid.io, _HOT, hottest)
 
 
 @njit
@@ -253,37 +253,37 @@ def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.in
     they never came on: a fault once the waiting time has passed by both clocks, since either side may have been
     suspended between a reading and its command.
     """
-    told, since = hid.told, hid.numbers[N_ENABLED]
+    io, since = hid.io, hid.numbers[N_ENABLED]
     if since < 0 or status & _STATUS_ENABLED:
         return
     if status & _STATUS_WATCHDOG and _ahead(answered, since) >= 0:
-        if made - told[TOLD_GIVEN] > 0.5 * WATCHDOG:
+        if made - io[IO_GIVEN] > 0.5 * WATCHDOG:
             hid.numbers[N_AGAIN] = 1
         else:
-            _fault(told, _REPORTED, _STATUS_WATCHDOG)
+            _fault(io, _REPORTED, _STATUS_WATCHDOG)
         return
-    waited = min(told[TOLD_NOW] - told[TOLD_ASKED], made - told[TOLD_ASKED_MADE])
+    waited = min(io[IO_NOW] - io[IO_ASKED], made - io[IO_ASKED_MADE])
     if waited > WATCHDOG:
-        _fault(told, _MOTORS_OFF, waited)
+        _fault(io, _MOTORS_OFF, waited)
 
 
 @entry_point
 def make_command(hid: HidMemory) -> None:
     """Write the next output report, with torques limited to the motors' peak; none if a torque is not finite."""
-    told, numbers, words = hid.told, hid.numbers, hid.outgoing
-    told[TOLD_FAULT] = 0.0
+    io, numbers, words = hid.io, hid.numbers, hid.outgoing
+    io[IO_FAULT] = 0.0
     wrong = first_not_finite(hid.torque)
     if wrong != 0.0:
-        _fault(told, _NOT_FINITE, wrong)
+        _fault(io, _NOT_FINITE, wrong)
         return
     numbers[N_SENT] += 1
-    enable = told[TOLD_ENABLE] > 0.0 and numbers[N_AGAIN] == 0
+    enable = io[IO_ENABLE] > 0.0 and numbers[N_AGAIN] == 0
     numbers[N_AGAIN] = 0
     if not enable:
         numbers[N_ENABLED] = -1
     elif numbers[N_ENABLED] < 0:
         numbers[N_ENABLED] = numbers[N_SENT]
-        told[TOLD_ASKED], told[TOLD_ASKED_MADE] = told[TOLD_NOW], told[TOLD_GIVEN]
+        io[IO_ASKED], io[IO_ASKED_MADE] = io[IO_NOW], io[IO_GIVEN]
     words.u8[0], words.u8[1] = _OUTPUT, _ENABLE if enable else 0
     words.u16[_OUT_BOOT], words.u32[_OUT_SEQUENCE] = numbers[N_BOOT], numbers[N_SENT] % 2**32
     words.u32[_OUT_WATCHDOG], words.u32[_OUT_ANSWERS] = numbers[N_WATCHDOG], max(0, numbers[N_LAST])
@@ -291,4 +291,4 @@ def make_command(hid: HidMemory) -> None:
         shaft = min(max(hid.torque[i] / hid.turns[i], -hid.peak[i]), hid.peak[i]) if enable else 0.0
         words.i32[_OUT_TORQUE + i] = int(np.rint(shaft / _TORQUE_UNIT))
     words.u32[_CRC] = checksum(words.u8)
-    hid.sent_at[numbers[N_SENT] % _SENT] = told[TOLD_NOW]
+    hid.sent_at[numbers[N_SENT] % _SENT] = io[IO_NOW]

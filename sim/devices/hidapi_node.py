@@ -31,16 +31,16 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
 
 
 @entry_point
-def read_report(places: IntArray, incoming: Bytes, told: Array) -> None:
-    """Call hid_read_timeout: `places` are its address and the device handle, `told` (2,) timeout [ms] and result."""
-    room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(told[0])
-    told[1] = call_int(places[0], (places[1], room, size, timeout))
+def read_report(places: IntArray, incoming: Bytes, io: Array) -> None:
+    """Call hid_read_timeout: `places` are its address and the device handle, `io` (2,) timeout [ms] and result."""
+    room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(io[0])
+    io[1] = call_int(places[0], (places[1], room, size, timeout))
 
 
 @entry_point
-def write_report(places: IntArray, outgoing: Bytes, told: Array) -> None:
-    """Call hid_write: `places` are its address and the device handle, `told` (1,) its result."""
-    told[0] = call_int(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
+def write_report(places: IntArray, outgoing: Bytes, io: Array) -> None:
+    """Call hid_write: `places` are its address and the device handle, `io` (1,) its result."""
+    io[0] = call_int(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
 
 
 class HidapiNode:

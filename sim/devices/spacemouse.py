@@ -87,9 +87,9 @@ class SpaceMouse:
         now = self._clock()
         self._move(0.0 if self._last is None else min(now - self._last, LONGEST_STEP))
         self._last = now
-        told = np.zeros(READING_SIZE)
-        write_pose(told, np.array(R_HP).T @ self._p_H, self._r_HS)
-        reading[:] = told
+        fresh = np.zeros(READING_SIZE)
+        write_pose(fresh, np.array(R_HP).T @ self._p_H, self._r_HS)
+        reading[:] = fresh
         self._taken += 1
         reading[READING_SWITCH] = float(self._buttons & 1)
         reading[READING_CLOCK] = now
@@ -139,12 +139,12 @@ class SpaceMouse:
             self._r_HS = turned
 
     def _gimbal_can(self, r_HS: Array) -> bool:
-        told = np.zeros(READING_SIZE)
-        write_pose(told, np.array(R_HP).T @ self._p_H, r_HS)
+        reading = np.zeros(READING_SIZE)
+        write_pose(reading, np.array(R_HP).T @ self._p_H, r_HS)
         # Gimbal lock near a pitch of 90°: a small step there would make the gimbal's angles jump.
-        return abs(told[READING_GIMBAL + 1]) < 1.4 and all(
+        return abs(reading[READING_GIMBAL + 1]) < 1.4 and all(
             low <= angle <= high
-            for angle, (low, high) in zip(told[READING_GIMBAL:], PREMIUM_1_5.gimbal_limit, strict=True)
+            for angle, (low, high) in zip(reading[READING_GIMBAL:], PREMIUM_1_5.gimbal_limit, strict=True)
         )
 
     def write(self, torque: Array, enable: bool) -> None:

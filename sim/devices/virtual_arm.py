@@ -119,9 +119,9 @@ def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
 
 
 @entry_point
-def place_by_numbers(reading: Array, p_P: Array, r_HS: Array, told: Array) -> None:
-    """`place_stylus` from Python; its result is written to `told`, shape (2,)."""
-    told[0], told[1] = place_stylus(reading, (p_P[0], p_P[1], p_P[2]), r_HS)
+def place_by_numbers(reading: Array, p_P: Array, r_HS: Array, fault: Array) -> None:
+    """`place_stylus` from Python; its result is written to `fault`, shape (2,)."""
+    fault[0], fault[1] = place_stylus(reading, (p_P[0], p_P[1], p_P[2]), r_HS)
 
 
 def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
@@ -132,10 +132,10 @@ def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
     DriverFault
         If the Phantom cannot take the pose, the pose is not finite, or the orientation is no rotation.
     """
-    told = np.zeros(2)
-    place_by_numbers(reading, np.ascontiguousarray(p_P), np.ascontiguousarray(r_HS), told)
-    if told[0] != 0.0:
-        raise pose_fault(told[0], told[1])
+    fault = np.zeros(2)
+    place_by_numbers(reading, np.ascontiguousarray(p_P), np.ascontiguousarray(r_HS), fault)
+    if fault[0] != 0.0:
+        raise pose_fault(fault[0], fault[1])
 
 
 def pose_fault(fault: float, value: float) -> DriverFault:

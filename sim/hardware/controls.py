@@ -19,14 +19,14 @@ from controllers.state import Array
 from sim.errors import SimError
 from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
 from sim.hardware.recorder_process import (
+    RECORDER_APART,
+    RECORDER_DROPPED,
+    RECORDER_ERROR,
+    RECORDER_FORCE,
+    RECORDER_READY,
+    RECORDER_ROWS,
+    RECORDER_SIZE,
     RING_SECONDS,
-    TOLD_APART,
-    TOLD_DROPPED,
-    TOLD_ERROR,
-    TOLD_FORCE,
-    TOLD_READY,
-    TOLD_ROWS,
-    TOLD_SIZE,
     RecordingJob,
     record_rows,
 )
@@ -124,7 +124,7 @@ class HardwareRun:
         The recorder's process.
     status : SharedNumbers
         The servo's last row, also for other processes that display it.
-    told : SharedNumbers
+    recorder_status : SharedNumbers
         The recorder's status, likewise.
     """
 
@@ -134,16 +134,16 @@ class HardwareRun:
         context = multiprocessing.get_context("spawn")
         self._orders, self.status = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE)
         self._rows = Ring(round(RING_SECONDS / period), ROW_SIZE)
-        self._until, self.told = SharedNumbers(1), SharedNumbers(TOLD_SIZE)
-        self._said, told = context.Pipe(duplex=False)
+        self._until, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
+        self._said, reports = context.Pipe(duplex=False)
         self._order, self._row, self._heard = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
-        channels = Channels(self._orders, self.status, self._rows, told)
+        channels = Channels(self._orders, self.status, self._rows, reports)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
         self.recorder: BaseProcess | None = None
         if job is not None:
-            arguments = job, self._rows, self._until, self.told
+            arguments = job, self._rows, self._until, self.recorder_status
             self.recorder = context.Process(target=record_rows, args=arguments, name="recorder", daemon=True)
-        self._their_end: Connection = told
+        self._their_end: Connection = reports
         self._ended: Ended | None = None
 
     def __enter__(self) -> "HardwareRun":
@@ -151,7 +151,7 @@ class HardwareRun:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        for shared in (self._orders, self.status, self._rows, self._until, self.told):
+        for shared in (self._orders, self.status, self._rows, self._until, self.recorder_status):
             shared.close()
 
     def start(self) -> Ready:
@@ -175,10 +175,10 @@ class HardwareRun:
 
     def _wait_for(self, recorder: BaseProcess) -> None:
         """Wait until the recorder is ready or has ended; `poll` then shows whether it could start."""
-        told, end = np.zeros(TOLD_SIZE), time.monotonic() + _START
-        while recorder.is_alive() and told[TOLD_READY] == 0.0 and time.monotonic() < end:
+        status, end = np.zeros(RECORDER_SIZE), time.monotonic() + _START
+        while recorder.is_alive() and status[RECORDER_READY] == 0.0 and time.monotonic() < end:
             time.sleep(0.01)
-            self.told.read(told)
+            self.recorder_status.read(status)
 
     def _hear(self, timeout: float) -> Ready | Refused | Ended | None:
         try:
@@ -208,12 +208,19 @@ class HardwareRun:
     def _recorded(self) -> Recorded | None:
         if self.recorder is None:
             return None
-        told = np.zeros(TOLD_SIZE)
-        self.told.read(told)
-        error = int(told[TOLD_ERROR])
-        force = told[TOLD_FORCE : TOLD_FORCE + 3]
+        status = np.zeros(RECORDER_SIZE)
+        self.recorder_status.read(status)
+        error = int(status[RECORDER_ERROR])
+        force = status[RECORDER_FORCE : RECORDER_FORCE + 3]
         alive = self.recorder.is_alive() and error == 0
-        return Recorded(alive, int(told[TOLD_ROWS]), int(told[TOLD_DROPPED]), error, force, float(told[TOLD_APART]))
+        return Recorded(
+            alive,
+            int(status[RECORDER_ROWS]),
+            int(status[RECORDER_DROPPED]),
+            error,
+            force,
+            float(status[RECORDER_APART]),
+        )
 
     def stop(self) -> Ended | None:
         """End the servo, then the recorder once it has written all rows; returns the servo's final report, if any."""

@@ -102,8 +102,8 @@ class Link(NamedTuple):
         Torques [N m], and 1 if the motors are to be on, shape (4,).
     telemetry, clocks : Array
         Those of `sim.devices.driver.note_arrival`.
-    told : Array
-        Arguments and results of the kernels, see `TOLD_NEW`.
+    io : Array
+        Arguments and results of the kernels, see `IO_NEW`.
     """
 
     descriptor: int
@@ -112,47 +112,47 @@ class Link(NamedTuple):
     command: Array
     telemetry: Array
     clocks: Array
-    told: Array
+    io: Array
 
 
-TOLD_NEW, TOLD_SIZE, TOLD_WENT, TOLD_SENT, TOLD_SEQUENCE, TOLD_WAIT, TOLD_LENGTH = range(7)
-"""Places in `Link.told`: readings taken; size of a wrong packet that ended the taking, or `NOTHING` or `BROKEN`; result
+IO_NEW, IO_SIZE, IO_WENT, IO_SENT, IO_SEQUENCE, IO_WAIT, IO_LENGTH = range(7)
+"""Places in `Link.io`: readings taken; size of a wrong packet that ended the taking, or `NOTHING` or `BROKEN`; result
 of sending the last command, and when it was sent [s]; number of the last reading; timeout of a reading [s]."""
 
 
 @entry_point
 def take_readings(link: Link) -> None:
     """Take all readings that have arrived or, if there are none, wait for the next ones within the timeout."""
-    told, telemetry = link.told, link.telemetry
-    told[TOLD_NEW], told[TOLD_SIZE] = 0.0, NOTHING
+    io, telemetry = link.io, link.telemetry
+    io[IO_NEW], io[IO_SIZE] = 0.0, NOTHING
     waited = False
     while True:
         size = receive(link.descriptor, link.packet)
-        if size == NOTHING and not waited and told[TOLD_NEW] == 0.0:
-            wait_for_packet(link.descriptor, told[TOLD_WAIT])
+        if size == NOTHING and not waited and io[IO_NEW] == 0.0:
+            wait_for_packet(link.descriptor, io[IO_WAIT])
             waited = True
             continue
         if size != 8 * _PACKET:
-            told[TOLD_SIZE] = size
+            io[IO_SIZE] = size
             break
         for i in range(READING_SIZE):
             link.reading[i] = link.packet[i]
-        told[TOLD_NEW] += 1.0
-    if told[TOLD_NEW] == 0.0:
+        io[IO_NEW] += 1.0
+    if io[IO_NEW] == 0.0:
         return
     number, now = link.reading[READING_SEQUENCE], monotonic()
-    telemetry[ROUND_TRIP] = now - told[TOLD_SENT]
+    telemetry[ROUND_TRIP] = now - io[IO_SENT]
     telemetry[READ] += 1
-    telemetry[LOST] += max(0.0, number - told[TOLD_SEQUENCE] - 1.0) if told[TOLD_SEQUENCE] > 0.0 else 0.0
+    telemetry[LOST] += max(0.0, number - io[IO_SEQUENCE] - 1.0) if io[IO_SEQUENCE] > 0.0 else 0.0
     note_arrival(telemetry, link.clocks, now, link.packet[_SENT_AT])
-    told[TOLD_SEQUENCE] = number
+    io[IO_SEQUENCE] = number
 
 
 @entry_point
 def send_command(link: Link) -> None:
     """Send the command, and store the time."""
-    link.told[TOLD_SENT] = monotonic()
-    link.told[TOLD_WENT] = transmit(link.descriptor, link.command)
+    link.io[IO_SENT] = monotonic()
+    link.io[IO_WENT] = transmit(link.descriptor, link.command)
 
 
 class EmulatedDriver:
@@ -168,35 +168,35 @@ class EmulatedDriver:
 
     def __init__(self, packets: socket.socket, calibrated: bool = True):
         packets.setblocking(False)
-        self._packets, self.telemetry, told = packets, fresh_telemetry(), np.zeros(TOLD_LENGTH)
+        self._packets, self.telemetry, io = packets, fresh_telemetry(), np.zeros(IO_LENGTH)
         self._reading, self._command = np.zeros(READING_SIZE), np.zeros(4)
         link = Link(
             packets.fileno(), np.zeros(_PACKET + 1), self._reading, self._command, self.telemetry, np.full(3, np.nan),
-            told,
+            io,
         )  # fmt: skip
-        told[TOLD_SENT] = time.monotonic()
-        self._torque, self._told = self._command[:3], items(told)
+        io[IO_SENT] = time.monotonic()
+        self._torque, self._io = self._command[:3], items(io)
         self._take, self._send = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`."""
-        told = self._told
-        told[TOLD_WAIT] = timeout
+        io = self._io
+        io[IO_WAIT] = timeout
         self._take()
-        if told[TOLD_SIZE] == BROKEN:
+        if io[IO_SIZE] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
-        if told[TOLD_SIZE] != NOTHING:
-            raise DriverFault(Fault.REPORT_MALFORMED, told[TOLD_SIZE])
+        if io[IO_SIZE] != NOTHING:
+            raise DriverFault(Fault.REPORT_MALFORMED, io[IO_SIZE])
         np.copyto(reading, self._reading)
-        return told[TOLD_NEW] > 0.0
+        return io[IO_NEW] > 0.0
 
     def write(self, torque: Array, enable: bool) -> None:
         """As `sim.devices.driver.Driver`."""
         np.copyto(self._torque, torque)
         self._command[3] = enable
         self._send()
-        if self._told[TOLD_WENT] == BROKEN:
+        if self._io[IO_WENT] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
         # If there was no room for the packet, the device does not keep up; its readings will then become stale.
 

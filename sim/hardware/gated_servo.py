@@ -13,7 +13,7 @@ from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
-from sim.hardware.gated_tick import TOLD_HEAT, TOLD_PUSHES, GateMemory, gated_tick
+from sim.hardware.gated_tick import MOTOR_HEAT, MOTORS_ON, GateMemory, gated_tick
 from sim.loop.loop import make_logs, tick_channels
 from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
@@ -99,7 +99,7 @@ class Ticker:
         self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
         self._number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
-        self._told, self._faults = items(self.gated.told), items(self._device.faults)
+        self._motors, self._faults = items(self.gated.motors), items(self._device.faults)
         self._block = KeptCall(run_block, (parts.servo,), self._number, (1, False, self._ticks, frames))
         gate = self._device, self.gated, field.limiter, field.tank, field.force
         self._gate = KeptCall(gated_tick, gate, self._request)
@@ -108,15 +108,15 @@ class Ticker:
 
     def _row_sources(self) -> list[Array]:
         """Views of the arrays from which a row is gathered, in the order of `CHANNELS`."""
-        device, gated, told = self._device, self.gated, self.parts.driver.telemetry
+        device, gated, telemetry = self._device, self.gated, self.parts.driver.telemetry
         one = {
             "tick": (self._number, 0), "fault": (device.faults, FAULT_CODE),
             "fault_value": (device.faults, FAULT_VALUE), "gaps": (device.faults, FAULT_GAPS),
             "state": (gated.gate, GATE_STATE), "gain": (gated.gate, GATE_GAIN),
-            "share": (gated.gate, GATE_SHARE), "heat": (gated.told, TOLD_HEAT),
+            "share": (gated.gate, GATE_SHARE), "heat": (gated.motors, MOTOR_HEAT),
             "sequence": (device.reading, READING_SEQUENCE), "clock": (device.reading, READING_CLOCK),
-            "round_trip": (told, ROUND_TRIP), "jitter": (told, JITTER),
-            "staleness": (told, STALENESS), "lost": (told, LOST), "refused": (told, BAD),
+            "round_trip": (telemetry, ROUND_TRIP), "jitter": (telemetry, JITTER),
+            "staleness": (telemetry, STALENESS), "lost": (telemetry, LOST), "refused": (telemetry, BAD),
         }  # fmt: skip
         sources = {name: channel.reshape(-1) for name, channel in tick_channels(self._ticks, 1).items()}
         sources |= {name: array[place : place + 1] for name, (array, place) in one.items()}
@@ -124,7 +124,7 @@ class Ticker:
             "asked": self.parts.servo.field.force, "force": gated.force, "torque": gated.torque,
             "theta": device.reading[READING_THETA : READING_THETA + 3],
             "gimbal": device.reading[READING_GIMBAL : READING_GIMBAL + 3],
-            "temperature": told[TEMPERATURE : TEMPERATURE + 3],
+            "temperature": telemetry[TEMPERATURE : TEMPERATURE + 3],
         }  # fmt: skip
         return [sources.get(name, self.row[_PLACES[name]]) for name in CHANNELS]  # those of the clock stay as they are
 
@@ -159,7 +159,7 @@ class Ticker:
         self._number[0], self._request[0] = number, request
         self._block()
         self._gate()
-        pushes = self._told[TOLD_PUSHES] > 0.0
+        pushes = self._motors[MOTORS_ON] > 0.0
         try:
             parts.driver.write(self.gated.torque, pushes)
         except DriverFault as found:

@@ -23,7 +23,7 @@ HOT = 0.98
 """Share of a motor's heat capacity above which a fault is latched."""
 
 MOTORS_HOT = int(Fault.MOTORS_HOT)
-TOLD_HEAT, TOLD_PUSHES = 0, 1
+MOTOR_HEAT, MOTORS_ON = 0, 1
 
 
 class GateMemory(NamedTuple):
@@ -35,7 +35,7 @@ class GateMemory(NamedTuple):
         Arguments of `controllers.safety.gate.pass_gate`.
     heat : Array
         Thermal state of the motors (`controllers.safety.thermal`), shape (3,).
-    told : Array
+    motors : Array
         [largest share of a motor's heat capacity that is used, 1 while the motors are on], shape (2,).
     force, torque : Array
         Force that the gate lets through [N], and torques commanded to the motors [N m], shape (3,).
@@ -50,7 +50,7 @@ class GateMemory(NamedTuple):
     gate: Array
     shaken: Array
     heat: Array
-    told: Array
+    motors: Array
     force: Array
     torque: Array
     cooling: float
@@ -95,14 +95,14 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     weight = gravity_torques((memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
-    gated.told[TOLD_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
+    gated.motors[MOTOR_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
     if gated.own_weight:
         for i in range(3):
             torque[i] += weight[i]
-    if gated.told[TOLD_HEAT] > HOT:
-        latch(faults, MOTORS_HOT, device.hand[HAND_TIME], gated.told[TOLD_HEAT])
+    if gated.motors[MOTOR_HEAT] > HOT:
+        latch(faults, MOTORS_HOT, device.hand[HAND_TIME], gated.motors[MOTOR_HEAT])
     on = pushes(int(gated.gate[GATE_STATE]))
-    gated.told[TOLD_PUSHES] = 1.0 if on else 0.0
+    gated.motors[MOTORS_ON] = 1.0 if on else 0.0
     if faults[FAULT_CODE] != 0.0 or not on:
         force[:] = 0.0
         torque[:] = 0.0

@@ -22,7 +22,8 @@ from sim.hardware.twin import TWIN_CHANNELS, Twin
 from sim.recording.recorder import DiskFull, Group, Recorder
 from sim.recording.recording import RecordingError
 
-TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_READY, TOLD_SIZE = 0, 1, 2, 3, 6, 7, 8
+RECORDER_ROWS, RECORDER_DROPPED, RECORDER_ERROR, RECORDER_FORCE, RECORDER_APART = 0, 1, 2, 3, 6
+RECORDER_READY, RECORDER_SIZE = 7, 8
 """Places in the recorder's status: rows written and dropped, errno of the error that stopped it, the hand's force (3)
 [N], distance from twin to device [m], and 1 once it is ready: compiling the twin may take longer than the ring holds
 rows, so the servo starts only then."""
@@ -61,39 +62,39 @@ def hardware_groups(period: float) -> dict[str, Group]:
     return {"ticks": Group(1.0 / period, CHANNELS | {"dropped": ()} | TWIN_CHANNELS)}
 
 
-def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: SharedNumbers) -> None:
+def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: SharedNumbers) -> None:
     """Record until `orders` holds a 1, or the parent process is gone, and no row is left; the target of a process.
 
-    A full disk, or any other error of writing, ends the recording and is reported in `told`; the servo is not affected.
+    A full disk, or any other error of writing, ends the recording and is in `report`; the servo is not affected.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    status, order, parent = np.zeros(TOLD_SIZE), np.zeros(1), os.getppid()
+    status, order, parent = np.zeros(RECORDER_SIZE), np.zeros(1), os.getppid()
     twin = Twin(job.scene)
     twin.follow(columns(np.zeros((0, ROW_SIZE))))
     try:
         with Recorder(job.path, job.config, job.seed, hardware_groups(job.scene.servo_period), job.static) as recorder:
-            status[TOLD_READY] = 1.0
-            told.write(status)
+            status[RECORDER_READY] = 1.0
+            report.write(status)
             while True:
                 orders.read(order)
                 last = order[0] > 0.0 or os.getppid() != parent
                 taken, lost = rows.take()
-                status[TOLD_DROPPED] += lost
+                status[RECORDER_DROPPED] += lost
                 if len(taken):
                     found = columns(taken)
-                    found |= {"dropped": np.full(len(taken), status[TOLD_DROPPED])} | twin.follow(found)
+                    found |= {"dropped": np.full(len(taken), status[RECORDER_DROPPED])} | twin.follow(found)
                     recorder.append("ticks", found)
-                    status[TOLD_ROWS] += len(taken)
-                    status[TOLD_FORCE : TOLD_FORCE + 3] = found["hand_force"][-1]
-                    status[TOLD_APART] = found["apart"][-1]
-                told.write(status)
+                    status[RECORDER_ROWS] += len(taken)
+                    status[RECORDER_FORCE : RECORDER_FORCE + 3] = found["hand_force"][-1]
+                    status[RECORDER_APART] = found["apart"][-1]
+                report.write(status)
                 if last and not len(taken):
                     break
                 time.sleep(_REST)
             recorder.flush()
-            recorder.close({"rows": int(status[TOLD_ROWS]), "dropped": int(status[TOLD_DROPPED])})
+            recorder.close({"rows": int(status[RECORDER_ROWS]), "dropped": int(status[RECORDER_DROPPED])})
     except (OSError, RuntimeError, RecordingError) as error:
         full = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
-        status[TOLD_ERROR] = float(getattr(error, "errno", None) or full)
-        told.write(status)
+        status[RECORDER_ERROR] = float(getattr(error, "errno", None) or full)
+        report.write(status)
         os._exit(1)  # a normal exit would let HDF5 write again

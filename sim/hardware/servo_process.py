@@ -28,10 +28,10 @@ from sim.compilation.memory_access import items
 from sim.compilation.sequence_lock import read_whole, write_whole
 from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
+from sim.hardware.duration_histogram import Quantiles, Spread, count_time
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers, append_row
-from sim.hardware.spread import Quantiles, Spread, count_time
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end
@@ -116,7 +116,7 @@ class Channels(NamedTuple):
     orders: SharedNumbers
     status: SharedNumbers
     rows: Ring
-    told: Connection
+    reports: Connection
 
 
 def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock) -> None:
@@ -136,7 +136,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
     try:
         parts = make()
     except (SimError, ControllerError, ModelError, OSError) as error:
-        channels.told.send(Refused(str(error)))
+        channels.reports.send(Refused(str(error)))
         return
     process = ServoProcess(Ticker(parts), channels, clock)
     broken = ""
@@ -147,7 +147,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         broken = traceback.format_exc()
     finally:
         parts.driver.let_go()
-        channels.told.send(process.ended(broken))
+        channels.reports.send(process.ended(broken))
         process.close()
         parts.driver.close()
 
@@ -189,7 +189,7 @@ class ServoProcess:
     """
 
     def __init__(self, ticker: Ticker, channels: Channels, clock: ServoClock):
-        self._ticker, self._told, self._clock = ticker, channels.told, clock
+        self._ticker, self._reports, self._clock = ticker, channels.reports, clock
         self._period = ticker.parts.gate.period
         order, parent = np.zeros(ORDER_SIZE), np.zeros(1)
         self._order, self._parent = items(order), items(parent)
@@ -211,7 +211,7 @@ class ServoProcess:
         self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
         self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # losses before the start do not count
         self._resources = _resources()
-        self._told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
+        self._reports.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:
         """Tick at absolute deadlines, until there is an order to end or the parent process is gone."""

@@ -3,8 +3,8 @@
 import numpy as np
 from numba import njit
 
-from controllers.fields.program import evaluate
-from controllers.fields.walker_feed import Walkers, feed_walkers
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
 from controllers.state import HAND_POSITION, HAND_SWITCH, Array
 from sim.compilation.compiled import entry_point
 from sim.loop.servo import Field

@@ -2,7 +2,7 @@
 
 from numba import typeof, types
 
-from controllers.fields.law import Program
+from controllers.fields.algebra.law import Program
 from sim.body.drive import follow_units
 from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit

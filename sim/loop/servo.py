@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.law import Program
-from controllers.fields.map_feed import feed_maps, feed_rows
-from controllers.fields.program import evaluate
-from controllers.fields.walker_feed import Walkers, feed_walkers, fresh_walkers
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.algebra.walker_feed import Walkers, feed_walkers, fresh_walkers
 from controllers.lent import lend
 from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
@@ -47,7 +47,7 @@ class Field(NamedTuple):
 
     `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
     `slots` are the places in `memory` where laws in Python put their wrenches. `maps` says which laws are given values
-    of the haptic map (see `controllers.fields.map_feed`), `walkers` are the state of figures that are
+    of the haptic map (see `controllers.fields.algebra.map_feed`), `walkers` are the state of figures that are
     led, which laws and the map read.
     """
 
@@ -134,7 +134,7 @@ class TickLog(NamedTuple):
     torque : Array
         Torques at the Phantom's joints [N m], shape (n, 3).
     trace : Array
-        Phase, closest point, distance (see `controllers.fields.instructions`), shape (n, 8).
+        Phase, closest point, distance (see `controllers.fields.algebra.instructions`), shape (n, 8).
     ctrl : Array
         All motor commands, shape (n, nu).
     applied : Array

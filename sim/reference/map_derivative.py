@@ -3,7 +3,7 @@
 import numpy as np
 from numba import types
 
-from controllers.fields.instructions import VECTOR
+from controllers.fields.algebra.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.state import Array, IntArray

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numba import typeof, types
 
-from controllers.fields.instructions import VECTOR
+from controllers.fields.algebra.instructions import VECTOR
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of

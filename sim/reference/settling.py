@@ -32,7 +32,7 @@ _ROUND = 4e-3  # r [m], rounds the onset of S
 
 
 @njit
-def slowness(p: Array, v: Array, seconds: float) -> float:
+def lowering_goal(p: Array, v: Array, seconds: float) -> float:
     """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips that last `seconds`."""
     square = p[0] * p[0] + p[1] * p[1]
     if square == 0.0:
@@ -74,7 +74,7 @@ def clearance(limbs: Array, ends: Array, pose: Array) -> float:
 
 
 @njit
-def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
+def lower_to_floor(limbs: Array, ends: Array, share: float, pose: Array) -> None:
     """Lower a pose (75,) by a share of its feet's clearance; `limbs` are `packed_steppers`, `ends` (n, 7) scratch."""
     if share <= 0.0 or limbs.shape[0] == 0:
         return
@@ -85,11 +85,11 @@ def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
 
 
 @entry_point
-def stood(limbs: Array, pose: Array) -> None:
-    """Lower the initial pose (75,) of a run fully to the floor; see `let_down`."""
-    let_down(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)
+def lower_start(limbs: Array, pose: Array) -> None:
+    """Lower the initial pose (75,) of a run fully to the floor; see `lower_to_floor`."""
+    lower_to_floor(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)
 
 
-def stood_unit() -> Unit:
-    """The compilation unit of `stood`."""
-    return Unit.of(stood, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"))
+def lower_start_unit() -> Unit:
+    """The compilation unit of `lower_start`."""
+    return Unit.of(lower_start, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"))

@@ -6,7 +6,7 @@ figure is shown in (`sim.reference.river_changes`). Only such a map needs that c
 
 from numba import njit
 
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import (
     COURSE,
@@ -21,7 +21,7 @@ from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
 from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
-from sim.reference.settling import approach, let_down, slowness
+from sim.reference.settling import approach, lower_to_floor, lowering_goal
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
 from sim.reference.transition import dwells
 
@@ -41,8 +41,8 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
     stylus : Array
         Measured position in H and orientation wxyz, shape (7,).
     trace : Array
-        Trace of the field, with the active river and the hand's phase on it (see `controllers.fields.instructions`).
-        Not read; see `update_river_reference`.
+        Trace of the field, with the active river and the hand's phase on it (see
+        `controllers.fields.algebra.instructions`). Not read; see `update_river_reference`.
     """
     _smooth(reference, stylus)
     look_around(reference, reference.hand)
@@ -70,12 +70,12 @@ def _smooth(reference: CompiledReference, stylus: Array) -> None:
         hand[0, :] = stylus[:3]
         reference.trail[0], reference.trail[1] = stylus[:3], stylus[:3]
         reference.orientation[:] = stylus[3:]
-        reference.settled[0] = slowness(hand[0], hand[1], reference.clip_seconds)
+        reference.settled[0] = lowering_goal(hand[0], hand[1], reference.clip_seconds)
     else:
         reference.trail[1], reference.trail[0] = reference.trail[0], hand[0]
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
-        approach(reference.settled, slowness(hand[0], hand[1], reference.clip_seconds), period)
+        approach(reference.settled, lowering_goal(hand[0], hand[1], reference.clip_seconds), period)
 
 
 @njit
@@ -119,4 +119,4 @@ def _settle(reference: CompiledReference) -> None:
     s, period, transition = reference.settled, reference.period, reference.transition
     for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
         share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
-        let_down(transition.limbs, transition.ends, share, pose)
+        lower_to_floor(transition.limbs, transition.ends, share, pose)

@@ -9,10 +9,10 @@ from sim.errors import SimError
 from sim.users.intents.own import Own
 from sim.users.person import person_state as at
 from sim.users.person.body import arm_matrices, check_steps
-from sim.users.person.chance import fresh_chance
 from sim.users.person.eye import LOOKS, no_eye
 from sim.users.person.person import Person
 from sim.users.person.person_state import PersonState
+from sim.users.person.random_numbers import fresh_chance
 from sim.users.person.wishes import Wishes
 
 LONGEST_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay

@@ -17,11 +17,11 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, neighbours
 from controllers.certificates.report import Verdict, hash_of, leaving_out
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law
 from controllers.fields.bunny import Bunny
-from controllers.fields.compiled_law import CompiledLaw
 from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
-from controllers.fields.law import Law
+from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.certify.certificate_page import certificate_page
 from experiments.certify.certified_device import phantom_device

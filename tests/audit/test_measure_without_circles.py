@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from experiments.config.words import run_config
-from experiments.results.measures import PathMeasure
+from experiments.results.measures.run_measures import PathMeasure
 from experiments.runs.run import run
 from models.humanoid.skeleton import FOOT_CONTACTS, JOINTS, figure_model, joint_range, rest_pose, standing_com
 from models.mocap.library import embedded

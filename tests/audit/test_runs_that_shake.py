@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.results.oscillation import oscillation_summary
+from experiments.results.measures.oscillation import oscillation_summary
 
 
 def recording(force, away=None, period=1e-3):

@@ -53,7 +53,7 @@ def test_a_convolved_bunny_is_certified_by_the_gains_that_are_felt():
 def test_a_held_tube_pulls_to_the_place_that_is_chosen(hold):
     program = StretchyTubes(CIRCLE, 150.0, 200.0, 14.0, hold=hold).program()
     memory, wrench, away = program.fresh_memory(), np.empty(6), CIRCLE.point(1.0) * 1.1
-    from controllers.fields.program import evaluate
+    from controllers.fields.algebra.program import evaluate
 
     def force(p, switch, t):
         hand = HandState.at(p, (0.0, 0.0, 0.0), t)._replace(switch=switch).vector()

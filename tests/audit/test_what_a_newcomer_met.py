@@ -181,7 +181,7 @@ def test_no_command_line_ends_in_a_traceback(
 ) -> None:
     """Random options with random values: what runs is of one tick, without a figure and a page."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.results.report_of.write_report_of", lambda folder: None)
+    monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)
     for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify", "arm"):
         monkeypatch.setattr(command_class(name), "__call__", lambda self: 0)  # what is typed is read, and no more
     chance = random.Random(seed)
@@ -249,15 +249,15 @@ def test_two_runs_do_not_write_into_one_folder(run: Path, capsys: pytest.Capture
 
 
 def test_a_run_of_a_day_says_first_what_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.console import foresight
+    from experiments.console import estimates
     from sim.recording.recorder import Group
 
-    monkeypatch.setattr(foresight, "expected_seconds", lambda what: 0.25)
+    monkeypatch.setattr(estimates, "expected_seconds", lambda what: 0.25)
     groups = {"ticks": Group(1000.0, {"x": (100,)})}
-    said = foresight.foreseen(tmp_path, 86400.0 / 24, groups)
+    said = estimates.foreseen(tmp_path, 86400.0 / 24, groups)
     assert said is not None
     assert said.startswith("3600 s of simulated time take about 15 minutes at the pace of the last run, and 2.88 GB of")
-    assert foresight.foreseen(tmp_path, 10.0, groups) is None
+    assert estimates.foreseen(tmp_path, 10.0, groups) is None
 
 
 def test_a_certificate_of_something_else_is_not_replaced_unasked(
@@ -343,7 +343,7 @@ def test_figures_of_slow_commands_are_printed_as_json(tmp_path: Path, capsys: py
 def test_what_was_chosen_by_default_is_in_the_resolved_configuration(run: Path, tmp_path: Path) -> None:
     """Pushes and grabs of a hand that none were given for; a run of that file has them again."""
     from experiments.config.run_config import load_config
-    from experiments.setups.defaults import resolved
+    from experiments.setups.parts.defaults import resolved
 
     out = tmp_path / "pushed"
     assert main(["run", "--figure", "none", "--user", "push", "--lap", "0.5", "--seconds", "1", "--out", str(out)]) == 0

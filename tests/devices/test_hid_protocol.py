@@ -12,14 +12,14 @@ from sim.devices import hid_protocol as protocol
 from sim.devices.driver import fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SWITCH, READING_THETA
 from sim.devices.hid_reports import (
+    IO_ENABLE,
+    IO_FAULT,
+    IO_NEW,
+    IO_SIZE,
     N_BOOT,
     N_LAST,
     N_SENT,
     N_WATCHDOG,
-    TOLD_ENABLE,
-    TOLD_FAULT,
-    TOLD_NEW,
-    TOLD_SIZE,
     HidMemory,
     judge_report,
     make_command,
@@ -60,13 +60,13 @@ def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
         for struct, layout in STRUCTS.items()
         for name in layout.names
     ]
-    told = printed(tmp_path, lines)
+    io = printed(tmp_path, lines)
     expected = [
         f"{struct} {name} {layout.fields[name][1]} {layout.fields[name][0].itemsize}"
         for struct, layout in STRUCTS.items()
         for name in layout.names
     ]
-    assert told.split("\n")[:-1] == expected
+    assert io.split("\n")[:-1] == expected
     assert all(layout.itemsize == protocol.REPORT_SIZE for layout in STRUCTS.values())
 
 
@@ -78,16 +78,16 @@ def test_reports_that_compiled_code_takes_apart_and_puts_together_are_those_of_t
         record["report"], record["status"], record["sequence"] = protocol.INPUT, 0, k + 1
         record["temperature"] = rng.integers(1 - 2**15, 9000, 3)
         hid.numbers[N_BOOT], hid.numbers[N_LAST] = record["boot"], k
-        hid.incoming.u8[:64], hid.told[TOLD_SIZE] = np.frombuffer(protocol.sealed(record), np.uint8), 64
+        hid.incoming.u8[:64], hid.io[IO_SIZE] = np.frombuffer(protocol.sealed(record), np.uint8), 64
         judge_report(hid)
-        assert (hid.told[TOLD_FAULT], hid.told[TOLD_NEW]) == (0.0, 1.0)
+        assert (hid.io[IO_FAULT], hid.io[IO_NEW]) == (0.0, 1.0)
         np.testing.assert_array_equal(hid.reading[READING_THETA:], record["encoder"])
         assert hid.reading[READING_SWITCH] == record["flags"] % 2
         assert hid.reading[READING_CLOCK] == record["time_us"].astype(np.int64) * 1e-6
         np.testing.assert_allclose(hid.telemetry[:3], record["temperature"] * protocol.TEMPERATURE_UNIT)
 
         torque, sent = rng.integers(-(2**31), 2**31, 3), int(rng.integers(0, 2**32))
-        hid.torque[:], hid.told[TOLD_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
+        hid.torque[:], hid.io[IO_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
         hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
         make_command(hid)
         made = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
@@ -109,8 +109,8 @@ def test_constants_are_the_header_s(tmp_path: Path) -> None:
         "HVF_CALIBRATION": protocol.CALIBRATION, "HVF_SWITCH": protocol.SWITCH, "HVF_ENABLE": protocol.ENABLE,
         "HVF_CALIBRATED": protocol.CALIBRATED,
     }  # fmt: skip
-    told = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
-    assert [int(line) for line in told.split()] == list(pairs.values())
+    io = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
+    assert [int(line) for line in io.split()] == list(pairs.values())
 
 
 def test_the_checksum_is_crc_32_of_ethernet_in_both(firmware: Firmware) -> None:
@@ -257,9 +257,9 @@ def test_the_page_s_bytes_are_those_of_the_firmware_and_of_the_driver(firmware: 
     np.testing.assert_allclose(firmware.joint_torque, np.array([1e-3, -2e-3, 3e-3]) * PREMIUM_1_5.capstan, rtol=1e-12)
     firmware.sensors.encoder[:] = [1000, -2000, 3000, 0, 100, -100]
     firmware.sensors.pressed = 1
-    told = firmware.tick()
-    assert told == of_the_page(protocol.INPUT)
-    report = np.frombuffer(told, protocol.INPUT_REPORT)[0]
+    io = firmware.tick()
+    assert io == of_the_page(protocol.INPUT)
+    report = np.frombuffer(io, protocol.INPUT_REPORT)[0]
     fields = ("flags", "status", "sequence", "time_us", "boot", "answered", "held_us", "refused")
     assert [int(report[name]) for name in fields] == [1, 3, 1, 1000, 1, 7, 1000, 0]
     assert report["encoder"].tolist() == [1000, -2000, 3000, 0, 100, -100]

@@ -10,8 +10,8 @@ import pytest
 from numba import njit
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.edited import Edited, performance
-from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from experiments.config.words import run_config
 from experiments.setups.setups import map_parts, parts_of

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.fields.program import evaluate
-from controllers.fields.walker_feed import feed_walkers
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from controllers.walking.gait import Gait
 from controllers.walking.walker import walker_at
 from experiments.config.modes import Lead
-from experiments.setups.lead import leading, leading_hand
+from experiments.setups.modes.lead import leading, leading_hand
 from sim.users.hand.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")

@@ -12,7 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.orientation import Orientation
 from controllers.haptic_map.composite import Composite
 from controllers.state import HandState
-from experiments.setups.expression import expressive_figure, lap_turns
+from experiments.setups.parts.expression import expressive_figure, lap_turns
 from models.humanoid.skeleton import BODIES
 from models.mocap.library import embedded
 from sim.users.hand.actions import turn_table

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.fields.program import evaluate
+from controllers.fields.algebra.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
 from experiments.config.words import run_config
 from experiments.setups.setups import map_parts, parts_of

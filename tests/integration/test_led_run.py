@@ -9,7 +9,7 @@ import pytest
 
 from experiments.config.words import run_config
 from experiments.runs.run import run
-from experiments.setups import lead
+from experiments.setups.modes import lead
 from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow

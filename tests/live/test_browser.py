@@ -9,9 +9,9 @@ import pytest
 
 from experiments.config.words import run_config
 from experiments.live.cap_hand import CapHand
-from experiments.live.desk import MOST_BYTES
 from experiments.live.gate import Gate
-from experiments.live.hand_keys import STEP
+from experiments.live.panels.hand_keys import STEP
+from experiments.live.session.desk import MOST_BYTES
 from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.live.desk import MOST_BYTES, Desk
+from experiments.live.session.desk import MOST_BYTES, Desk
 from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh
 from sim.errors import SimError

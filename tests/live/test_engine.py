@@ -5,10 +5,10 @@ import pytest
 
 from controllers.errors import ParameterError
 from experiments.config.words import run_config
-from experiments.live.engine import STRONGEST, Drag, Engine
-from experiments.live.engine_process import slice_points
-from experiments.live.gains import gains_of, with_gain
-from experiments.live.takes import Take
+from experiments.live.session.engine import STRONGEST, Drag, Engine
+from experiments.live.session.engine_process import slice_points
+from experiments.live.session.gains import gains_of, with_gain
+from experiments.live.session.takes import Take
 from experiments.results.folder import EDITED, RECORDING
 from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire

@@ -6,8 +6,8 @@ from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from experiments.certify.certify import certified_rivers
 from experiments.config.words import run_config
-from experiments.live.gain_verdict import GainVerdicts
-from experiments.live.gains_panel import verdict_html
+from experiments.live.panels.gains_panel import verdict_html
+from experiments.live.session.gain_verdict import GainVerdicts
 from experiments.setups.certified_law import governor_drag
 
 

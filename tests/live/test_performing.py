@@ -12,7 +12,7 @@ import pytest
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.live import driver
-from experiments.live.take_mix import FPS, TakeData
+from experiments.live.session.take_mix import FPS, TakeData
 from sim.recording.recording import Recording
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.live.take_mix import FPS, Region, TakeData, between, mixed
-from experiments.live.takes_panel import next_name
+from experiments.live.panels.takes_panel import next_name
+from experiments.live.session.take_mix import FPS, Region, TakeData, between, mixed
 
 LAP = 4.0
 

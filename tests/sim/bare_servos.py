@@ -3,8 +3,8 @@
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Program
 from controllers.fields.follow import Follow
-from controllers.fields.law import Program
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import HandState

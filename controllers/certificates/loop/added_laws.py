@@ -7,7 +7,7 @@ import casadi
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.laws import Law
 from controllers.errors import ControllerError
-from controllers.fields.function_law import FunctionLaw
+from controllers.fields.own.function_law import FunctionLaw
 from controllers.state import HandState
 
 

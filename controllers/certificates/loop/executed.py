@@ -15,8 +15,8 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
-from controllers.fields.law import Program
-from controllers.fields.program import evaluate
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import evaluate
 from controllers.state import Array, HandState
 
 STEP = 1e-6  # [rad], [rad/s] of the differences

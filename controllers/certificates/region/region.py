@@ -23,7 +23,7 @@ from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, f
 from controllers.certificates.region.remainder import Course, Remainder, remainder
 from controllers.certificates.region.tube_bounds import TubeBounds, tube_bounds
 from controllers.certificates.report import CertificateError, Verdict
-from controllers.fields.window import window
+from controllers.fields.algebra.window import window
 from controllers.state import Array
 
 # [m], [m/s] limits of a region: beyond, the bounds of the remainder grow too fast. The demo's region reaches 5.0 mm and

@@ -35,7 +35,7 @@ from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common
 from controllers.curves.closest_point import closest_phases
-from controllers.fields.window import window
+from controllers.fields.algebra.window import window
 from controllers.state import Array
 
 CORE = 0.1  # share of a tube's radius within which the hysteresis bounds the dwell time

@@ -14,9 +14,9 @@ import numpy as np
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER
-from controllers.fields.program import evaluate
 from controllers.state import Array, HandState
 
 LOST = 0.02  # [s] without an active river after which a hand counts as thrown out

@@ -14,14 +14,14 @@ from experiments.config.maps import MapFile
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.config.words import run_config
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.code_hash import code_hash
 from experiments.trials.design.design import Condition, Meeting, conditions, meetings
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.participants import participants
 from experiments.trials.design.study_config import StudyConfig, Words
 from models.mocap.library import embedded_names
 from sim.users.person.person import Person
+from sim.users.person.population import population
 
 
 class Trial(NamedTuple):
@@ -50,7 +50,7 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
     ControllerError, SimError, ModelError
         If the design contradicts itself, a level sets a parameter that a run does not have, or a clip does not exist.
     """
-    people = participants(study.users)
+    people = population(study.users.number, study.users.seed)
     bases = {number: _base(study, people[0], condition) for number, condition in enumerate(conditions(study))}
     _check_apart(study, bases)
     trials: list[Trial] = []

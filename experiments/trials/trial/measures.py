@@ -12,9 +12,9 @@ import numpy as np
 
 from controllers.state import Array, Mask
 from experiments.config.run_config import PERSONAL, RunConfig
-from experiments.results.measures import SETTLING
-from experiments.results.pose_distance import geodesic_distance, seen_distance
-from experiments.results.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
+from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
+from experiments.results.measures.run_measures import SETTLING
+from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.trials.trial.trial_log import TrialLog

@@ -17,7 +17,7 @@ from experiments.config.maps import Composite, Cylindrical
 from experiments.config.part import from_json, to_dict
 from experiments.config.run_config import RunConfig
 from experiments.results.folder import RECORDING
-from experiments.setups.parts import MapParts
+from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import measured_trial

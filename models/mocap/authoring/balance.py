@@ -22,6 +22,8 @@ from models.mocap.motion.clip import Clip
 
 # Height below which a contact sphere is support [m], at any speed, unlike in `contacts`: authored soles are exact.
 _SUPPORT_HEIGHT = 0.006
+_CUTOFF, _ROUNDS = 8.0, 12  # highest frequency of the sway [Hz], and iterations of its correction
+_WITHIN = 0.7  # the zero-moment point is to lie within the support polygon scaled by this about its middle
 
 
 class Dynamics(NamedTuple):
@@ -120,9 +122,7 @@ def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
     return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
 
 
-def balanced_clip(
-    choreography: Choreography, fps: float, cutoff: float = 8.0, rounds: int = 12, share: float = 0.7
-) -> Clip:
+def balanced_clip(choreography: Choreography, fps: float) -> Clip:
     """Sample a cyclic in-place choreography with a sway of the pelvis that keeps the zero-moment point under the feet.
 
     A sway δ of the pelvis moves the zero-moment point by about δ − (h/g) δ̈ (cart-table model, Kajita et al. 2003). For
@@ -134,12 +134,6 @@ def balanced_clip(
         The motion; its sway is added to the x and y of its keys.
     fps : float
         Frame rate [1/s].
-    cutoff : float
-        Highest frequency of the sway [Hz].
-    rounds : int
-        Number of iterations.
-    share : float
-        The zero-moment point is to lie within the support polygon scaled by this factor about its middle.
 
     Returns
     -------
@@ -150,15 +144,15 @@ def balanced_clip(
     t = np.linspace(0.0, choreography.duration, n + 1)
     sway = np.zeros((n + 1, 2))
     frequency = np.arange(n // 2 + 1) / choreography.duration
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
         wanted = [
-            supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
+            supported(point, contacts, _WITHIN) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
         ]
         # A sway adds a moment, which moves the zero-moment point further where the vertical force is smaller.
         load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
         error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)
-        error[frequency > cutoff] = 0.0
+        error[frequency > _CUTOFF] = 0.0
         error /= (1 + motion.com[:, 2].mean() / GRAVITY * (2 * np.pi * frequency) ** 2)[:, None]
         change = np.fft.irfft(error, n, axis=0)
         sway += np.vstack([change, change[:1]])

@@ -1,4 +1,4 @@
-"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm and its derivative, velocities, slerp."""
+"""Arrays of unit quaternions (wxyz): product, rotation of vectors, heading, logarithm, slerp."""
 
 import numpy as np
 
@@ -38,6 +38,12 @@ def about_axis(axis: int, angle: Array) -> Array:
     q[..., 0] = np.cos(angle / 2)
     q[..., 1 + axis] = np.sin(angle / 2)
     return q
+
+
+def heading(q: Array) -> Array:
+    """Angle about z [rad] by which the x axis is turned in the plane, shape (...)."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def logarithm(q: Array) -> Array:

@@ -98,13 +98,6 @@ def turns(rate: Array, load: Array, fps: float) -> list[tuple[int, int]]:
     return [turn for k, turn in enumerate(found) if k == 0 or turn[0] >= found[k - 1][1]]
 
 
-def heading(turned: Array) -> Array:
-    """Heading of a foot's forward axis about the vertical [rad], for its rotations, shape (..., 4)."""
-    x = 1.0 - 2.0 * (turned[..., 2] ** 2 + turned[..., 3] ** 2)
-    y = 2.0 * (turned[..., 1] * turned[..., 2] + turned[..., 0] * turned[..., 3])
-    return np.arctan2(y, x)
-
-
 def lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
     """Sphere centres of a sole flat on the floor, placed at the median of its spheres over frames, shape (4, 3) [m]."""
     c, s = np.cos(yaw), np.sin(yaw)

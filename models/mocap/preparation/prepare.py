@@ -21,7 +21,8 @@ from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import contact_points, resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import Stances, rested, stances
-from models.mocap.retargeting.retarget import COARSE, Hints, RetargetReport
+from models.mocap.retargeting.hints import Hints
+from models.mocap.retargeting.retarget_report import COARSE, RetargetReport
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 # RMS change of joints [rad] and of the root's height [m] beyond which the result counts as another motion. Films of

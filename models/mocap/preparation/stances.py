@@ -24,7 +24,7 @@ from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.motion.spans import cleaned, spans
-from models.mocap.preparation.foot_places import LOADED, heading, lying, place_foot, turns
+from models.mocap.preparation.foot_places import LOADED, lying, place_foot, turns
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
 from models.mocap.preparation.poses import around, contact_points, sole_points
 
@@ -105,7 +105,10 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
         own = turned[:, BODIES.index(f"{side}_foot")]
-        yaw, rate = np.unwrap(heading(own)), quaternions.rotated(own, quaternions.velocities(own, fps))[:, 2]
+        yaw, rate = (
+            np.unwrap(quaternions.heading(own)),
+            quaternions.rotated(own, quaternions.velocities(own, fps))[:, 2],
+        )
         for start, end in spans(np.any(parts[:, foot], axis=1)):
             stance = slice(start, end)
             turning = turns(rate[stance], load[stance], fps)
@@ -170,7 +173,7 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
             if schedule.standing[at, mine].any():
                 place = schedule.places[at, mine]
             else:
-                yaw = float(heading(turned[at, BODIES.index(f"{side}_foot")]))
+                yaw = float(quaternions.heading(turned[at, BODIES.index(f"{side}_foot")]))
                 place = lying(points[None, at, mine], soles()[mine], yaw, [0, 1, 2, 3])
             made.places[span, mine] = place
             made.standing[span, mine] = made.pushing[span, mine] = True

@@ -188,7 +188,7 @@ def _read_character(path: Path) -> tuple[_Joint, ...]:
             raise MotionFileError(path, 1, what, f"a name and one of {', '.join(_WIDTH)}")
         if (
             type(parent) is not int
-            or not (-1 if index == 0 else 0) <= parent < max(index, 0)
+            or not (-1 if index == 0 else 0) <= parent < index
             or not all(_is_number(value) for value in attach)
         ):
             raise MotionFileError(path, 1, f"joint {quoted(name)}: Parent or Attach", "an earlier joint and numbers")

@@ -21,14 +21,15 @@ Another set-up of the same rig (joint frames G_J D, another rest pose) changes C
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
-from models.mocap.retargeting.body_lines import AT_REST, SIDES, BodyLines, unit
+from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
+from models.mocap.retargeting.segment_frames import arcs, carried, frames
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
+from models.mocap.retargeting.sole_calibration import calibrated_foot, flat_frames
 
 _Z = np.array([0.0, 0.0, 1.0])
 # Standard deviation of the weight w over the angle between trunk and thighs: half of it turns the joints of 19
@@ -37,29 +38,10 @@ _STRAIGHT = np.deg2rad(20.0)
 _BEND = np.sin(np.deg2rad(12.0))  # least bend that defines a plane: knees of straight legs are up to 12° off the line
 # Weight of the parent's axis beside the hinge axis: that of a bend by 15°; half or twice turns joints by 0.3° RMS.
 _UNBENT = 0.01
-_TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
-_PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs, and 16 frames a second, need more
-# Height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]: half of it turns
-# the joints of 19 captures by 0.5° RMS, twice by 0.02°.
-_LOW = 0.05
-_ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
-# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the captures of ../shared/mocap, 30° in one of
-# fifty others. A squat on the toes, and single poses with a foot in the air, have 37 to 114°.
-_STRANGE = np.deg2rad(35.0)
-_SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals: half or twice changes none of 17 captures
 # Inclination of the chest up to which a head can be level: 25° turns the joints of a dance by 11° RMS, 80° those of
 # four of 17 captures by up to 1.3°.
 _UPRIGHT = np.cos(np.deg2rad(50.0))
 _ROUNDS = 5  # iterations for the trunk line: each leaves a third of the error, as the pelvis is a third of the line
-# Standard deviation of a sole's likely inclination about that of the mean ankle: half or twice turns the joints of 19
-# captures by 0.3 or 0.2° RMS, in one of them by 3.5°.
-_ANKLE = np.deg2rad(20.0)
-# Least component of the toes' direction along the sole from which a foot's heading is taken: half or twice changes
-# none of 19 captures.
-_POINTING = 0.3
-# Least number of frames from which a sole's orientation is taken: with 2 the joints of one of 17 captures turn by 0.7°
-# RMS, with 6 those of a run, whose stances are short, by 4.6°.
-_LEAST = 3
 
 
 class Calibration(NamedTuple):
@@ -117,9 +99,9 @@ def calibrate(
             body.put(f"{SIDES[k]}_foot", body.of(f"{SIDES[k]}_shank"))
             counts.append(0)
             continue
-        flat = _flat(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
+        flat = flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
         shank = body.of(f"{SIDES[k]}_shank")
-        sole, used = _foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
+        sole, used = calibrated_foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
         body.put(f"{SIDES[k]}_foot", sole)
         counts.append(used)
     return Calibration(body.segments, least, (counts[0], counts[1]))
@@ -146,7 +128,7 @@ class _Body:
         if index is None:
             return None
         end = self.roles.ends.get(body)
-        if end is not None and body != "foot" and index in ancestry(self._parents[end], self._parents):
+        if end is not None and index in ancestry(self._parents[end], self._parents):
             index = self._parents[end]
         return self._rotations[:, index]
 
@@ -177,23 +159,37 @@ def _put_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
         if source is None:
             body.put(name, body.of("pelvis"))
             continue
-        wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
-        turned = _carried(source, wanted, straight)
+        wanted = quaternions.product(frames(left, trunk), quaternions.conjugate(own_trunk))
+        turned = carried(source, wanted, straight)
         if name == "pelvis":
             # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
-            turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
+            turned = quaternions.product(arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
         body.put(name, turned)
     if "abdomen" not in body.roles.segments:
         body.put("abdomen", quaternions.slerped(body.of("pelvis"), body.of("chest"), 0.5))
     chest = body.of("chest")
     for name in ("left_clavicle", "right_clavicle"):
         source = body.joint(name)
-        body.put(name, chest if source is None else _carried(source, chest, straight))
+        body.put(name, chest if source is None else carried(source, chest, straight))
 
 
 def _put_head(body: _Body, up: Array, straight: Array) -> None:
+    """The head: on average of the upright frames level, with the heading of the chest.
+
+    People keep the eyes level whatever the trunk does (Pozzo et al. 1990). The head of a body that is never upright
+    has the orientation of the chest on average.
+    """
     source, chest = body.joint("head"), body.of("chest")
-    body.put("head", chest if source is None else _head(source, chest, up, straight))
+    if source is None:
+        body.put("head", chest)
+        return
+    upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
+    if upright.sum() < 1e-6:
+        body.put("head", carried(source, chest, straight))
+        return
+    left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
+    left = unit(left - (left @ up)[:, None] * up)
+    body.put("head", carried(source, frames(left, np.broadcast_to(up, left.shape)), upright))
 
 
 def _put_limbs(body: _Body, lines: BodyLines, k: int) -> None:
@@ -209,30 +205,15 @@ def _put_limbs(body: _Body, lines: BodyLines, k: int) -> None:
     for parent, name, start, end, hinge, along, across in bones:
         body.put(name, _limb(body.joint(name), (end - start)[:, k], hinge, body.of(parent), along, across))
     hand, forearm = body.joint(f"{side}_hand"), body.of(f"{side}_forearm")
-    body.put(f"{side}_hand", forearm if hand is None else _carried(hand, forearm, np.ones(len(forearm))))
+    body.put(f"{side}_hand", forearm if hand is None else carried(hand, forearm, np.ones(len(forearm))))
 
 
 def _own_trunk(has_arms: bool) -> Array:
-    """Frame of the figure's own trunk line in the rest pose, built like a source's by `_frames`."""
+    """Frame of the figure's own trunk line in the rest pose, built like a source's by `frames`."""
     model = figure_model()
     top = model.body("abdomen").pos + model.body("chest").pos
     top = top + (model.body("left_clavicle").pos + model.body("left_upper_arm").pos if has_arms else 0.0)
-    return _frames(np.array([[0.0, 1.0, 0.0]]), unit(np.array([[top[0], 0.0, top[2]]])))[0]
-
-
-def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
-    """R of the head: on average of the upright frames level, with the heading of the chest.
-
-    People keep the eyes level whatever the trunk does (Pozzo et al. 1990). The head of a body that is never upright
-    has the orientation of the chest on average.
-    """
-    upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
-    if upright.sum() < 1e-6:
-        return _carried(source, chest, straight)
-    left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
-    left = unit(left - (left @ up)[:, None] * up)
-    level = _frames(left, np.broadcast_to(up, left.shape))
-    return _carried(source, level, upright)
+    return frames(np.array([[0.0, 1.0, 0.0]]), unit(np.array([[top[0], 0.0, top[2]]])))[0]
 
 
 def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
@@ -253,29 +234,13 @@ def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool)
         ]
         own = quaternions.rotated(segments[:, 0], abdomen) + quaternions.rotated(segments[:, 1], chest)
         own = unit(own + (ends[0] + ends[1]) / 2.0)
-        turn = _arcs(own, np.where(np.isnan(trunk), own, trunk))
+        turn = arcs(own, np.where(np.isnan(trunk), own, trunk))
         segments[:, carried] = quaternions.product(turn[:, None], segments[:, carried])
         if not clavicled:
             continue
         own = quaternions.rotated(turn, unit(ends[0] - ends[1]))
-        turn = _arcs(own, np.where(np.isnan(shoulders), own, shoulders))
+        turn = arcs(own, np.where(np.isnan(shoulders), own, shoulders))
         segments[:, sides] = quaternions.product(turn[:, None], segments[:, sides])
-
-
-def _frames(left: Array, along: Array) -> Array:
-    """Rotations that turn y into `left` and z as nearly as possible into `along`, shape (n, 4)."""
-    x = unit(np.cross(left, along))
-    matrices = np.stack((x, left, np.cross(x, left)), axis=-1)
-    # Where both are parallel, the frame is undefined; the substitute has no weight, since such a trunk is not straight.
-    matrices[np.isnan(matrices).any(axis=(1, 2))] = np.eye(3)
-    return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
-
-
-def _carried(source: Array, wanted: Array, weights: Array) -> Array:
-    """G C with C the mean of G⁻¹ T (Markley et al. 2007: the mean that minimises the chordal distance)."""
-    offsets = Rotation.from_quat(quaternions.product(quaternions.conjugate(source), wanted), scalar_first=True)
-    constant = np.asarray(offsets.mean(weights).as_quat(scalar_first=True))
-    return quaternions.product(source, constant)
 
 
 def _limb(
@@ -284,9 +249,9 @@ def _limb(
     """R of a limb's segment: axis `along` is on its bone in every frame, axis `across` on its hinge on average."""
     axis, sign = along
     if np.isnan(bone).any():
-        return parent if source is None else _carried(source, parent, np.ones(len(parent)))
+        return parent if source is None else carried(source, parent, np.ones(len(parent)))
     bone = unit(bone)
-    straight = quaternions.product(_arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
+    straight = quaternions.product(arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
     unbent = quaternions.rotated(straight, np.eye(3)[across])
     sine = np.linalg.norm(hinge, axis=1, keepdims=True)
     evidence = np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent
@@ -302,93 +267,4 @@ def _limb(
     columns[:, third] = np.cross(columns[:, (third + 1) % 3], columns[:, (third + 2) % 3])
     turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
     # In files that stretch bones, or bend them at joints in between, bones turn relative to the joint frames.
-    return quaternions.product(_arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)
-
-
-def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
-    """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
-
-    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames. The feet of a
-    body that walks on the spot stand where they move with the ground under it.
-    """
-    n = len(source)
-    if n == 1:
-        return np.array([0])
-    places = [lines.lowest_joints[:, k]]
-    if not np.isnan(lines.toes[:, k]).any():
-        places.append(lines.toes[:, k])
-    turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
-    heights = lines.lowest_joints @ up
-    low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
-    ground = _ground(lines, up, fps)
-    off = [np.linalg.norm(np.gradient(place, axis=0) - ground, axis=1) for place in places]
-    passing = np.max(off, axis=0) * fps / lines.leg
-    for factor in _PATIENCE:
-        flat = np.flatnonzero(low & (passing < factor * AT_REST) & (turning < factor * _TURNS))
-        if len(flat) >= _LEAST:
-            return flat
-    return np.zeros(0, dtype=np.intp)
-
-
-def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
-    """Motion in a frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
-
-    It is that of the lower ankle in the median, if that ankle moves with it more often than it rests.
-    """
-    n, ankles, rest = len(lines.middle), lines.lowest_joints, AT_REST * lines.leg / fps
-    lower = np.gradient(ankles, axis=0)[np.arange(n), np.argmin(ankles @ up, axis=1)]
-    carried = np.median(lower, axis=0)
-    carried = carried - (carried @ up) * up
-    travels = np.linalg.norm(lines.middle[-1] - lines.middle[0]) > n * rest
-    still, moved = (np.sum(np.linalg.norm(lower - ground, axis=1) < rest) for ground in (0.0, carried))
-    return carried if not travels and moved > still and np.linalg.norm(carried) > rest else np.zeros(3)
-
-
-def _foot(
-    source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
-) -> tuple[Array, int]:  # fmt: skip
-    """R of a foot, with a level sole in stance and the heading of its toes; and the number of stance frames used.
-
-    Without stance frames, or where these would bend an ankle throughout, the sole has the orientation of an ankle in
-    rest pose on average.
-    """
-    back = quaternions.conjugate(source)
-    resting = _carried(source, shank, straight)
-    vertical = quaternions.rotated(back[flat], up)
-    alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
-    neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
-    # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
-    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
-    told = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
-    if told.sum() < min(_LEAST, len(source)):
-        normal = neutral
-        told = np.zeros(0, dtype=bool)
-    else:
-        # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
-        normal = unit(vertical[told].mean(axis=0))
-        for _ in range(_SHIFTS):
-            near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
-            normal = unit((near * likely) @ vertical)
-        if normal @ neutral < np.cos(_STRANGE):
-            normal, told = neutral, np.zeros(0, dtype=bool)
-    x = normal
-    if not np.isnan(toes).any():
-        ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
-        x = ahead - normal * (ahead @ normal)
-    if np.linalg.norm(x) < _POINTING or np.isnan(toes).any():
-        # Without toes, or with toes below the ankle, a foot has the heading of its shank.
-        ahead = quaternions.rotated(back, quaternions.rotated(resting, np.array([1.0, 0.0, 0.0])))[0]
-        x = ahead - normal * (ahead @ normal)
-    x = unit(x)
-    columns = np.column_stack((x, np.cross(normal, x), normal))
-    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
-    return turned, int(told.sum())
-
-
-def _arcs(u: Array, v: Array) -> Array:
-    """The smallest rotations from unit vectors u to v, (n, 3) → (n, 4); for opposite vectors about any normal axis."""
-    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
-    length = np.linalg.norm(q, axis=1, keepdims=True)
-    aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
-    q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
-    return q / np.linalg.norm(q, axis=1, keepdims=True)
+    return quaternions.product(arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)

@@ -6,7 +6,6 @@ from numba import njit
 
 from controllers.state import Array
 from controllers.work_array import work_array
-from sim.users.person.chance import normal
 from sim.users.person.person_state import (
     BEGUN,
     BELIEF,
@@ -27,6 +26,7 @@ from sim.users.person.person_state import (
     TICKS,
     PersonState,
 )
+from sim.users.person.random_numbers import normal
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.person.wishes import PLACE
 

@@ -8,6 +8,7 @@ from numba import njit
 
 from controllers.state import Array
 from sim.users.person.body import REFERENCE_GRIP
+from sim.users.person.decisions import want
 from sim.users.person.muscles import move
 from sim.users.person.person_state import (
     BELIEF,
@@ -27,7 +28,6 @@ from sim.users.person.person_state import (
     PersonState,
 )
 from sim.users.person.senses import sense
-from sim.users.person.will import want
 
 
 @njit

@@ -10,7 +10,6 @@ from numba import njit
 
 from controllers.state import Array
 from controllers.work_array import work_array
-from sim.users.person.chance import normal
 from sim.users.person.eye import seen_place
 from sim.users.person.person_state import (
     ASTRAY,
@@ -54,6 +53,7 @@ from sim.users.person.person_state import (
     WISH_PERIOD,
     PersonState,
 )
+from sim.users.person.random_numbers import normal
 
 DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump, mass_in, run_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from controllers.errors import ParameterError
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
 from controllers.state import HandState
+from tests.controllers.fields.field_probes import force_of, largest_jump, mass_in, run_over
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
 RIVER = River(CIRCLE, 0.08, 4.0 / 300.0, 4.0)

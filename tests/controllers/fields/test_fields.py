@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
-from controllers.fields.law import Program
-from controllers.fields.program import evaluate
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
 

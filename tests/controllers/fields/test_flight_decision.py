@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
+from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading
-from controllers.fields.walker_feed import feed_walkers
 from controllers.walking.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.walking.walker import walker_at
 from controllers.walking.walking import Walking

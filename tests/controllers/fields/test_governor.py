@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump, run_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
 from controllers.state import HandState
+from tests.controllers.fields.field_probes import force_of, largest_jump, run_over
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
 SPEEDS = np.array([[0.0, 0.3], [0.0, 0.3], [0.06, 0.12], [0.06, 0.12], [0.0, 0.3]])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump, mass_in, run_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,13 +9,14 @@ from controllers.curves.branches import BRANCHES, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.river import River
 from controllers.state import HandState
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
+from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 from experiments.studies.field_figures import SPEED, crossing, eight, straight_river
+from tests.controllers.fields.field_probes import force_of, largest_jump, mass_in, run_over
 
 SCALE = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
 R, S, H = SCALE

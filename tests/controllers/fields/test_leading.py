@@ -3,13 +3,12 @@
 import casadi
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump
 from numba import njit
 
 from controllers.errors import ParameterError
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading, leading_force
-from controllers.fields.program import evaluate
-from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HandState
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import (
@@ -24,6 +23,7 @@ from controllers.walking.walked_path import (
 )
 from controllers.walking.walker import walker_at
 from controllers.walking.walking import Walking
+from tests.controllers.fields.field_probes import force_of, largest_jump
 
 # A run: one foot, none, the other, none; and a walk on one or two.
 _RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
 from controllers.fields.orientation import Orientation
-from controllers.fields.program import evaluate
 from controllers.state import HandState
 
 RNG = np.random.default_rng(11)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from field_probes import force_of, largest_jump
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
@@ -10,6 +9,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import Follow
 from controllers.fields.river import River, integrate, settling_time
 from controllers.state import HandState
+from tests.controllers.fields.field_probes import force_of, largest_jump
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
 

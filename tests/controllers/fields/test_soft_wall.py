@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.fields.map_feed import feed_maps, feed_rows
-from controllers.fields.program import evaluate
+from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.soft_wall import SoftWall, _is_clear, wall_slope  # pyright: ignore[reportPrivateUsage]
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState

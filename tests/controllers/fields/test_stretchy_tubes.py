@@ -6,10 +6,10 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError, ParameterError
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_SIZE
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_SIZE
-from controllers.fields.law import Program
-from controllers.fields.program import evaluate
 from controllers.fields.stretchy_tubes import CLICK_TIME, StretchyTubes, stretch_force
 from controllers.state import HandState
 

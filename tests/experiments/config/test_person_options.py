@@ -11,7 +11,7 @@ from experiments.cli import main
 from experiments.config.part import from_json, to_json
 from experiments.config.run_config import RunConfig
 from experiments.config.words import changed, run_config, words_of
-from experiments.setups.hands import intent_of
+from experiments.setups.parts.hands import intent_of
 from experiments.studies.user_laws.report import lines, user_laws
 from sim.errors import SimError
 from sim.users.intents import Bend, Exaggerate, Press

@@ -108,7 +108,7 @@ def test_a_robot_arm_says_what_it_needs_before_it_is_made():
         ),
         (run_config(mode="rivers", map="rivers"), ["river_clips_map", "_derivative", "_reference_along"]),
         (run_config(mode="lead"), ["led_map", "leading_wrench", "follow_hand", "_poses_along"]),
-        (run_config(mode="stretch"), ["stretchy_wrench", "stood"]),
+        (run_config(mode="stretch"), ["stretchy_wrench", "lower_start"]),
     ],
     ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
 )

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from experiments.files.kept import kept_array
+from experiments.files.array_cache import kept_array
 
 SHAPE = (4, 3, 2)
 VALUES = np.random.default_rng(0).normal(size=SHAPE)

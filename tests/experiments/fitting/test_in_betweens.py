@@ -9,7 +9,7 @@ import pytest
 from experiments.config.maps import Cylindrical
 from experiments.config.words import run_config
 from experiments.fitting.balance import nearest_supported
-from experiments.setups.clips import load_clips
+from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.balance import supported

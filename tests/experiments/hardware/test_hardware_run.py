@@ -35,7 +35,7 @@ from experiments.files.device_files import (
 from experiments.files.json_text import json_text
 from experiments.hardware.calibrate import still_readings
 from experiments.hardware.permit import HAND_PUSH, check_device, verified
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError

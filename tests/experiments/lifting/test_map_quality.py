@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from experiments.lifting.in_betweens import measure_motion
 from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, in_between, lap_times, measure_map
+from experiments.lifting.motion_measure import measure_motion
 from models.humanoid.skeleton import JOINTS, N_TANGENT, figure_model, joint_range, rest_pose
 from models.mocap.motion.clip import Clip
 

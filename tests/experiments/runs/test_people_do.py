@@ -8,7 +8,7 @@ from rich.console import Console
 
 import hvf
 from experiments.config.words import run_config
-from experiments.results.summary import RunSummary
+from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record
 from experiments.setups.wiring import wire
 from sim.users.intents.intent import PersonIntent

@@ -10,7 +10,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.cli import main
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.fitting.alike import motion_at, motion_of
+from experiments.fitting.similarity import motion_at, motion_of
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
 from models.mocap.library import embedded

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.certify.trial_simulation import EVERYTHING
 from experiments.studies import certified_trials
-from experiments.studies.certified_trials import ASSUMED, Let, draw_certified, let_go
+from experiments.studies.certified_trials import ASSUMED, Release, draw_certified, release
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +26,10 @@ def test_hands_let_go_in_a_certified_river_do_not_diverge(drawn, tmp_path, monke
 def test_a_river_that_is_no_longer_what_was_certified_is_noticed(drawn):
     wild = drawn._replace(river=drawn.river._replace(k_r=60.0 * drawn.river.k_r), radius=0.97)
     rng = np.random.default_rng(5)
-    assert all(let_go(wild, conditions, rng).diverges for conditions in (ASSUMED, EVERYTHING))
+    assert all(release(wild, conditions, rng).diverges for conditions in (ASSUMED, EVERYTHING))
 
 
 def test_a_hand_that_friction_holds_is_not_taken_for_one_that_diverges():
-    assert not Let(3.0e-3, 3.0e-3 + 2e-5, 5e-5).diverges
-    assert Let(3.0e-3, 3.0e-3 + 2e-5, 0.0).diverges
-    assert Let(np.inf, np.inf, 5e-5).diverges
+    assert not Release(3.0e-3, 3.0e-3 + 2e-5, 5e-5).diverges
+    assert Release(3.0e-3, 3.0e-3 + 2e-5, 0.0).diverges
+    assert Release(np.inf, np.inf, 5e-5).diverges

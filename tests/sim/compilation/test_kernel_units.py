@@ -12,8 +12,8 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
-from controllers.fields.program import evaluate
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, evaluate_map, kinds_of
 from controllers.haptic_map.expressive import EXPRESSIVE
 from controllers.haptic_map.robot_arm import ROBOT_ARM

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numba import njit, typeof, types
 
+from controllers.fields.algebra.instructions import LAW_ARGUMENTS
 from controllers.fields.bunny import bunny_wrench
 from controllers.fields.follow import follow_wrench
 from controllers.fields.governor import governor_wrench
 from controllers.fields.higher_order import higher_order_wrench
-from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS
 from controllers.lent import Lent

@@ -116,7 +116,7 @@ class CountedServo(ServoProcess):
 
     def __init__(self, device: Packets | Reports | Frames | Poses):
         self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
-        _, told = multiprocessing.get_context("spawn").Pipe(duplex=False)
+        _, reports = multiprocessing.get_context("spawn").Pipe(duplex=False)
         self.device, self.order = device, np.zeros(ORDER_SIZE)
         self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **AT_ONCE))
         self.order[[ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST]] = 1.0, 1.0, ARM
@@ -125,7 +125,7 @@ class CountedServo(ServoProcess):
         self.heap.heap_open.restype = self.heap.heap_close.restype = None
         self.heap.heap_calls.restype = ctypes.c_long
         clock = ServoClock(late=60.0, heartbeat=60.0, realtime=False)
-        super().__init__(self.ticker, Channels(self.orders, self.status, self.rows, told), clock)
+        super().__init__(self.ticker, Channels(self.orders, self.status, self.rows, reports), clock)
 
     def turn(self, number: float, late: float) -> bool:
         self.heap.heap_close()

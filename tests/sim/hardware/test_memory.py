@@ -15,7 +15,7 @@ from controllers.state import Array
 from experiments.config import maps, modes
 from experiments.config.run_config import RunConfig
 from experiments.hardware.parts import served, session_of, start_of
-from experiments.setups.defaults import resolved
+from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from controllers.fields.program import evaluate
+from controllers.fields.algebra.program import evaluate
 from controllers.safety.limiter import limit_force
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.setups.clips import load_clips
-from experiments.setups.hands import lap_pushes
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.hands import lap_pushes
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose

@@ -12,10 +12,10 @@ from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config.modes import Stretch
 from experiments.config.words import run_config
 from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve
-from experiments.results.stretch_figure import draw_stretch
-from experiments.results.stretch_summary import stretch_summary
+from experiments.results.measures.stretch_summary import stretch_summary
+from experiments.results.pages.stretch_figure import draw_stretch
+from experiments.setups.modes.stretch import stretch_grabs, stretch_parts
 from experiments.setups.session import Session
-from experiments.setups.stretch import stretch_grabs, stretch_parts
 from experiments.setups.wiring import wire
 from models.mocap.motion.clip import pose_difference
 from sim.errors import SimError

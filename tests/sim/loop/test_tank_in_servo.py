@@ -5,11 +5,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from controllers.fields.python_law import PythonLaw
+from controllers.fields.own.python_law import PythonLaw
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
 from experiments.config.words import run_config
-from experiments.setups.clips import load_clips
-from experiments.setups.hands import lap_pushes
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.hands import lap_pushes
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
 from sim.users.hand.actions import Push

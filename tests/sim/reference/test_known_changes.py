@@ -14,10 +14,10 @@ from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
 from experiments.config.words import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.fitting.rests import with_rests
+from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.verdict import Verdict
-from experiments.setups.clips import load_clips
-from experiments.setups.rivers import river_bundle
+from experiments.setups.modes.rivers import river_bundle
+from experiments.setups.parts.clips import load_clips
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip, pose_difference

@@ -8,13 +8,13 @@ import pytest
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.fitting.balance import nearest_supported
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.fitting.rests import with_rests
-from experiments.setups.clips import load_clips
-from experiments.setups.rivers import river_bundle
+from experiments.fitting.rest_phases import with_rests
+from experiments.setups.modes.rivers import river_bundle
+from experiments.setups.parts.clips import load_clips
 from experiments.studies.change_trials import (
     BLEND,
     LAP,

@@ -6,13 +6,13 @@ import pytest
 
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs, packed_legs
-from experiments.setups.clips import load_clips
-from experiments.setups.hands import edited_until
-from experiments.setups.stretch import flight_remarks
+from experiments.setups.modes.stretch import flight_remarks
+from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.hands import edited_until
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.motion.clip import pose_difference
@@ -20,7 +20,7 @@ from models.world.scene import FIGURE
 from sim.loop.loop import Loop, pose_errors
 from sim.loop.servo import FrameLog, TickLog
 from sim.reference.reference import make_reference, reference_along
-from sim.reference.settling import approach, let_down, slowness
+from sim.reference.settling import approach, lower_to_floor, lowering_goal
 
 FIGURE_MODEL = figure_model()
 LEGS, ENDS = packed_legs(FIGURE_MODEL), np.empty((2, 7))
@@ -47,7 +47,7 @@ def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str)
     poses = _poses(name)
     before, lowered = _lowest(poses), poses.copy()
     for pose in lowered:
-        let_down(LEGS, ENDS, 1.0, pose)
+        lower_to_floor(LEGS, ENDS, 1.0, pose)
     assert before.max() > 0.03
     assert _lowest(lowered).max() < 0.006
     assert _lowest(lowered).min() > before.min() - 1e-9
@@ -57,7 +57,7 @@ def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str)
     np.testing.assert_array_equal(np.delete(lowered, 2, axis=1), np.delete(poses, 2, axis=1))
     for pose, own in zip(lowered, poses, strict=True):
         pose[:] = own
-        let_down(LEGS, ENDS, 0.0, pose)
+        lower_to_floor(LEGS, ENDS, 0.0, pose)
     np.testing.assert_array_equal(lowered, poses)
 
 
@@ -66,7 +66,7 @@ def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
     over = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
     lowered = over.copy()
     for pose in lowered:
-        let_down(LEGS, ENDS, 1.0, pose)
+        lower_to_floor(LEGS, ENDS, 1.0, pose)
     assert len(over) > 5
     np.testing.assert_array_equal(lowered, over)
 
@@ -74,15 +74,15 @@ def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
 def test_a_hand_is_slow_until_it_has_the_pace_of_the_clips() -> None:
     p = np.array([0.05, 0.0, 0.02])
     along = 0.05 * 2.0 * np.pi / LAP * np.array([0.0, 1.0, 0.0])
-    shares = [slowness(p, pace * along, LAP) for pace in np.linspace(0.0, 1.2, 49)]
+    shares = [lowering_goal(p, pace * along, LAP) for pace in np.linspace(0.0, 1.2, 49)]
     assert shares[0] == 1.0
     assert shares[28] == 1.0  # 0.7 of the pace
     assert max(shares[36:]) < 1e-9  # 0.9 of it
     assert np.all(np.diff(shares) <= 0.0)
     # The other way round is as fast; up, down, outwards and on the axis it does not move on.
-    assert slowness(p, -along, LAP) < 1e-9
-    assert slowness(p, np.array([0.3, 0.0, 0.3]), LAP) == 1.0
-    assert slowness(np.zeros(3), along, LAP) == 1.0
+    assert lowering_goal(p, -along, LAP) < 1e-9
+    assert lowering_goal(p, np.array([0.3, 0.0, 0.3]), LAP) == 1.0
+    assert lowering_goal(np.zeros(3), along, LAP) == 1.0
 
 
 def test_the_share_goes_over_without_a_jump_or_an_overshoot() -> None:

@@ -8,8 +8,8 @@ from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
-from controllers.fields.program import evaluate
 from controllers.safety.energy_tank import river_power
 from controllers.state import HandState
 from experiments.certify.certified_device import phantom_device

@@ -11,9 +11,9 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
-from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading, leading_wrench
-from controllers.fields.walker_feed import feed_walkers
 from controllers.state import HandState
 from controllers.walking.gait import Gait
 from controllers.walking.walker import walker_at
@@ -23,7 +23,7 @@ from experiments.certify.certified_leading import certify_leading, leading_energ
 from experiments.certify.trial_simulation import Conditions, simulate
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
-from experiments.setups.lead import s_curve
+from experiments.setups.modes.lead import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted
 from models.mocap.library import embedded

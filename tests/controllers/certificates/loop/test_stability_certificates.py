@@ -27,9 +27,9 @@ from controllers.certificates.loop.stability import (
 from controllers.certificates.report import Certificate
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError, ParameterError
+from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_SWITCH, HandState
 from experiments.certify.certified_device import phantom_device

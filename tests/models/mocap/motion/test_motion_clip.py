@@ -3,10 +3,12 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.quaternions import heading
 
 
 @pytest.fixture(scope="module")
@@ -136,3 +138,9 @@ def test_a_clip_does_not_share_memory_with_its_source():
 def test_what_is_no_clip_is_refused(poses, fps, says):
     with pytest.raises(ModelError, match=says):
         Clip(poses, fps, "bad")
+
+
+def test_the_heading_of_a_rotation_is_the_direction_of_its_x_axis_on_the_floor():
+    rotations = Rotation.random(50, rng=np.random.default_rng(5))
+    x, y, _ = rotations.apply([1.0, 0.0, 0.0]).T
+    np.testing.assert_allclose(heading(rotations.as_quat(scalar_first=True)), np.arctan2(y, x), atol=1e-12)

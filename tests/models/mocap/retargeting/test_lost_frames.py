@@ -15,8 +15,9 @@ from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.prepare import prepared
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repaired
+from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leading_pose import leading_frames
-from models.mocap.retargeting.retarget import Hints, retarget
+from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 

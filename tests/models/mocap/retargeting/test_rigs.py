@@ -22,7 +22,7 @@ from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.poses import sole_points
 from models.mocap.retargeting import abdomen, calibration, footing, retarget
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
 
 LARGEST = 2.0  # deg

@@ -9,7 +9,7 @@ from experiments.cli import main
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError
-from models.mocap.retargeting.retarget import Hints
+from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 JOINT = re.compile(r"(ROOT|JOINT) (\S+)")

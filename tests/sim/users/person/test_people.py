@@ -8,9 +8,9 @@ import pytest
 from sim.errors import SimError
 from sim.users.participant import Participant, tremor_filter
 from sim.users.person.body import arm_matrices, check_steps
-from sim.users.person.chance import fresh_chance, normal, uniform
 from sim.users.person.person import INTERVALS, Person
 from sim.users.person.population import PERSONAS, persona, population
+from sim.users.person.random_numbers import fresh_chance, normal, uniform
 
 
 def test_every_number_of_a_person_has_an_interval_with_a_source() -> None:

@@ -1,0 +1,315 @@
+"""Laws of force and their algebra: the interface shared by built-in, composed and user-defined fields."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.checks import checked
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.algebra.description import parts_of
+from controllers.fields.algebra.instructions import (
+    LAW_ARGUMENTS,
+    OP_CODE,
+    OP_MEMORY,
+    OP_PARAMETERS,
+    STACK,
+    TRACE_SIZE,
+    Join,
+    Kernel,
+    empty_trace,
+)
+from controllers.fields.algebra.program import Compiled, evaluate
+from controllers.fields.algebra.walker_feed import WalkerFeed, Walkers, feed_walkers, fresh_walkers
+from controllers.fields.algebra.weights import WEIGHT_SIZE, Weight
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
+from controllers.kernel_call import address_of
+from controllers.state import HAND_POSITION, Array, HandState, IntArray, Wrench
+from controllers.walking.walking import follow_hand
+
+
+class Law(ABC):
+    r"""A field of force F(hand), and the algebra of fields.
+
+    .. math:: F + F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
+
+    by ``+``, ``*``, `gated`, `blended` and `limited`; each result is again a law, and s is a `Weight`.
+    """
+
+    @abstractmethod
+    def _composed(self) -> "Program":
+        """The field as it is executed, for `program`, which asks for it once."""
+
+    @cached_property
+    def _program(self) -> "Program":
+        return self._composed()
+
+    def program(self) -> "Program":
+        """Compiled form of the field, which the servo runs."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
+        program, wrench = self.program(), np.empty(6)
+        memory = program.fresh_memory()
+        program.feed(memory, hand)
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
+        return Wrench(wrench[:3], wrench[3:])
+
+    def description(self) -> dict[str, object]:
+        """The law's name and its parameters by name, in plain data; a certificate of the law depends on these."""
+        return {"law": type(self).__name__, "parameters": parts_of(self)}
+
+    def __add__(self, other: "Law") -> "Program":
+        """Sum of two fields."""
+        return self.program().joined(other.program(), Join.ADD)
+
+    def __rmul__(self, factor: float) -> "Program":
+        """Field times a number."""
+        return self.gated(Weight.constant(factor))
+
+    def gated(self, weight: Weight) -> "Program":
+        """Field times a weight: s F."""
+        return self.program().followed(Join.GATE, weight.row)
+
+    def blended(self, other: "Law", weight: Weight) -> "Program":
+        """Blend of two fields: (1 − s) F + s F'."""
+        return self.program().joined(other.program(), Join.BLEND, weight.row)
+
+    def limited(self, force: float, torque: float = np.inf) -> "Program":
+        """Field whose force [N] and moment [N m] saturate at a norm; their direction is kept."""
+        bounds = (("force", force, "N"), ("torque", torque, "N m"))
+        return self.program().followed(Join.LIMIT, [checked(*bound, infinite=True) for bound in bounds])
+
+
+class PythonFeed(NamedTuple):
+    """Wrench [F (3), τ (3)] in a field's memory that a Python function writes before each evaluation.
+
+    Attributes
+    ----------
+    slot : int
+        Offset in the memory.
+    function : callable
+        From the measured hand state to the six numbers.
+    """
+
+    slot: int
+    function: Callable[[HandState], Array]
+
+    def moved(self, params: int, memory: int) -> "PythonFeed":
+        """The same feed with its offsets in the parameters and in the memory increased."""
+        return self._replace(slot=self.slot + memory)
+
+
+class MapFeed(NamedTuple):
+    """Pose h (nq) and derivative h_* (nv × 6) of a haptic map at the stylus, written into a law's memory.
+
+    Attributes
+    ----------
+    slot : int
+        Offset of h in the memory; h_* and then the map's own memory follow.
+    at : int
+        Offset of the map's parameters among the field's.
+    haptic_map : HapticMap
+    """
+
+    slot: int
+    at: int
+    haptic_map: HapticMap
+
+    def moved(self, params: int, memory: int) -> "MapFeed":
+        """The same feed with its offsets in the parameters and in the memory increased."""
+        return self._replace(slot=self.slot + memory, at=self.at + params)
+
+
+class LawPlace(NamedTuple):
+    """Where a law of a program has its numbers.
+
+    Attributes
+    ----------
+    law : Law
+    params, memory : int
+        Offsets in the program's parameters and in its memory.
+    """
+
+    law: Law
+    params: int
+    memory: int
+
+
+@dataclass(frozen=True, eq=False)
+class Program(Law):
+    """Field of force in the form that the servo runs.
+
+    Parameters
+    ----------
+    ops : IntArray, shape (n, 4)
+        Instructions, see `controllers.fields.algebra.instructions`.
+    params : Array
+        Gains and packed curves; never written.
+    memory : Array
+        Initial memory. Evaluation writes into a copy of it (`fresh_memory`), one copy for every run.
+    kernels : tuple of Kernel
+        Compiled laws, each once; the code of a law's instruction is its kernel's index here.
+    laws : tuple of Law
+        Laws in the order of their instructions.
+    python_feeds, map_feeds, walker_feeds
+        Inputs that are written into the memory before each evaluation, besides the hand.
+
+    Raises
+    ------
+    ParameterError
+        If the instructions do not leave exactly one wrench, need a stack deeper than `STACK`, or a law has no kernel.
+    """
+
+    ops: IntArray
+    params: Array
+    memory: Array
+    kernels: tuple[Kernel, ...] = ()
+    laws: tuple[Law, ...] = ()
+    python_feeds: tuple[PythonFeed, ...] = ()
+    map_feeds: tuple[MapFeed, ...] = ()
+    walker_feeds: tuple[WalkerFeed, ...] = ()
+
+    def __post_init__(self) -> None:
+        codes: list[int] = self.ops[:, OP_CODE].tolist()
+        depth = np.cumsum([1 if code >= 0 else 1 - Join(code).takes for code in codes])
+        if len(depth) == 0 or depth[-1] != 1 or depth.min() < 1 or depth.max() > STACK:
+            raise ParameterError(
+                f"a field must leave one wrench and stack at most {STACK}; its instructions stack {depth.tolist()}"
+            )
+        laws = [code for code in codes if code >= 0]
+        if max(laws) >= len(self.kernels) or len(laws) != len(self.laws):
+            raise ParameterError(
+                f"a field of {len(laws)} laws with the codes {laws} needs their kernels and names; "
+                f"got {len(self.kernels)} kernels and {len(self.laws)} laws"
+            )
+
+    @staticmethod
+    def of(
+        law: Law,
+        kernel: Kernel,
+        params: Sequence[float] | Array,
+        memory: Sequence[float] | Array,
+        curve: Trajectory | None = None,
+        feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
+    ) -> "Program":
+        """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
+
+        The law's memory begins at `TRACE_SIZE`.
+        """
+        blob = np.zeros(0) if curve is None else curve.packed()
+        ops = np.array([[0, 0, TRACE_SIZE, len(params)]], dtype=np.int64)
+        numbers = np.concatenate([np.asarray(params, dtype=np.float64), blob])
+        python = tuple(feed for feed in feeds if isinstance(feed, PythonFeed))
+        maps = tuple(feed for feed in feeds if isinstance(feed, MapFeed))
+        walkers = tuple(feed for feed in feeds if isinstance(feed, WalkerFeed))
+        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps, walkers)
+
+    def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
+        """Both programs one after the other, then an operation that combines their two wrenches into one."""
+        kernels = (*self.kernels, *(kernel for kernel in other.kernels if kernel not in self.kernels))
+        gap, kept = len(self.params), len(self.memory) - TRACE_SIZE
+        moved = other.ops + np.array([0, gap, kept, gap])
+        laws = moved[:, OP_CODE] >= 0
+        moved[laws, OP_CODE] = [kernels.index(other.kernels[code]) for code in moved[laws, OP_CODE]]
+        return Program(
+            np.vstack([self.ops, moved, [[join, gap + len(other.params), 0, 0]]]),
+            np.concatenate([self.params, other.params, params]),
+            np.concatenate([self.memory, other.memory[TRACE_SIZE:]]),
+            kernels,
+            self.laws + other.laws,
+            self.python_feeds + tuple(feed.moved(gap, kept) for feed in other.python_feeds),
+            self.map_feeds + tuple(feed.moved(gap, kept) for feed in other.map_feeds),
+            self.walker_feeds + tuple(feed.moved(gap, kept) for feed in other.walker_feeds),
+        )
+
+    def followed(self, join: Join, params: Sequence[float]) -> "Program":
+        """The program, then an operation on its wrench."""
+        ops = np.vstack([self.ops, [[join, len(self.params), 0, 0]]])
+        return replace(self, ops=ops, params=np.concatenate([self.params, params]))
+
+    def _composed(self) -> "Program":
+        return self
+
+    @cached_property
+    def _compiled(self) -> Compiled:
+        units = np.array([address_of(kernel, LAW_ARGUMENTS) for kernel in self.kernels], dtype=np.int64)
+        return Compiled(units, self.ops, self.params)
+
+    def compiled(self) -> Compiled:
+        """First arguments of `evaluate`; laws that are not compiled yet are compiled in this process."""
+        return self._compiled
+
+    @property
+    def python_laws(self) -> tuple[Callable[[HandState], Array], ...]:
+        """Functions that the loop calls at every tick, each returning a wrench of six numbers."""
+        return tuple(feed.function for feed in self.python_feeds)
+
+    def fresh_memory(self) -> Array:
+        """Memory for a new run."""
+        return self.memory.copy()
+
+    def fresh_walkers(self) -> Walkers:
+        """Walkers for a new run; their kernel is compiled in this process, unless it is."""
+        walkers = fresh_walkers(self.walker_feeds)
+        return walkers.linked(address_of(follow_hand, LAW_ARGUMENTS)) if self.walker_feeds else walkers
+
+    def feed(self, memory: Array, hand: HandState) -> None:
+        """Write the inputs of the feeds into the memory, from Python, as at the first tick of a run."""
+        if self.walker_feeds:
+            feed_walkers(self.fresh_walkers(), self.params, memory, hand.vector())
+        for slot, function in self.python_feeds:
+            memory[slot : slot + 6] = function(hand)
+        stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
+        for slot, _, haptic_map in self.map_feeds:
+            first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT
+            kept = memory[last : last + len(haptic_map.compiled().memory)]
+            memory[slot:first] = haptic_map.pose(stylus, kept)
+            memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
+
+    def places(self) -> tuple[LawPlace, ...]:
+        """Where the laws have their parameters and their memory, in the order of their instructions."""
+        rows = self.ops[self.ops[:, OP_CODE] >= 0].tolist()
+        return tuple(
+            LawPlace(law, row[OP_PARAMETERS], row[OP_MEMORY]) for law, row in zip(self.laws, rows, strict=True)
+        )
+
+    def composition(self) -> Iterator[tuple[Law | Join, Array]]:
+        """Laws and operations in postfix order, each with the operation's parameters (none for a law)."""
+        laws = iter(self.laws)
+        for code, at, *_ in self.ops.tolist():
+            if code >= 0:
+                yield next(laws), np.zeros(0)
+            else:
+                join = Join(code)
+                yield join, self.params[at : at + {Join.ADD: 0, Join.LIMIT: 2}.get(join, WEIGHT_SIZE)]
+
+    def with_law(self, law: Law, other: Law) -> "Program":
+        """The same composition with `law` replaced by `other`."""
+        stack: list[Program] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append((other if what is law else what).program())
+                continue
+            last = stack.pop()
+            stack.append(
+                last.followed(what, list(numbers)) if what.takes == 1
+                else stack.pop().joined(last, what, list(numbers))
+            )  # fmt: skip
+        return stack[0]
+
+    def description(self) -> dict[str, object]:
+        """Composition of the field: operations, and laws with their parameters by name."""
+        stack: list[dict[str, object]] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append(what.description())
+                continue
+            taken, stack = stack[len(stack) - what.takes :], stack[: len(stack) - what.takes]
+            stack.append({what.name.lower(): taken, "parameters": numbers.tolist()})
+        return stack[0]

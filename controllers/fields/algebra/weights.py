@@ -1,0 +1,111 @@
+"""Weights, and the operations on wrenches that use them: gate, blend, limit. With the sum: the algebra of fields."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.easing import smooth_step
+from controllers.errors import ParameterError
+from controllers.fields.algebra.window import window
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
+
+_CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
+_KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # row of a weight: kind, flag for 1 − s, four numbers
+
+
+@njit
+def weight_of(params: Array, at: int, hand: Array) -> float:
+    """Weight s of the row at ``params[at:]`` for a hand (see `Weight`)."""
+    kind = params[at + _KIND]
+    s = params[at + _NUMBERS]
+    if kind == _BALL:
+        square = 0.0
+        for i in range(3):
+            square += (hand[HAND_POSITION + i] - params[at + _NUMBERS + i]) ** 2
+        s = window(square * params[at + _NUMBERS + 3])
+    elif kind == _SPEED:
+        square = 0.0
+        for i in range(3):
+            square += hand[HAND_VELOCITY + i] ** 2
+        s = smooth_step((np.sqrt(square) - params[at + _NUMBERS]) * params[at + _NUMBERS + 1])
+    elif kind == _SWITCH:
+        s = hand[HAND_SWITCH]
+    return 1.0 - s if params[at + _COMPLEMENT] != 0.0 else s
+
+
+@njit
+def gate(params: Array, at: int, hand: Array, wrench: Array) -> None:
+    """Instruction GATE: F ← s F."""
+    s = weight_of(params, at, hand)
+    for i in range(6):
+        wrench[i] *= s
+
+
+@njit
+def blend(params: Array, at: int, hand: Array, wrench: Array, other: Array) -> None:
+    """Instruction BLEND: F ← (1 − s) F + s F', with F' the wrench above F on the stack."""
+    s = weight_of(params, at, hand)
+    for i in range(6):
+        wrench[i] = (1.0 - s) * wrench[i] + s * other[i]
+
+
+@njit
+def limit(params: Array, at: int, wrench: Array) -> None:
+    """Instruction LIMIT: F ← F min(1, L/|F|), and the moment likewise; parameters [L of the force, L of the moment]."""
+    for part in range(2):
+        x, y, z = wrench[3 * part], wrench[3 * part + 1], wrench[3 * part + 2]
+        # Scaled by the largest component, so that the squares do not overflow.
+        largest = max(abs(x), abs(y), abs(z), 1e-300)
+        norm = largest * np.sqrt((x / largest) ** 2 + (y / largest) ** 2 + (z / largest) ** 2)
+        if norm > params[at + part]:
+            for i in range(3):
+                wrench[3 * part + i] *= params[at + part] / norm
+
+
+@dataclass(frozen=True)
+class Weight:
+    """Number s between 0 and 1 that depends on the hand, for `Program.gated` and `Program.blended`; ``~s`` is 1 − s.
+
+    Made by `constant`, `ball`, `speed` and `switch`. All but the switch are C² in the state of the hand; at the
+    switch a field jumps.
+    """
+
+    row: tuple[float, ...]
+
+    @staticmethod
+    def constant(s: float) -> "Weight":
+        """Constant weight: any finite number, so that it can also scale a field or reverse its sign."""
+        return _weight(_CONSTANT, s)
+
+    @staticmethod
+    def ball(centre: npt.ArrayLike, radius: float) -> "Weight":
+        """Window w(|p − c|/r) about a centre c in H [m]: 1 at the centre, 0 from the radius r [m] on."""
+        x, y, z = np.asarray(centre, dtype=float)
+        if not radius > 0.0:
+            raise ParameterError(f"the radius of a ball must be positive, got {radius} m")
+        return _weight(_BALL, float(x), float(y), float(z), radius**-2)
+
+    @staticmethod
+    def speed(low: float, high: float) -> "Weight":
+        """0 up to the hand speed `low`, 1 from `high` on [m/s], with a smooth step between."""
+        if not 0.0 <= low < high:
+            raise ParameterError(f"speeds of a weight must be 0 ≤ low < high, got {low} and {high} m/s")
+        return _weight(_SPEED, low, 1.0 / (high - low))
+
+    @staticmethod
+    def switch() -> "Weight":
+        """1 while the stylus switch is pressed, else 0."""
+        return _weight(_SWITCH)
+
+    def __invert__(self) -> "Weight":
+        return Weight((self.row[_KIND], 1.0 - self.row[_COMPLEMENT], *self.row[_NUMBERS:]))
+
+
+def _weight(kind: int, *numbers: float) -> Weight:
+    if not np.isfinite(numbers).all():
+        raise ParameterError(f"numbers of a weight must be finite, got {numbers}")
+    padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - _NUMBERS - len(numbers))
+    return Weight((float(kind), 0.0, *numbers, *padding))

@@ -1,0 +1,120 @@
+"""User-defined laws of force compiled by numba: as cheap to evaluate as the built-in ones."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from numba import njit, types
+from numba.core.errors import NumbaError
+from numba.cpython.unsafe.tuple import tuple_setitem
+
+from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import Kernel
+from controllers.fields.algebra.law import Program
+from controllers.fields.own.function_law import FunctionLaw, place_of
+from controllers.state import Array, HandState, hand_state
+
+_NUMBER = types.float64
+_HAND = types.NamedTuple(
+    [
+        _NUMBER,
+        types.UniTuple(_NUMBER, 3),
+        types.UniTuple(_NUMBER, 4),
+        types.UniTuple(_NUMBER, 3),
+        types.UniTuple(_NUMBER, 3),
+        types.boolean,
+    ],
+    HandState,
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledLaw(FunctionLaw):
+    """Field computed by a function that numba compiles when the law is made.
+
+    The function gets numbers only: vectors of the hand are tuples, and it returns a tuple. A division by zero gives
+    inf or NaN, as in NumPy, and raises nothing. Parameters are those of `FunctionLaw`.
+
+    Raises
+    ------
+    ParameterError
+        If the function cannot be compiled, or does not return a tuple of three or six numbers.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _kernel(self.function, len(self.parameters))
+
+    def _composed(self) -> Program:
+        numbers = [float(value) for value in self.parameters.values()]
+        return Program.of(self, _kernel(self.function, len(numbers)), numbers, [])
+
+
+@cache
+def _kernel(function: Callable[..., Any], count: int) -> Kernel:
+    """The function as a law's kernel; its parameters are `count` numbers, in the order of its arguments."""
+    compiled: Any = njit(error_model="numpy")(function)
+    signature = (_HAND, *[_NUMBER] * count)
+    try:
+        compiled.compile(signature)
+    except NumbaError as error:
+        lines = [line.strip() for line in str(error).splitlines()]
+        said = next((line for line in lines if line and not line.startswith("Failed in")), "no reason given")
+        at = re.findall(r'File "[^"]*", line (\d+)', str(error))
+        where = f"in line {at[-1]}: " if at else ""
+        raise ParameterError(
+            f"{place_of(function)} cannot be compiled: {where}{said}. Expected a function of numbers, "
+            "see docs/tutorials/your-own-law.md"
+        ) from None
+    given: Any = compiled.overloads[signature].signature.return_type
+    tupled = isinstance(given, types.BaseTuple)
+    if not tupled or len(given) not in (3, 6) or not all(_is_number(kind) for kind in given):  # pyright: ignore[reportGeneralTypeIssues]
+        raise ParameterError(
+            f"{place_of(function)} returns {given}; expected a tuple of three numbers, the force [N], or of six, "
+            "with the moment [N m]"
+        )
+    write, numbers_of = _write_force if len(given) == 3 else _write_wrench, _reader(count)
+
+    @njit
+    def own_law(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+        write(wrench, compiled(hand_state(hand), *numbers_of(params, at)))
+
+    return own_law
+
+
+def _is_number(kind: Any) -> bool:
+    return isinstance(types.unliteral(kind), types.Float | types.Integer | types.Boolean)
+
+
+def _reader(count: int) -> Callable[[Array, int], tuple[float, ...]]:
+    """Compiled function that reads `count` consecutive numbers of an array as a tuple."""
+    if count == 0:
+
+        @njit
+        def none(params: Array, at: int) -> tuple[float, ...]:
+            return ()
+
+        return none
+    zeros = (0.0,) * count
+
+    @njit
+    def read(params: Array, at: int) -> tuple[float, ...]:
+        numbers = zeros
+        for i in range(count):
+            numbers = tuple_setitem(numbers, i, params[at + i])  # pyright: ignore[reportCallIssue]
+        return numbers
+
+    return read
+
+
+@njit
+def _write_force(wrench: Array, force: tuple[float, float, float]) -> None:
+    wrench[0], wrench[1], wrench[2] = force
+    wrench[3:] = 0.0
+
+
+@njit
+def _write_wrench(wrench: Array, given: tuple[float, ...]) -> None:
+    wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = given

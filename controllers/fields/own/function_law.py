@@ -1,0 +1,131 @@
+"""Laws of force given by a user's Python function with named parameters."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.algebra.description import code_digest
+from controllers.fields.algebra.law import Law
+from controllers.state import Array, HandState, Wrench
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FunctionLaw(Law):
+    """Field F(hand; parameters), computed by a function; made by `controllers.fields.own.own_law.law`.
+
+    The object is a law with its current parameters; calling it with keyword arguments gives the same law with those
+    parameters replaced.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(hand, **parameters)``, from a `HandState` to the force F_H [N], or the force and the moment [N m]:
+        three or six numbers.
+    parameters : mapping of str to float
+        Values by name.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is not a finite number; on evaluation, if the function does not return three or six numbers.
+    """
+
+    function: Callable[..., npt.ArrayLike]
+    parameters: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __post_init__(self) -> None:
+        for name, value in self.parameters.items():
+            if not isinstance(value, Real) or not np.isfinite(value):
+                raise ParameterError(f"{name} of {self.place} must be a finite number, got {value!r}")
+
+    def __call__(self, **parameters: float) -> Self:
+        """The same law with other parameters.
+
+        Raises
+        ------
+        ParameterError
+            If the law has no parameter of that name, or a value is not a finite number.
+        """
+        unknown = [name for name in parameters if name not in self.parameters]
+        if unknown:
+            raise ParameterError(
+                f"{self.place} has no parameter {', '.join(unknown)}; there are {', '.join(self.parameters) or 'none'}"
+            )
+        return replace(self, parameters={**self.parameters, **parameters})
+
+    def __repr__(self) -> str:
+        return f"{self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})"
+
+    @property
+    def name(self) -> str:
+        """Name of the function."""
+        return getattr(self.function, "__name__", type(self.function).__name__)
+
+    @property
+    def place(self) -> str:
+        """The function, its file and its line, for messages."""
+        return place_of(self.function)
+
+    def six_numbers(self, hand: HandState) -> Array:
+        """Force [N] and moment [N m] of the function at a hand state, shape (6,); a moment not returned is zero."""
+        numbers = np.asarray(self.function(hand, **self.parameters), dtype=np.float64)
+        if numbers.shape not in ((3,), (6,)):
+            raise ParameterError(
+                f"{self.place} gave numbers of shape {numbers.shape}; expected a force of three [N], or six with the "
+                "moment [N m]"
+            )
+        return numbers if len(numbers) == 6 else np.concatenate([numbers, np.zeros(3)])
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force and moment at one hand state.
+
+        Raises
+        ------
+        ParameterError
+            If they are not finite. In a run, such a wrench latches the limiter's fault instead.
+        """
+        wrench = super().wrench(hand)
+        if np.isfinite(hand.vector()).all() and not np.isfinite(np.concatenate(wrench)).all():
+            raise ParameterError(f"{self.place} gave {wrench.force} N and {wrench.torque} N m; expected finite numbers")
+        return wrench
+
+    def expression(self, hand: HandState, **parameters: Any) -> tuple[Any, ...]:
+        """The function evaluated on symbols (for example CasADi's) instead of numbers.
+
+        Parameters
+        ----------
+        hand : HandState
+            Made of symbols; vectors may be tuples of them.
+        **parameters
+            Symbols for some of the parameters; the others keep their values.
+
+        Raises
+        ------
+        ControllerError
+            If the function cannot be evaluated on symbols, as when it branches on the hand.
+        """
+        try:
+            given: Any = self.function(hand, **{**self.parameters, **parameters})
+        except (RuntimeError, TypeError, NotImplementedError) as error:
+            said = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise ControllerError(
+                f"{self.place} cannot be evaluated on symbols ({said}); expected no branch on the hand or a parameter: "
+                "np.maximum and np.minimum instead of if, max and min"
+            ) from None
+        return tuple(given)
+
+    def description(self) -> dict[str, object]:
+        """Name, parameters by name, and a hash of the code that runs."""
+        return {"law": self.name, "parameters": dict(self.parameters), "code": code_digest(self.function)}
+
+
+def place_of(function: Any) -> str:
+    """A function, its file and its line, for messages."""
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    name = getattr(function, "__name__", type(function).__name__)
+    return f"law {name}" if code is None else f"law {name} ({code.co_filename}, line {code.co_firstlineno})"

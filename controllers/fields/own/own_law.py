@@ -1,0 +1,68 @@
+"""User-defined laws of force: the decorator `law` turns a function into a field."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any, overload
+
+import numpy.typing as npt
+
+from controllers.errors import ParameterError
+from controllers.fields.own.compiled_law import CompiledLaw
+from controllers.fields.own.function_law import place_of
+from controllers.fields.own.python_law import PythonLaw
+
+_Function = Callable[..., npt.ArrayLike]
+
+
+@overload
+def law(function: _Function) -> PythonLaw: ...
+@overload
+def law(*, compiled: bool) -> Callable[[_Function], PythonLaw | CompiledLaw]: ...
+def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
+    """Make a law from a function ``law(hand, parameter=default, ...)`` that returns a force, or force and moment.
+
+    ::
+
+        @law
+        def floor(hand, k=500.0, b=3.0):
+            depth = -1e-3 - hand.p[2]
+            return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
+
+    is a law with these parameters, and ``floor(k=300.0)`` the same law with another stiffness. With
+    ``@law(compiled=True)`` numba compiles the function, and the servo need not call Python.
+
+    Parameters
+    ----------
+    function : callable
+        From a `controllers.state.HandState` to three numbers, the force F_H [N], or six, with the moment [N m].
+    compiled : bool
+        Whether the function is compiled.
+
+    Raises
+    ------
+    ParameterError
+        If the first argument is not ``hand``, another one has no number as its default, or it cannot be compiled.
+    """
+    make = CompiledLaw if compiled else PythonLaw
+
+    def made(function: _Function) -> PythonLaw | CompiledLaw:
+        plain = getattr(function, "py_func", function)
+        return make(plain, _parameters(plain))
+
+    return made if function is None else made(function)
+
+
+def _parameters(function: _Function) -> dict[str, float]:
+    given = list(inspect.signature(function).parameters.values())
+    if not given or given[0].name != "hand" or given[0].kind is not given[0].POSITIONAL_OR_KEYWORD:
+        got = given[0] if given else "no argument"
+        raise ParameterError(f"the first argument of {place_of(function)} must be hand, got {got}")
+    parameters: dict[str, float] = {}
+    for other in given[1:]:
+        if other.kind is not other.POSITIONAL_OR_KEYWORD or other.default is other.empty:
+            raise ParameterError(
+                f"argument {other} of {place_of(function)} must be a parameter with a number as its default, "
+                f"as in {other.name}=1.0"
+            )
+        parameters[other.name] = other.default
+    return parameters

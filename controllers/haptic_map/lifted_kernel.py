@@ -1,0 +1,211 @@
+"""Kernel of the lifted map, and its parameters: frames, neighbours and corrections of the clips, packed."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.blending.combination import combine, figure_channels, figure_limbs, packed_figure, weight_groups
+from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
+from controllers.curves.cylinder import cylinder
+from controllers.curves.splines import basis, basis_slope, control_points, round_lap
+from controllers.haptic_map.lifting.cores import draw_in
+from controllers.haptic_map.lifting.frames import PlacedClip, frames_at, interpolate_frames, lap_spline, packed_frames
+from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
+from controllers.haptic_map.lifting.sites import box
+from controllers.legs.floor import SOFTNESS
+from controllers.legs.footing import packed_soles
+from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
+from controllers.legs.limbs import END, Limb
+from controllers.motion.channels import normalise
+from controllers.motion.lap import MEMORY
+from controllers.saturation import clamped
+from controllers.state import Array, IntArray
+from controllers.work_array import work_array, work_integers
+
+LIFTED = 3
+
+_LAGS = 128  # samples of λ round the lap
+_ROWS = 256  # largest number of rows of the corrections' table round the lap
+_PAIR_STEPS = 24  # phases of the lap at which neighbouring clips are searched
+(
+    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _OWN_LEGS, _SHARE, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT,
+    _PAIRS_AT, _SOLES_AT, _FIGURE,
+) = range(15)  # fmt: skip
+_NOBODYS = 0.0  # in place of 1 + the number of the clip that gives the legs: all joints are blended
+
+
+@njit
+def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array, slope: Array) -> None:
+    """Write λ of each limb, which all clips share, into the channels of the first clip."""
+    s = angle * _LAGS / (2.0 * np.pi)
+    row = min(int(s), _LAGS - 1)
+    b0, b1, b2, b3 = basis(s - row)
+    c0, c1, c2, c3 = basis_slope(s - row)
+    for n in range(limbs):
+        v0, v1 = control[row * limbs + n], control[(row + 1) * limbs + n]
+        v2, v3 = control[(row + 2) * limbs + n], control[(row + 3) * limbs + n]
+        k = channels - END * (limbs - n) + 3
+        value[0, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
+        slope[0, k] = _LAGS / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+
+
+@njit
+def weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, changes: Array) -> tuple[float, int]:
+    """Angle of the hand and number of nearby clips; writes `near`, weights w and their derivatives `changes` (3, m)."""
+    radius, angle = cylinder(x, chain)
+    r, r_slope = clamped(radius, params[_R_LOW], params[_R_HIGH], params[_MARGIN])
+    z, z_slope = clamped(x[2], params[_Z_LOW], params[_Z_HIGH], params[_MARGIN])
+    for k in range(6):
+        chain[1, k] *= r_slope
+        chain[2, k] *= z_slope
+    total = near.shape[0]
+    sites, slopes = work_array((total, SITE)), work_array((total, SITE))
+    neighbours = params[int(params[_NEAR_AT]) :]
+    count = near_clips(neighbours, angle, r, z, near, sites, slopes)
+    place, change = work_array(2), work_array((3, 2))
+    if not draw_in(r, z, sites[:count], slopes[:count], place, change):
+        near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
+        return angle, count
+    count = near_clips(neighbours, angle, place[0], place[1], near, sites, slopes)
+    near_weights(neighbours, place[0], place[1], sites[:count], slopes[:count], w[:count], changes[:, :count])
+    for i in range(count):
+        by_r, by_z = changes[1, i], changes[2, i]
+        changes[0, i] += by_r * change[0, 0] + by_z * change[0, 1]
+        for way in (1, 2):
+            changes[way, i] = by_r * change[way, 0] + by_z * change[way, 1]
+    return angle, count
+
+
+@njit
+def _give_legs(owner: int, share: float, near: IntArray, count: int, w: Array, changes: Array) -> int:
+    """Weights of two groups from those of the second: the first is the owner's, of the second it gets 1 − λ more.
+
+    Returns the number of clips, which counts the owner though it may be far from the hand.
+    """
+    at = 0
+    while at < count and near[at] != owner:
+        at += 1
+    if at == count:
+        near[at], w[1, at], count = owner, 0.0, count + 1
+        for way in range(3):
+            changes[1, way, at] = 0.0
+    for i in range(count):
+        w[0, i] = 0.0
+        w[1, i] *= share
+        for way in range(3):
+            changes[0, way, i] = 0.0
+            changes[1, way, i] *= share
+    w[0, at] = 1.0
+    w[1, at] += 1.0 - share
+    return count
+
+
+@njit
+def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Lifted`: h(x), and h_*(x) unless `jacobian` has no rows."""
+    total, chain, owner = int(params[_CLIPS]), work_array((3, 6)), int(params[_OWN_LEGS]) - 1
+    groups = 2 if owner >= 0 else 1  # the last group has the weights of the hand's place
+    near, w, changes = work_integers(total), work_array((groups, total)), work_array((groups, 3, total))
+    angle, count = weigh(params, x, chain, near, w[groups - 1], changes[groups - 1])
+    if owner >= 0:
+        count = _give_legs(owner, params[_SHARE], near, count, w, changes)
+    figure = params[_FIGURE:]
+    channels = figure_channels(figure)
+    value, slope, drifts = work_array((count, channels)), work_array((count, channels)), work_array((count, 3))
+    frames = params[int(params[_FRAMES_AT]) :]
+    for i in range(count):
+        interpolate_frames(frames, near[i], angle, value[i], slope[i])
+        for k in range(3):
+            drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
+    limbs = figure_limbs(figure)
+    _lags(params[int(params[_LAG_AT]) :], limbs, angle, channels, value, slope)
+    pairs = params[int(params[_PAIRS_AT]) :]
+    d = work_array((4, pair_channels(pairs)))
+    if d.shape[1] > 0:
+        pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
+    ground, at = 0.0, int(params[_SOLES_AT])
+    for i in range(count):
+        ground += w[0, i] * params[at + 1 + near[i]]
+    soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else work_array((0, 0, 3))
+    combine(
+        figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory[:MEMORY],
+        memory[MEMORY:], soles, ground, params[at], pose, jacobian,
+    )  # fmt: skip
+
+
+def packed_lifted(clips: Sequence[PlacedClip], sites: Array, margin: float, limbs: Sequence[Limb]) -> Array:
+    """Parameters of the kernel, with all joints blended; sites (rows, m, 2) and margin in [m], as in `Lifted`."""
+    drifts, rotations = np.stack([clip.drift for clip in clips]), (clips[0].poses.shape[1] - 3) // 4
+    lags = _common_lags(clips, drifts, rotations, limbs)
+    channels = [_clip_channels(clip, lags, limbs) for clip in clips]
+    splines = [lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(clips, channels, strict=True)]
+    low, high = box(sites)
+    half = 0.5 * margin
+    rows = int(np.clip(max(len(clip.poses) for clip in clips), 64, _ROWS)) if limbs else 1
+    blocks = [
+        packed_figure(np.zeros(rotations, dtype=np.int64), limbs),
+        control_points(lags, np.ones(lags.shape[1:])).ravel(),
+        drifts.ravel(),
+        packed_frames(splines),
+        packed_neighbours(sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
+        _packed_pairs(splines, drifts, lags, sites, rows, limbs),
+        _packed_soles(channels, limbs),
+    ]
+    at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
+    numbers = [low[0], high[0], low[1], high[1], margin, len(clips), _NOBODYS, 1.0, *at]
+    return np.concatenate([numbers, *blocks])
+
+
+def with_legs_of(params: Array, clip: int, upper: Sequence[int], share: float) -> Array:
+    """Parameters of the same map with root and all joints but `upper` from one clip, and a share λ of the rest."""
+    changed = params.copy()
+    groups = weight_groups(changed[_FIGURE:])
+    groups[:] = np.isin(np.arange(len(groups)), upper)
+    changed[_OWN_LEGS], changed[_SHARE] = 1.0 + clip, share
+    return changed
+
+
+def _clip_channels(clip: PlacedClip, lags: Array, limbs: Sequence[Limb]) -> Array:
+    """Channels of a clip at its frames: the remainder, then each limb's end."""
+    result, ends = clip.remainder[:, None], list[Array]()
+    rest, lag = result.copy(), round_lap(lags, clip.angles)
+    for n, limb in enumerate(limbs):
+        quaternions, end = end_channels(rest, clip.drift[None], limb, lag[:, n])
+        result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
+        ends.append(end)
+    return np.concatenate([result, *ends], axis=2)[:, 0]
+
+
+def _packed_soles(channels: list[Array], limbs: Sequence[Limb]) -> Array:
+    if not limbs:
+        return np.zeros(1 + len(channels))
+    floor = min(lowest_of_limbs(clip[:, None], limbs, SOFTNESS).min() for clip in channels)
+    return np.concatenate([
+        [floor], *(grounds(clip[:, None], limbs) for clip in channels), packed_soles(limbs),
+    ])  # fmt: skip
+
+
+def _packed_pairs(
+    splines: list[tuple[Array, Array, Array]], drifts: Array, lags: Array, sites: Array, rows: int,
+    limbs: Sequence[Limb],
+) -> Array:  # fmt: skip
+    """Corrections of in-betweens of neighbouring clips, a table of `rows` phases round the lap."""
+    phases = np.arange(rows) * 2.0 * np.pi / rows
+    channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
+    last = channels.shape[2] - END * len(limbs)
+    normalise(channels, (last - 3) // 4)
+    for n in range(len(limbs)):
+        channels[..., last + END * n + 3] = round_lap(lags[:, n], phases)[:, None]
+    steps = round_lap(sites, np.arange(_PAIR_STEPS) * 2.0 * np.pi / _PAIR_STEPS)
+    return packed_pairs(channels, drifts, limbs, neighbouring_pairs(steps))
+
+
+def _common_lags(clips: Sequence[PlacedClip], drifts: Array, rotations: int, limbs: Sequence[Limb]) -> Array:
+    """λ of each limb at equal steps of the lap, shape (_LAGS, limbs), from all clips."""
+    if not drifts[:, 2].any() or not limbs:
+        return np.zeros((_LAGS, len(limbs)))
+    phases = np.arange(_LAGS) * 2.0 * np.pi / _LAGS
+    splines = [lap_spline(clip.angles, clip.remainder, rotations, clip.closed) for clip in clips]
+    channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
+    return np.stack([end_lag(end_poses(channels, limb)[0], drifts) for limb in limbs], axis=1)

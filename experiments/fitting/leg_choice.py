@@ -1,0 +1,129 @@
+r"""Choice of the clip whose legs and trunk the map plays where clips move too differently to be blended as a whole.
+
+Only arms and head are then blended. A kick is balanced by the arms of its own clip, and a flight is ballistic only with
+them, so simulation decides: for the legs of each clip in turn, the physical figure follows the map's animation while a
+hand wanders through the whole domain and pushes. The first clip in the user's order that is followed well is taken, or
+else the best one. If the figure falls with the best, or its residual is too large, the other clips' arms are blended in
+with a smaller share λ, down to 0, where the clip plays alone. Legs that skate, penetrate the floor or exceed joint
+ranges are tried last. If nothing is followed well enough, a remark says so.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.easing import cubic_steps
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.state import Array
+from experiments.files.array_cache import kept_array
+from experiments.fitting.similarity import SKATES, motion_of
+from experiments.fitting.verdict import BEARABLE, FPS, SECONDS, Verdict, tried
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
+from sim.compilation.sources import kept_folder
+from sim.reference.reference import map_poses
+
+SHARES = (1.0, 0.5, 0.25, 0.0)
+WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is taken at once
+# Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and excess angle [rad].
+SINKS, BEYOND = 0.01, np.deg2rad(5.0)
+_PUSHED = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, in 50 mm
+EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand
+
+
+Carrying = TypeVar("Carrying", Cylindrical, Composite)
+
+
+def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
+    """How the physical figure follows a map about a circle for 20 s; cached, and needs compiled code."""
+    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
+    return tried(__name__, lambda: toured(made, lap), SECONDS, made_of)
+
+
+def _domain(made: Cylindrical | Composite) -> Array:
+    """Intervals of r and z [m] that the hand passes through."""
+    return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
+
+
+def toured(made: Cylindrical | Composite, lap: float) -> Clip:
+    """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
+
+    The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
+    so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW.
+    """
+    times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
+    turn, pushed = 2.0 * np.pi * times / SECONDS, _PUSHED * push_profile(times)
+    shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
+    low, high = _domain(made).T
+    r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
+    middle = 0.5 * (low[0] + high[0])
+    pace = middle / (middle + pushed * (high[0] - low[0]))
+    angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    stylus = np.zeros((len(times), 7))
+    stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
+    return Clip(map_poses(made, stylus), FPS, "blend")
+
+
+def push_profile(times: Array) -> Array:
+    """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
+    phase = times / EVERY % 2.0
+    ramp = np.minimum(phase, 2.0 - phase) * EVERY / _WITHIN
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * EVERY) % 2.0 == 0.0, 1.0, -1.0))
+
+
+def sound(made: Cylindrical | Composite, lap: float) -> bool:
+    """Whether the animation of `toured` is sound (`is_sound`)."""
+    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
+    return is_sound(__name__, lambda: toured(made, lap), made_of)
+
+
+def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArray[np.generic]]) -> bool:
+    """Whether soles neither penetrate the floor nor skate, and joints stay within ranges, all within tolerances.
+
+    The result is cached; needs compiled code. The arguments are those of `tried`.
+    """
+
+    def find() -> Array:
+        shown = show()
+        motion = motion_of(shown.poses, shown.fps, dynamics=False)
+        return np.array([[motion.lowest, motion.skate, beyond_ranges(shown.poses).max()]])
+
+    lowest, skate, beyond = kept_array(kept_folder(module), "sound", made_of, (1, 3), find)[0]
+    return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
+
+
+def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
+    """The map with the legs that best carry the other clips' arms, and remarks; needs compiled code.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the map, a Cylindrical or Composite, with the legs of the clip of a given index.
+    names : sequence of str
+        Names of the clips whose legs it may have.
+    lap : float
+        Duration of a lap [s].
+    """
+    owned = cache(make)  # made on demand: most often the first clip will do
+
+    @cache
+    def fit(i: int) -> bool:
+        return sound(owned(i).with_share(0.0), lap)
+
+    best, name, found = owned(0), names[0], Verdict(np.inf, 0.0)
+    for wanted in (True, False):
+        for share in SHARES:
+            for i in (i for i in range(len(names)) if fit(i) is wanted):
+                made = owned(i).with_share(share)
+                verdict = verdict_on(made, lap)
+                if verdict.bearable and verdict.residual <= WELL:
+                    return made, ()
+                if verdict.worse() < found.worse():
+                    best, name, found = made, names[i], verdict
+            if found.bearable:
+                return best, ()
+    return best, (f"the physical figure {found} with the legs of {name}, the best that is found at this lap",)

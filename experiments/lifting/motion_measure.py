@@ -1,0 +1,56 @@
+"""Measures of a motion that a map has made: joint limits, foot skate, floor penetration, flights."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.flight.flight_fit import best_fall, find_flights
+from experiments.results.measures.soles import Soles
+from models.humanoid.skeleton import N_JOINTS, joint_range, rest_pose
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.momentum import momentum
+from models.mocap.motion.clip import Clip, pose_difference
+from models.world.scene import SceneConfig
+
+
+class MotionMeasure(NamedTuple):
+    """Largest faults of a motion.
+
+    Attributes
+    ----------
+    limits : float
+        Excess of a joint over its limits [rad].
+    slide : float
+        Foot skate (`experiments.results.measures.soles`) [m].
+    penetration : float
+        Depth of the body below the floor [m].
+    ballistic : float
+        Distance of the centre of mass from the best-fitting free fall in flights [m]; 0 without a flight.
+    """
+
+    limits: float
+    slide: float
+    penetration: float
+    ballistic: float
+
+    @staticmethod
+    def worst(measures: "list[MotionMeasure]") -> "MotionMeasure":
+        """The largest of each measure; zeros for an empty list."""
+        return MotionMeasure(*np.max([MotionMeasure(0.0, 0.0, 0.0, 0.0), *measures], axis=0).tolist())
+
+
+def measure_motion(clip: Clip) -> MotionMeasure:
+    """Measure a clip on the default figure."""
+    turns = pose_difference(np.broadcast_to(rest_pose(), clip.poses.shape), clip.poses)[:, 6:]
+    turns = turns.reshape(-1, N_JOINTS, 3)
+    low, high = joint_range()[..., 0], joint_range()[..., 1]
+    touched, feet = contacts(clip), Soles(SceneConfig())
+    feet.add(clip.poses)
+    com = momentum(clip).com
+    spans = find_flights(touched.supported, clip.fps)
+    return MotionMeasure(
+        limits=float(np.maximum(low - turns, turns - high).clip(min=0.0).max()),
+        slide=feet.slide,
+        penetration=float(max(0.0, -touched.clearance.min())),
+        ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
+    )

@@ -1,0 +1,6 @@
+"""The wrapper of event handlers that every panel is given (`experiments.live.page.Page.acts`)."""
+
+from collections.abc import Callable
+from typing import Any
+
+Acts = Callable[[Callable[[Any], None]], Callable[[Any], None]]

@@ -1,0 +1,114 @@
+"""Panel of the live page for time (pause, step, pace, reset, looking back) and for the stylus switch and grip."""
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from experiments.config.modes import StretchThenFollow
+from experiments.live.panels.acts import Acts
+from experiments.live.session.desk import REMEMBERED, Desk
+
+PACES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
+
+
+class ClockPanel:
+    """Buttons of the clock and of the hand.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        GUI to which the buttons are added.
+    desk : Desk
+        State and actions of the page.
+    acts : callable
+        Wraps every event handler; see `Page.acts`.
+    """
+
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
+        self._desk = desk
+        self._press = gui.add_checkbox(
+            "Grab and bend", False, visible=False,
+            hint="The stylus' switch: with it a drag takes hold of the curve and bends it; so does shift.",
+        )  # fmt: skip
+        self._keep = gui.add_checkbox("Hold on", False, hint="Keep the stylus when the mouse lets go of the ball.")
+        self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
+        self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
+        self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
+        self._pace = gui.add_dropdown("Pace", tuple(PACES))
+        self._back = gui.add_slider(
+            "Look back [s]",
+            -REMEMBERED,
+            0.0,
+            0.1,
+            0.0,
+            hint="Now is at the right; time stands still while you look.",
+        )
+        self._from = gui.add_button("Go on from there", visible=False)
+        self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
+        self._press.on_update(acts(lambda event: desk.press(self._press.value)))
+        self._keep.on_update(acts(lambda event: None if self._keep.value else desk.let_go()))
+        self._perform.on_click(acts(lambda event: desk.perform(not self._performs)))
+        self._time.on_click(acts(lambda event: self._on_time()))
+        self._edit.on_click(acts(lambda event: desk.undo() if self._edit.value == "Undo" else desk.redo()))
+        self._pace.on_update(acts(lambda event: desk.pace(PACES[self._pace.value])))
+        self._back.on_update(acts(lambda event: desk.pause(True)))
+        self._from.on_click(acts(lambda event: self._go_on()))
+        self._rearm.on_click(acts(lambda event: desk.rearm()))
+        keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
+            "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
+            "Step": ("N", lambda event: desk.step()),
+            "Reset": ("R", lambda event: desk.reset()),
+            "Undo": ("Z", lambda event: desk.undo()),
+            "Redo": ("Y", lambda event: desk.redo()),
+            "Grab or let go": ("G", lambda event: self._toggle()),
+        }
+        for label, (key, does) in keys.items():
+            gui.add_command(label, hotkey=key).on_trigger(acts(does))
+
+    @property
+    def pressed(self) -> bool:
+        """Whether the switch is pressed while the hand holds the stylus."""
+        return self._press.value
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the hand keeps holding the stylus when the mouse lets go."""
+        return self._keep.value
+
+    @property
+    def seconds_ago(self) -> float:
+        """How far the view looks back in time [s]."""
+        return -self._back.value
+
+    def write(self) -> None:
+        """Update the buttons from the state of the run."""
+        desk = self._desk
+        self._from.visible = self.seconds_ago > 0.0
+        self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
+        built = desk.built
+        self._press.visible = built is not None and built.bends
+        self._perform.visible = built is not None and isinstance(built.config.mode, StretchThenFollow)
+        self._perform.label = "Bend it again" if self._performs else "Perform the bent curve"
+
+    @property
+    def _performs(self) -> bool:
+        return bool(self._desk.now["performs"][0] > 0.0)
+
+    def _toggle(self) -> None:
+        self._press.value = not self._press.value
+        self._desk.press(self._press.value)
+
+    def _on_time(self) -> None:
+        self._back.value = 0.0
+        if self._time.value == "Pause":
+            self._desk.pause(not self._desk.paused)
+        elif self._time.value == "Step":
+            self._desk.step()
+        else:
+            self._desk.reset()
+
+    def _go_on(self) -> None:
+        self._desk.go_back(self.seconds_ago)
+        self._back.value = 0.0
+        self._desk.pause(False)

@@ -1,0 +1,40 @@
+"""Keys that move the hand: one step per press or key repeat."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from controllers.state import Array
+from experiments.live.panels.acts import Acts
+from experiments.live.session.desk import Desk
+
+STEP = 0.003  # [m] per press; at some thirty key repeats a second this is 0.1 m/s
+LETS_GO = "H"
+WAYS: dict[str, tuple[str, Array]] = {
+    "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
+    "L": ("Hand to the right", np.array([1.0, 0.0, 0.0])),
+    "I": ("Hand away", np.array([0.0, 1.0, 0.0])),
+    "K": ("Hand towards you", np.array([0.0, -1.0, 0.0])),
+    "U": ("Hand up", np.array([0.0, 0.0, 1.0])),
+    "O": ("Hand down", np.array([0.0, 0.0, -1.0])),
+}
+"""Label and direction in H of each key, as seen in the views; WASD, Q, E and the arrows move viser's camera."""
+
+
+def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[], bool]) -> None:
+    """Let keys move the hand, which holds the stylus until `LETS_GO`; the first arguments are those of `ClockPanel`.
+
+    Parameters
+    ----------
+    pressed : callable
+        Whether the switch is pressed.
+    """
+
+    def moves(way: Array) -> Callable[[Any], None]:
+        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * way, pressed())
+
+    for key, (label, way) in WAYS.items():
+        gui.add_command(label, hotkey=key).on_trigger(acts(moves(way)))  # pyright: ignore[reportArgumentType]
+    gui.add_command("Let go of the stylus", hotkey=LETS_GO).on_trigger(acts(lambda event: desk.let_go()))

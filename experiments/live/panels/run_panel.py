@@ -1,0 +1,149 @@
+"""Panel of the live page for the choice of mode, map, figure and clips."""
+
+from typing import Any
+
+import viser
+
+from controllers.errors import ParameterError
+from experiments.config.maps import MAPS, Led, MapFile
+from experiments.config.modes import MODES
+from experiments.config.part import to_json
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.live.panels.acts import Acts
+from experiments.live.session.desk import Desk
+from experiments.live.session.messages import Built
+from models.mocap.library import embedded_names
+
+FOR_EVER = 86400.0  # [s] longest session: a day
+SLOTS = {
+    "cylindrical": ("inner low", "outer low", "inner high", "outer high"),
+    "composite": ("lower body", "upper body inside", "upper body outside"),
+    "rivers": ("level river", "wave", "high river"),
+    "led": ("walks",),
+    "file": (),
+}
+"""Roles of a map's clips, by kind of map."""
+
+
+class RunPanel:
+    """Choice of mode, map, figure and clips, and the button that runs them; other arguments as in `ClockPanel`.
+
+    Parameters
+    ----------
+    config : RunConfig
+        The initial choice.
+    """
+
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, config: RunConfig):
+        self._gui, self._desk, self._acts = gui, desk, acts
+        modes = tuple(mode.__pydantic_fields__["kind"].default for mode in MODES)  # pyright: ignore
+        maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS)  # pyright: ignore
+        self._file = config.map.file if isinstance(config.map, MapFile) else ""
+        with gui.add_folder("Run"):
+            self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)
+            self._map = gui.add_dropdown(
+                "Map",
+                tuple(kind for kind in maps if kind != "file" or self._file),
+                initial_value=_map_kind(config),
+            )
+            self._figure = gui.add_dropdown("Figure", ("physical", "kinematic"), initial_value=config.figure.kind)
+            self._folder = gui.add_folder("Clips")
+            self._build = gui.add_button("Run this", icon=viser.Icon.PLAYER_PLAY, color="blue")
+        self._slots: list[viser.GuiDropdownHandle[Any]] = []
+        self._chosen = tuple(config.map.clips)
+        self._known = self._clips()
+        self._lay_slots()
+        self._mode.on_update(acts(lambda event: self._lay_slots()))
+        self._map.on_update(acts(lambda event: self._lay_slots()))
+        self._build.on_click(acts(lambda event: desk.build(self.config())))
+
+    def config(self) -> RunConfig:
+        """The chosen run, with the default gains of its mode.
+
+        Raises
+        ------
+        ParameterError
+            If its parts do not fit.
+        """
+        mode = str(self._mode.value)
+        words: dict[str, Any] = {"figure": str(self._figure.value), "seconds": FOR_EVER, "clips": self._names()}
+        if mode == "lead":
+            return run_config(mode=mode, **words)
+        chosen = str(self._map.value)
+        if chosen == "file":
+            del words["clips"]
+            return run_config(mode=mode, map=self._file, **words)
+        return run_config(mode=mode, map=chosen, **words)
+
+    def show(self, built: Built) -> None:
+        """Set the choice to the current run."""
+        config = built.config
+        self._chosen = tuple(_name(clip) for clip in config.map.clips)
+        self._mode.value, self._figure.value = config.mode.kind, config.figure.kind
+        if not config.leads:
+            self._map.value = _map_kind(config)
+        self._lay_slots()
+
+    def write(self) -> None:
+        """Offer newly prepared clips."""
+        if self._clips() != self._known:
+            new = [name for name in self._clips() if name not in self._known]
+            self._known = self._clips()
+            self._chosen = (*new, *self._names_shown()[len(new) :])
+            self._lay_slots()
+
+    def _clips(self) -> tuple[str, ...]:
+        return (*self._desk.clips, *embedded_names())
+
+    def _kind(self) -> str:
+        return "led" if self._mode.value == "lead" else str(self._map.value)
+
+    def _lay_slots(self) -> None:
+        labels, known = SLOTS[self._kind()], self._clips()
+        if len(self._slots) == len(labels):
+            chosen = self._names_shown() if not self._chosen else self._chosen
+        else:
+            chosen = self._chosen
+        defaults = _default_clips(self._kind())
+        for slot in self._slots:
+            slot.remove()
+        self._slots = []
+        with self._folder:
+            for k, label in enumerate(labels):
+                name = chosen[k] if k < len(chosen) and chosen[k] in known else defaults[min(k, len(defaults) - 1)]
+                self._slots.append(self._gui.add_dropdown(label, known, initial_value=name))
+        self._chosen = ()
+
+    def _names_shown(self) -> tuple[str, ...]:
+        return tuple(str(slot.value) for slot in self._slots)
+
+    def _names(self) -> tuple[str, ...]:
+        return tuple(str(self._desk.clips.get(name, name)) for name in self._names_shown())
+
+
+def _map_kind(config: RunConfig) -> str:
+    return "cylindrical" if config.leads else config.map.kind
+
+
+def _default_clips(kind: str) -> tuple[str, ...]:
+    found = next((part for part in (*MAPS, Led) if part.__pydantic_fields__["kind"].default == kind), None)  # pyright: ignore
+    return () if found is None or kind == "file" else found().clips  # pyright: ignore
+
+
+def _name(clip: str) -> str:
+    """Name of a clip in a list: of a file its stem."""
+    return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
+
+
+def configuration_text(config: RunConfig | None) -> str:
+    """A configuration as JSON, as ``hvf run --config`` reads it.
+
+    Raises
+    ------
+    ParameterError
+        If nothing runs yet.
+    """
+    if config is None:
+        raise ParameterError("nothing runs yet; expected a run whose configuration can be kept")
+    return to_json(config)

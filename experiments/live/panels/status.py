@@ -1,0 +1,36 @@
+"""Status lines at the top of the live page: clock, pace, driver, progress, faults; and the first steps."""
+
+import html
+
+from controllers.state import Array
+from experiments.live.session.desk import Desk
+
+FIRST_STEPS = """
+- **Drag the orange ball**: it is your hand on the stylus. The stylus lags behind it as a hand feels the field: the
+  green arrow is the force on you, the orange one yours. Let go, and the stylus finds its way back to the curve.
+- The **figure** moves as the stylus does; the translucent one shows the animation that nobody touches.
+- To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag
+  the curve, and *Perform the bent curve*.
+- **Keys**: I J K L and U O move the hand (H lets go), space pauses, N steps, Z and Y undo and redo, R resets.
+- *Gains* shows whether the loop is stable; *Takes* records what you do, and downloads it; *Clips* takes your motion.
+- Turn the view by dragging beside the ball, zoom with the wheel, move it with the right button.
+"""
+
+
+def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
+    """HTML of the status lines, including a fault of the device."""
+    middle, most = 1e3 * now["cost"]
+    doing = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
+    said = [f"<b>{now['t'][0]:.2f} s</b> · {doing}"]
+    if going:
+        said.append(html.escape(going))
+    elif driver is None:
+        said.append("<b>Drag the orange ball</b> (keys: I J K L U O)")
+    else:
+        said.append(f"browser {driver} drives")
+    if desk.records:
+        said.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
+    if now["fault"][0] != 0.0:
+        said.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
+    said.append(f'<span style="color:#7a8494">a tick takes {middle:.2f} ms, 99 % under {most:.2f} ms</span>')
+    return "".join(f'<p style="margin:.25rem .75rem;font-size:.8rem">{line}</p>' for line in said)

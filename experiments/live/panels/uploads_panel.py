@@ -1,0 +1,41 @@
+"""Panel of the live page for uploading a motion file, which is prepared and then offered among the clips."""
+
+import time
+from typing import Any
+
+import viser
+
+from experiments.live.panels.acts import Acts
+from experiments.live.session.desk import MOST_BYTES, Desk
+
+
+class UploadsPanel:
+    """Upload and its progress; the arguments are those of `ClockPanel`."""
+
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
+        self._desk = desk
+        gui.add_markdown(
+            "A **BVH**, or an **ASF** and then its **AMC**: calibrated, put on the floor, looped or at rest, made "
+            "feasible on contact, as `hvf prepare` does. It is then the first of the clips under *Play*."
+        )
+        self._upload = gui.add_upload_button(
+            f"Upload a motion (up to {MOST_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
+        )
+        self._going = gui.add_markdown("", visible=False)
+        self._bar = gui.add_progress_bar(100.0, visible=False, animated=True)
+        self._said = gui.add_markdown("")
+        self._upload.on_upload(acts(self._came))
+
+    def write(self) -> None:
+        """Show the file being prepared and the clips that are ready."""
+        preparing = self._desk.preparing
+        self._bar.visible = self._going.visible = preparing is not None
+        if preparing is not None:
+            name, since = preparing
+            self._going.content = f"Preparing **{name}**: {time.monotonic() - since:.0f} s so far, of ten to sixty."
+        if self._desk.clips:
+            self._said.content = "Ready: " + ", ".join(f"**{name}**" for name in self._desk.clips)
+
+    def _came(self, event: Any) -> None:
+        file = self._upload.value
+        self._desk.upload(file.name, file.content)

@@ -1,0 +1,350 @@
+"""State and actions of the live page, without its GUI: engine process, displayed values, undo, takes and clips."""
+
+import re
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.state import Array
+from experiments.config.run_config import RunConfig
+from experiments.live.session.engine_process import EngineProcess
+from experiments.live.session.gain_verdict import GainVerdict
+from experiments.live.session.gains import with_gain
+from experiments.live.session.messages import (
+    Build,
+    Built,
+    GoBack,
+    Perform,
+    Progress,
+    Rearm,
+    Record,
+    Redo,
+    Refused,
+    Reset,
+    Saved,
+    SetGains,
+    Stop,
+    Undo,
+)
+from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
+from sim.errors import SimError
+
+REMEMBERED = 60.0  # [s] of history that can be looked at again
+PICTURES = 30.0  # states stored per second of history
+MOST_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
+_MOTIONS = (".bvh", ".amc", ".asf", ".txt", ".json")
+
+
+class Doing(NamedTuple):
+    """An action that can be undone: a change of gains, or, without configurations, a bend of the curve."""
+
+    before: RunConfig | None = None
+    after: RunConfig | None = None
+
+
+class Desk:
+    """State of a live page and what can be done there; `poll` brings it up to date.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of takes and clips.
+    say : callable
+        Called with each line of text that the person should read.
+    """
+
+    def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None):
+        self.folder, self._say = folder, say
+        self.engine = EngineProcess()
+        self.built: Built | None = None
+        self.config: RunConfig | None = None
+        self.progress: Progress | None = None
+        self.verdict: tuple[GainVerdict, ...] = ()
+        self.checking = False
+        self.builds = 0
+        self.preparing: tuple[str, float] | None = None
+        self.clips: dict[str, Path] = {}
+        self.history: deque[dict[str, Array]] = deque(maxlen=round(REMEMBERED * PICTURES))
+        self.now: dict[str, Array] = self.engine.shown.read()
+        self._done: list[Doing] = []
+        self._undone: list[Doing] = []
+        self._bends, self._expected = 0, 0
+        self._verdicts = Worker(verdicts)
+        self._preparation: Worker | None = None
+
+    # What it shows
+
+    def poll(self) -> None:
+        """Process the messages of the engine and of the workers, and read the latest displayed values."""
+        while (told := self.engine.told()) is not None:
+            self._hear(told)
+        while (found := self._verdicts.told()) is not None:
+            config, now, more = found
+            if self.config is not None and config.mode == self.config.mode:
+                self.verdict, self.checking = now, more
+        if self._preparation is not None and (made := self._preparation.told()) is not None:
+            self._take_clip(made)
+        if not self.engine.alive:
+            raise SimError("the servo's process has ended; start hvf live again")
+        now = self.engine.shown.read()
+        if self.built is not None and now["t"][0] != self.now["t"][0]:
+            self._remember(now)
+        self.now = now
+
+    def _hear(self, told: object) -> None:
+        self.progress = told if isinstance(told, Progress) else None
+        if isinstance(told, Built):
+            self.built, self.config = told, told.config
+            self.builds += 1
+            self.history.clear()
+            self._done, self._undone, self._bends, self._expected = [], [], 0, 0
+            self._judge()
+            for remark in told.remarks:
+                self._say(remark)
+        elif isinstance(told, Refused):
+            self._say(told.text)
+            if self.built is not None and self.config is not None and self.config.map == self.built.config.map:
+                self._judge()
+        elif isinstance(told, Saved):
+            self._say(f"Take kept in {told.folder}.")
+
+    def _remember(self, now: dict[str, Array]) -> None:
+        if now["t"][0] < self.now["t"][0]:
+            self.history = deque((h for h in self.history if h["t"][0] <= now["t"][0]), maxlen=self.history.maxlen)
+        bends = int(now["bends"][0])
+        if bends > self._bends and bends > self._expected:
+            self._done.append(Doing())
+            self._undone.clear()
+        self._bends = self._expected = bends
+        if not self.history or now["t"][0] - self.history[-1]["t"][0] >= 1.0 / PICTURES:
+            if self.history and now["curve"][0] == self.history[-1]["curve"][0]:
+                now["course"] = self.history[-1]["course"]
+            self.history.append(now)
+
+    def at(self, seconds_ago: float) -> dict[str, Array]:
+        """The displayed values of `seconds_ago` [s] before now, from the history; the current ones for 0."""
+        if seconds_ago <= 0.0 or not self.history:
+            return self.now
+        wanted = self.now["t"][0] - seconds_ago
+        return min(self.history, key=lambda h: abs(float(h["t"][0]) - wanted))
+
+    # What can be done
+
+    def build(self, config: RunConfig) -> None:
+        """Put another run together; the current one continues until it is ready."""
+        self.let_go()
+        self.engine.ask(Build(config))
+
+    def hold(self, target: Array, pressed: bool) -> None:
+        """Hold the stylus with a target position in H [m], with its switch pressed or not."""
+        self.engine.held.write({"grip": 1.0, "pressed": float(pressed), "target": target})
+
+    def press(self, pressed: bool) -> None:
+        """Press or release the switch of the held stylus."""
+        self.engine.held.write({"pressed": float(pressed)})
+
+    def let_go(self) -> None:
+        """Release the stylus."""
+        self.engine.held.write({"grip": 0.0, "pressed": 0.0})
+
+    @property
+    def holds(self) -> bool:
+        """Whether a person holds the stylus."""
+        return bool(self.engine.held.rows["grip"][0] > 0.0)
+
+    @property
+    def target(self) -> Array:
+        """Target position of the held stylus in H [m], shape (3,)."""
+        return self.engine.held.rows["target"].copy()
+
+    @property
+    def paused(self) -> bool:
+        """Whether the simulation is paused."""
+        return bool(self.engine.held.rows["paused"][0] > 0.0)
+
+    def pause(self, paused: bool) -> None:
+        """Pause the simulation, or let it continue."""
+        self.engine.held.write({"paused": float(paused)})
+
+    def step(self) -> None:
+        """Pause, and advance by a block of 8 ms."""
+        self.engine.held.write({"paused": 1.0, "steps": self.engine.held.rows["steps"][0] + 1.0})
+
+    def pace(self, share: float) -> None:
+        """Set the pace of the simulation, as a share of real time."""
+        self.engine.held.write({"pace": share})
+
+    def look(self, at_field: bool) -> None:
+        """Switch the computation of the field on a slice on or off."""
+        self.engine.held.write({"slice": float(at_field)})
+
+    def reset(self) -> None:
+        """Go back to the beginning."""
+        self.let_go()
+        self.engine.ask(Reset())
+
+    def go_back(self, seconds_ago: float) -> None:
+        """Continue from the last stored state before the time `seconds_ago` [s] ago; one state is stored per second."""
+        self.let_go()
+        self.engine.ask(GoBack(float(self.at(seconds_ago)["t"][0])))
+
+    def perform(self, now: bool) -> None:
+        """Perform the bent curve, or bend it again."""
+        self.engine.ask(Perform(now))
+
+    def rearm(self) -> None:
+        """Clear a latched fault."""
+        self.engine.ask(Rearm())
+
+    def set_gain(self, name: str, value: float) -> None:
+        """Set a gain.
+
+        Raises
+        ------
+        ParameterError
+            If the value is out of its interval.
+        """
+        if self.config is None:
+            return
+        before, after = self.config, with_gain(self.config, name, value)
+        if before == after:
+            return
+        last = self._done[-1] if self._done else Doing()
+        if last.after is before and self._moved(last) == {name}:
+            self._done[-1] = Doing(last.before, after)  # successive moves of a slider are undone together
+        else:
+            self._done.append(Doing(before, after))
+        self._undone.clear()
+        self._take_over(after)
+
+    def _moved(self, doing: Doing) -> set[str]:
+        if doing.before is None or doing.after is None:
+            return set()
+        before, after = vars(doing.before.mode), vars(doing.after.mode)
+        return {name for name in before if before[name] != after[name]}
+
+    def undo(self) -> None:
+        """Undo the last action: a bend or a change of gains."""
+        if not self._done:
+            self._say("Nothing is left to undo.")
+            return
+        doing = self._done.pop()
+        self._undone.append(doing)
+        if doing.before is None:
+            self._expected = self._bends - 1
+            self.engine.ask(Undo())
+        else:
+            self._take_over(doing.before)
+
+    def redo(self) -> None:
+        """Redo the last undone action."""
+        if not self._undone:
+            self._say("Nothing is left to do again.")
+            return
+        doing = self._undone.pop()
+        self._done.append(doing)
+        if doing.after is None:
+            self._expected = self._bends + 1
+            self.engine.ask(Redo())
+        else:
+            self._take_over(doing.after)
+
+    def _take_over(self, config: RunConfig) -> None:
+        self.config = config
+        self.engine.ask(SetGains(config))
+        self._judge()
+
+    def _judge(self) -> None:
+        self.checking = True
+        self._verdicts.ask(self.config)
+
+    # Takes and clips
+
+    @property
+    def records(self) -> bool:
+        """Whether a take is being recorded."""
+        return bool(self.now["recording"][0] > 0.0)
+
+    def takes(self) -> tuple[str, ...]:
+        """Names of the existing takes."""
+        folder = self.folder / "takes"
+        return tuple(sorted(path.parent.name for path in folder.glob("*/edited.bvh")))
+
+    def take(self, name: str) -> Path:
+        """Folder of a take."""
+        return self.folder / "takes" / name
+
+    def record(self, name: str) -> None:
+        """Begin a take.
+
+        Raises
+        ------
+        SimError
+            If the name is invalid, or another take has it.
+        """
+        if not re.fullmatch(r"[\w][\w .-]{0,60}", name):
+            raise SimError(f"a take cannot be named {name!r}; expected letters, digits, space, dot and dash")
+        if self.take(name).exists():
+            raise SimError(f"there is a take {name!r} already; expected another name")
+        self.engine.ask(Record(self.take(name)))
+
+    def stop(self) -> None:
+        """End the take; it is measured and saved."""
+        self.engine.ask(Stop())
+
+    def upload(self, name: str, content: bytes) -> None:
+        """Have a motion file prepared in a separate process.
+
+        Raises
+        ------
+        SimError
+            If it is too large or of an unsupported format, or another file is being prepared.
+        """
+        file = Path(name).name
+        if Path(file).suffix.lower() not in _MOTIONS:
+            raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
+        if len(content) > MOST_BYTES:
+            raise SimError(
+                f"{file} has {len(content) / 1e6:.1f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB; hvf prepare "
+                "takes larger ones"
+            )
+        if self.preparing is not None:
+            raise SimError(f"{self.preparing[0]} is being prepared; expected one file after the other")
+        came = self.folder / "uploads"
+        came.mkdir(parents=True, exist_ok=True)
+        (came / file).write_bytes(content)
+        if file.lower().endswith(".asf"):
+            self._say(f"{file}: the skeleton is kept; its AMC can come now.")
+            return
+        target = self.folder / "clips" / f"{Path(file).stem}.bvh"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        self._preparation = self._preparation or Worker(preparation)
+        self.preparing = file, time.monotonic()
+        self._preparation.ask((came / file, target))
+
+    def _take_clip(self, made: Uploaded) -> None:
+        self.preparing = None
+        if made.path is not None:
+            self.clips[made.path.stem] = made.path
+        self._say(made.text)
+
+    def close(self) -> None:
+        """End all processes; a take in progress is saved."""
+        self.engine.close()
+        self._verdicts.close()
+        if self._preparation is not None:
+            self._preparation.close()
+
+
+def numbers(history: deque[dict[str, Array]], names: tuple[str, ...], seconds: float) -> tuple[Array, ...]:
+    """Times [s], and norms of the named values over the last `seconds` [s] of the history, for plots."""
+    if not history:
+        return (np.zeros(2), *(np.zeros(2) for _ in names))
+    last = history[-1]["t"][0]
+    rows = [h for h in history if h["t"][0] >= last - seconds]
+    times = np.array([h["t"][0] for h in rows])
+    return (times, *(np.array([float(np.linalg.norm(h[name])) for h in rows]) for name in names))

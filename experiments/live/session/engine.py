@@ -1,0 +1,235 @@
+"""The engine of a live session: runs the servo block by block while a person drags the stylus and changes gains."""
+
+import time
+from collections import deque
+from dataclasses import replace
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Program
+from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
+from controllers.state import HAND_SWITCH, POSITION, Array
+from experiments.config.run_config import RunConfig
+from experiments.setups.session import Session
+from experiments.setups.setups import parts_of
+from sim.devices.simulated import SimulatedPhantom
+from sim.loop.bends import redo_bend, undo_bend
+from sim.loop.loop import make_logs
+from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
+from sim.loop.snapshots import KeptState, kept_state, put_back
+from sim.users.hand.dragged import dragged, relaxed, tremor
+
+BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short for a pause of the hand to be seen
+STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force
+FASTEST = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
+HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three pictures of the page
+KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be returned to, and their largest number
+
+
+class Drag(NamedTuple):
+    """A person's target for the stylus in H [m], and whether its switch is pressed."""
+
+    target: Array
+    pressed: bool = False
+
+
+class Engine:
+    """A session that a person drives.
+
+    Parameters
+    ----------
+    session : Session
+        Session that has not been run yet.
+
+    Attributes
+    ----------
+    config : RunConfig
+        Configuration with the current gains.
+    tick : int
+        Number of the next tick.
+    """
+
+    def __init__(self, session: Session):
+        self.session, self.world = session, session.world
+        self.config = cast(RunConfig, session.config)
+        assert isinstance(session.servo.device, SimulatedPhantom)
+        field = session.servo.field
+        # A copy, as the gains change here and the law must keep its own parameters.
+        self._servo = session.servo._replace(field=field._replace(params=field.params.copy()))
+        self._device, self._arm = session.servo.device, session.servo.device.user.arm
+        self._block = self._servo.figure_ticks * max(1, BLOCK // self._servo.figure_ticks)
+        self.logs = make_logs(self._servo, self._block)
+        self._costs: deque[float] = deque(maxlen=1000)
+        self._intended = np.full(3, np.nan)
+        self.drag: Drag | None = None
+        self.tick = 0
+        self._until = self._end_of_stretching()
+        self.perform(False)
+        self._begin = kept_state(self._servo, self.world, 0)
+        self._kept: deque[KeptState] = deque([self._begin], maxlen=KEPT)
+
+    @property
+    def period(self) -> float:
+        """Period of the servo [s]."""
+        return self._servo.plant.period
+
+    @property
+    def seconds(self) -> float:
+        """Duration of a block [s]."""
+        return self._block * self.period
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.tick * self.period
+
+    @property
+    def stylus(self) -> Array:
+        """Measured position of the stylus in H [m], shape (3,)."""
+        return self._device.hand[POSITION]
+
+    @property
+    def memory(self) -> Array:
+        """Memory of the field."""
+        return self._servo.field.memory
+
+    @property
+    def field(self) -> Field:
+        """The compiled field with its current parameters."""
+        return self._servo.field
+
+    @property
+    def tubes(self) -> StretchyTubes | None:
+        """The law in whose memory a curve is bent, if there is one."""
+        law = self.session.field
+        return law if isinstance(law, StretchyTubes) else None
+
+    def advance(self) -> tuple[TickLog, FrameLog]:
+        """Run a block and return its logs, which the next block overwrites."""
+        t, seconds = self.time, self.seconds
+        if self.drag is None or self.tick == 0:  # before the first tick the position of the stylus is not measured
+            arm = relaxed(self._arm)
+            self._intended[:] = np.nan
+        else:
+            start = self.stylus.copy() if np.isnan(self._intended[0]) else self._intended
+            share = 1.0 - np.exp(-seconds / HAND_TIME)
+            wanted = _within_reach(start + share * (self.drag.target - start), start, FASTEST * seconds)
+            end = _within_reach(wanted, self.stylus, STRONGEST / self._arm.stiffness)
+            arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
+            self._intended = end
+        device = self._device._replace(user=self._device.user._replace(arm=arm))
+        begin = time.thread_time()  # processor time of this thread, without the time that other programs take
+        run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
+        self._costs.append((time.thread_time() - begin) / self._block)
+        self.tick += self._block
+        if self.time >= self._kept[-1].tick * self.period + KEPT_EVERY:
+            self._kept.append(kept_state(self._servo, self.world, self.tick))
+        return self.logs
+
+    def cost(self) -> tuple[float, float]:
+        """Median and 99th percentile of the processor time per tick over recent blocks [s]; zeros before the first."""
+        if not self._costs:
+            return 0.0, 0.0
+        middle, most = np.percentile(self._costs, (50.0, 99.0))
+        return float(middle), float(most)
+
+    def set_gains(self, config: RunConfig) -> None:
+        """Apply the gains of a configuration's mode during the run.
+
+        A curve that is bent in the field's memory keeps its original timing, as bends are stored by phase.
+
+        Raises
+        ------
+        ControllerError
+            If a number is out of its interval, or the structure of the field would change.
+        """
+        parts = parts_of(config, self.session.parts.maps)
+        new, old, field = parts.program, self.session.parts.program, self._servo.field
+        if not np.array_equal(new.ops, old.ops) or len(new.params) != len(old.params):
+            raise ParameterError("another field than the one that runs; expected other gains of the same mode and map")
+        field.params[:] = new.params
+        state = slice(0, len(old.memory) if self.tubes is None else self._record)
+        before, after = self._initial[state], new.memory[state]
+        changed = (before != after) & ~(np.isnan(before) & np.isnan(after))
+        field.memory[state][changed] = after[changed]
+        self._initial[state] = after
+        field.budget[:] = parts.tank.params()
+        if self.tubes is not None:
+            field.params[self._until] = self._performs_from
+        self.config = cast(RunConfig, parts.config)
+
+    def perform(self, now: bool) -> None:
+        """Perform the bent curve from now on, or make it bendable again, in a mode that has both."""
+        self._performs_from = self.time if now else np.inf
+        if self.tubes is not None:
+            self._servo.field.params[self._until] = self._performs_from
+
+    @property
+    def performs(self) -> bool:
+        """Whether a bent curve is being performed."""
+        return bool(np.isfinite(self._performs_from))
+
+    def undo(self) -> bool:
+        """Undo the last bend; False if there is none."""
+        return self._may_edit() and undo_bend(self.memory, self._record)
+
+    def redo(self) -> bool:
+        """Redo the last undone bend; False if there is none."""
+        return self._may_edit() and redo_bend(self.memory, self._record)
+
+    def _may_edit(self) -> bool:
+        """Whether the mode bends a curve and nobody holds it, neither by a drag nor by the switch as last sensed."""
+        return self.tubes is not None and self.drag is None and self._device.hand[HAND_SWITCH] == 0.0
+
+    def bends(self) -> int:
+        """Number of bends in force."""
+        return 0 if self.tubes is None else len(self.tubes.edits(self.memory))
+
+    def rearm(self) -> None:
+        """Clear a latched fault of the device; the force is ramped in from zero."""
+        rearm_servo(self._servo)
+
+    def reset(self) -> None:
+        """Go back to the beginning; the gains are kept."""
+        self._go_to(self._begin)
+
+    def back_to(self, t: float) -> float:
+        """Go back to the last stored state at or before the time t [s]; returns the time of that state [s]."""
+        state = next((kept for kept in reversed(self._kept) if kept.tick * self.period <= t), self._kept[0])
+        self._go_to(state)
+        return self.time
+
+    def _go_to(self, state: KeptState) -> None:
+        put_back(self._servo, self.world, state)
+        self.tick = state.tick
+        while len(self._kept) > 1 and self._kept[-1].tick > self.tick:
+            self._kept.pop()
+        if self._kept[0].tick > self.tick:
+            self._kept = deque([state], maxlen=KEPT)
+        self.drag = None
+        self._intended[:] = np.nan
+
+    def _end_of_stretching(self) -> int:
+        """Index of the parameter with the time at which stretching ends; also stores the field's initial memory."""
+        program: Program = self.session.parts.program
+        self._initial = program.memory.copy()
+        for place in program.places():
+            if self.tubes is not None and place.law is self.tubes:
+                self._record = self.tubes.record_at(place.memory)
+                return place.params + StretchyGains._fields.index("until")
+        return 0
+
+
+def take_session(session: Session, config: RunConfig, handled: tuple[tuple[float, float], ...]) -> Session:
+    """The session with which a take is measured: with the gains at its end, and the spans in which the hand dragged."""
+    parts = replace(session.parts, config=config, handled=handled)
+    return replace(session, parts=parts)
+
+
+def _within_reach(point: Array, centre: Array, reach: float) -> Array:
+    """The point, or if it is outside a ball about `centre`, the nearest point of the ball."""
+    away = point - centre
+    distance = float(np.linalg.norm(away))
+    return point if distance <= reach else centre + away * (reach / distance)

@@ -1,0 +1,282 @@
+"""The process of the engine, so that the servo never waits for the page nor for the page's Python interpreter."""
+
+import os
+import queue
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from controllers.errors import ControllerError
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
+from controllers.safety.faults import FAULT_CODE
+from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
+from experiments.live.session.board import Board
+from experiments.live.session.engine import Drag, Engine
+from experiments.live.session.messages import (
+    COURSE_POINTS,
+    HELD,
+    SHOWN,
+    SLICE_SIDE,
+    Build,
+    Built,
+    GoBack,
+    Perform,
+    Progress,
+    Quit,
+    Rearm,
+    Record,
+    Redo,
+    Refused,
+    Reset,
+    Saved,
+    SetGains,
+    Stop,
+    Undo,
+)
+from experiments.live.session.takes import Take
+from experiments.live.session.workers import PageProcess
+from experiments.setups.default_animation import default_poses
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from models.errors import ModelError
+from sim.compilation.unit_workers import compile_units, missing_units
+from sim.compilation.units import Unit
+from sim.errors import SimError
+from sim.loop.field_slice import field_slice
+from sim.loop.loop import configuration_size, shown_configuration
+
+PICTURE = 0.012  # [s] least time between two pictures: every other block of 8 ms, so that each of the page's is new
+SLICE = 0.25  # [s] between two computations of the field's slice
+SLICE_WIDTH = 0.14  # [m] side of the slice
+IDLE = 0.01  # [s] between two polls of the page while nothing runs
+LATE = 0.1  # [s] of delay from which it is not made up for
+
+
+class EngineProcess(PageProcess):
+    """The page's handle of the engine's process: boards to read and write, and a queue in each direction."""
+
+    def __init__(self) -> None:
+        shown, held = Board.memory(SHOWN), Board.memory(HELD)
+        self.shown, self.held = Board(shown, SHOWN), Board(held, HELD)
+        self.held.write({"pace": 1.0})
+        # Not a daemon, as it starts compiler processes.
+        super().__init__(_main, (shown, held), daemon=False, name="hvf-servo")
+
+    def close(self) -> None:
+        """End the process; a take in progress is saved."""
+        self.ask(Quit())
+        self._process.join(30.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._close_queues()
+
+
+def _main(shown: Any, held: Any, orders: Any, told: Any) -> None:
+    _Runner(Board(shown, SHOWN), Board(held, HELD), orders, told).run()
+
+
+class _Runner:
+    """The loop of the process: orders, a block, a picture, and the wall clock."""
+
+    def __init__(self, shown: Board, held: Board, orders: Any, told: Any):
+        self._shown, self._held, self._orders, self._told = shown, held, orders, told
+        self._engine: Engine | None = None
+        self._take: Take | None = None
+        self._parent, self._going = os.getppid(), True
+        self._pictured, self._sliced, self._steps = 0.0, 0.0, 0.0
+        self._paced = 0.0, 0.0
+        self._curve, self._changed = 0, True
+
+    def run(self) -> None:
+        """Run until told to quit, or until the page's process has ended."""
+        origin, pace = time.perf_counter(), 1.0
+        before = 0.0
+        while self._going and os.getppid() == self._parent:
+            self._listen()
+            held = self._held.rows
+            engine = self._engine
+            paused, steps = held["paused"][0] > 0.0, held["steps"][0]
+            if engine is None or (paused and steps <= self._steps):
+                self._steps = min(self._steps, steps)
+                time.sleep(IDLE)
+                self._picture()
+                origin, before = time.perf_counter(), 0.0
+                continue
+            if paused:
+                self._steps += 1.0
+            else:
+                self._steps = steps
+            self._block(engine)
+            if held["pace"][0] != pace:
+                pace, origin, before = max(float(held["pace"][0]), 0.01), time.perf_counter(), 0.0
+            before += engine.seconds / pace
+            ahead = origin + before - time.perf_counter()
+            if ahead > 0.0:
+                time.sleep(ahead)
+            elif ahead < -LATE:
+                origin, before = time.perf_counter(), 0.0
+        if self._engine is not None:
+            self._stop(self._engine)
+
+    def _hold(self, engine: Engine) -> None:
+        held = self._held.rows
+        engine.drag = Drag(held["target"].copy(), held["pressed"][0] > 0.0) if held["grip"][0] > 0.0 else None
+
+    def _block(self, engine: Engine) -> None:
+        self._hold(engine)
+        logs = engine.advance()
+        if self._take is not None:
+            self._take.add(logs, engine)
+        self._picture()
+
+    def _listen(self) -> None:
+        while self._going:
+            try:
+                order = self._orders.get_nowait()
+            except queue.Empty:
+                return
+            try:
+                self._obey(order)
+            except (ModelError, ControllerError, SimError, OSError) as error:
+                self._told.put(Refused(str(error)))
+
+    def _obey(self, order: object) -> None:
+        if isinstance(order, Build):
+            self._build(order)
+        elif isinstance(order, Quit):
+            self._going = False
+        elif self._engine is not None:
+            self._hold(self._engine)
+            self._do(order, self._engine)
+            self._changed = True
+
+    def _do(self, order: object, engine: Engine) -> None:
+        done: dict[type, Callable[[Any], Any]] = {
+            SetGains: lambda order: engine.set_gains(order.config),
+            Reset: lambda order: engine.reset(),
+            GoBack: lambda order: engine.back_to(order.t),
+            Undo: lambda order: engine.undo(),
+            Redo: lambda order: engine.redo(),
+            Perform: lambda order: engine.perform(order.now),
+            Rearm: lambda order: engine.rearm(),
+            Record: lambda order: self._record(order, engine),
+            Stop: lambda order: self._stop(engine),
+        }
+        if isinstance(order, Reset | GoBack):
+            self._stop(engine)  # a take must be continuous in time
+        done[type(order)](order)
+
+    def _record(self, order: Record, engine: Engine) -> None:
+        self._stop(engine)
+        self._take = Take(order.folder, engine)
+
+    def _stop(self, engine: Engine) -> None:
+        if self._take is None:
+            return
+        take, self._take = self._take, None
+        self._told.put(Progress("saving the take", 0.5))
+        try:
+            self._told.put(Saved(take.folder, take.end(engine)))
+        except SimError as error:
+            self._told.put(Refused(str(error)))
+
+    def _build(self, order: Build) -> None:
+        if self._engine is not None:
+            self._stop(self._engine)
+        self._told.put(Progress("putting the run together", 0.1))
+        session = wire(order.config, ready=self._compile)
+        self._engine = Engine(session)
+        self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
+        self._changed = True
+        self._slice(self._engine)  # so that its code is compiled or loaded now, not during the run
+        self._told.put(_built(session, self._engine))
+        self._picture()
+
+    def _compile(self, units: Sequence[Unit]) -> None:
+        waiting = missing_units(units)
+        done = 0
+        for_ever = "compiling once what this run needs"
+
+        def tell(unit: Unit) -> None:
+            nonlocal done
+            done += 1
+            self._told.put(Progress(f"{for_ever}: {done} of {len(waiting)}", done / len(waiting)))
+
+        if waiting:
+            self._told.put(Progress(f"{for_ever}: 0 of {len(waiting)}; it takes a minute or two", 0.02))
+            compile_units(waiting, tell)
+
+    def _picture(self) -> None:
+        now, engine = time.perf_counter(), self._engine
+        if engine is None or now - self._pictured < PICTURE:
+            return
+        servo = engine.session.servo
+        self._pictured = now
+        trace, hand = engine.memory, servo.device.hand
+        shown: dict[str, Any] = {
+            "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
+            "recording": 0.0 if self._take is None else self._take.seconds(engine), "qpos": shown_configuration(servo),
+            "reference": servo.reference.pose, "p": hand[POSITION], "v": hand[VELOCITY], "switch": hand[HAND_SWITCH],
+            "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
+            "phase": trace[TRACE_PHASE], "residual": float(np.linalg.norm(servo.figure.applied[:3])),
+            "target": np.full(3, np.nan) if engine.drag is None else engine.drag.target,
+            "ghost": self._ghost(trace, servo.reference.pose),
+        }  # fmt: skip
+        if now - self._sliced > SLICE:
+            then, at = self._paced
+            shown["pace"] = 0.0 if then == 0.0 else (engine.time - at) / (now - then)
+            self._sliced, self._paced = now, (now, engine.time)
+            shown["cost"], shown["bends"] = engine.cost(), engine.bends()
+            if self._held.rows["slice"][0] > 0.0:
+                shown["slice"] = self._slice(engine)
+        held = self._shown.rows["switch"][0] > 0.0 and engine.tubes is not None
+        if self._changed or held:
+            self._changed, self._curve = held, self._curve + 1
+            shown["curve"], shown["bends"] = self._curve, engine.bends()
+            shown["course"] = _course(engine)
+        self._shown.write(shown)
+
+    def _ghost(self, trace: Array, pose: Array) -> Array:
+        """Pose of the default animation; where rivers play their own clips, that of the animation itself."""
+        if self._poses is None or not np.isfinite(trace[TRACE_DISTANCE]):
+            return pose
+        nearest, phase, river = trace[TRACE_POINT : TRACE_POINT + 3], trace[TRACE_PHASE], trace[TRACE_RIVER]
+        return self._poses(nearest[None].copy(), np.array([phase]), np.array([river]))[0]
+
+    def _slice(self, engine: Engine) -> Array:
+        """Points and forces of the field on the horizontal plane through the stylus, shape (n, 6)."""
+        hand = engine.session.servo.device.hand.copy()
+        points = slice_points(float(hand[HAND_POSITION + 2]))
+        forces = np.zeros_like(points)
+        if not engine.session.parts.maps.plays_rivers:
+            hand[VELOCITY] = 0.0
+        field_slice(engine.field, hand, points, forces)
+        return np.hstack([points, forces])
+
+
+def slice_points(height: float) -> Array:
+    """Grid points in a horizontal plane at a height in H [m], shape (81, 3)."""
+    side = np.linspace(-0.5 * SLICE_WIDTH, 0.5 * SLICE_WIDTH, SLICE_SIDE)
+    x, y = np.meshgrid(side, side)
+    return np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1)
+
+
+def _course(engine: Engine) -> Array:
+    """Points of the curve as it is bent now, in H [m], shape (241, 3)."""
+    curve = engine.session.curve if engine.tubes is None else engine.tubes.edited(engine.memory)
+    return curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
+
+
+def _built(session: Session, engine: Engine) -> Built:
+    static = session.static()
+    kept = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
+    assert configuration_size(session.servo) <= SHOWN["qpos"]
+    return Built(
+        engine.config,
+        {name: static[name] for name in kept if name in static},
+        engine.tubes is not None,
+        session.remarks,
+    )

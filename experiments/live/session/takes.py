@@ -1,0 +1,107 @@
+"""Takes: recorded spans of a live session, each in a folder like those of ``hvf run``, for ``hvf report``."""
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config.part import to_dict, to_json
+from experiments.files.curve_files import CURVE_FILE, save_curve
+from experiments.files.json_text import json_text
+from experiments.live.session.engine import Engine, take_session
+from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
+from experiments.results.measures.run_measures import summarise
+from experiments.results.measures.stretch_summary import stretch_summary
+from experiments.results.measures.summary_parts import SpeedSummary
+from experiments.runs.run import write_animations
+from experiments.setups.default_animation import default_poses
+from sim.errors import SimError
+from sim.loop.loop import groups, record_into
+from sim.loop.memory import peak_memory_mb
+from sim.loop.servo import FrameLog, TickLog
+from sim.recording.recorder import Recorder
+from sim.recording.recording import Recording
+
+LIVE = "dragged by hand on the live page; no configuration says what the hand did"
+"""Text ``live`` of a take's recording, which marks that it cannot be reproduced from its configuration."""
+LEAST = 0.5  # [s] shortest take that is measured; a shorter one is a slip of the mouse
+
+
+class Take:
+    """A take that is being recorded.
+
+    Its time begins at 0. Changes of gains and bends are recorded through their forces, not as events; the stored
+    configuration is that at the end of the take.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder to write into; it may not hold a run.
+    engine : Engine
+        The running engine.
+
+    Raises
+    ------
+    SimError
+        If the folder cannot be written, or holds a run.
+    """
+
+    def __init__(self, folder: Path, engine: Engine):
+        check_folder(folder, overwrite=False)
+        clear_folder(folder)
+        self.folder, self._began = folder, engine.time
+        self._wall = time.perf_counter()
+        servo = engine.session.servo
+        static = engine.session.static() | {"live": LIVE}
+        config = to_dict(engine.config)
+        self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo), static)
+        self._record = record_into(self._recorder, servo, engine.world)
+        self._handled: list[tuple[float, float]] = []
+
+    def seconds(self, engine: Engine) -> float:
+        """Duration so far [s]."""
+        return engine.time - self._began
+
+    def add(self, logs: tuple[TickLog, FrameLog], engine: Engine) -> None:
+        """Record the last block."""
+        ticks, frames = logs
+        ticks.hand[:, 0] -= self._began
+        frames.t[:] -= self._began
+        self._record(ticks, frames, len(ticks.hand))
+        if engine.drag is not None:
+            end = self.seconds(engine)
+            begin = end - engine.seconds
+            if self._handled and begin - self._handled[-1][1] < 1e-6:
+                begin = self._handled.pop()[0]
+            self._handled.append((begin, end))
+
+    def end(self, engine: Engine) -> tuple[str, ...]:
+        """Measure and close the recording, and write the files of ``hvf run`` beside it; returns the summary's lines.
+
+        Raises
+        ------
+        SimError
+            If it is too short to be measured; the recording is then kept as an interrupted one.
+        """
+        seconds = self.seconds(engine)
+        self._recorder.flush()
+        if seconds < LEAST:
+            self._recorder.close()
+            raise SimError(f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {LEAST:g} s or more")
+        session = take_session(engine.session, engine.config, tuple(self._handled))
+        speed = SpeedSummary(seconds / (time.perf_counter() - self._wall), 0.0, peak_memory_mb())
+        with Recording(self.folder / RECORDING) as recording:
+            summary = summarise(
+                recording, default_poses(session), speed, session.world.warnings(), session.parts.handled
+            )
+        lines = summary.lines()
+        tubes = engine.tubes
+        if isinstance(tubes, StretchyTubes):
+            lines = [stretch_summary(tubes, engine.memory).line(), *lines]
+            save_curve(tubes.edited(engine.memory), self.folder / CURVE_FILE)
+        whole = asdict(summary) | {"lines": lines}
+        self._recorder.close(whole)
+        (self.folder / SUMMARY).write_text(json_text(whole) + "\n", encoding="utf-8")
+        (self.folder / CONFIG).write_text(to_json(engine.config), encoding="utf-8")
+        write_animations(self.folder, session)
+        return tuple(lines)

@@ -1,0 +1,164 @@
+"""Worker processes for tasks that would block the page: verdicts on gains, and preparation of motion files."""
+
+import os
+import queue
+import signal
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from models.errors import ModelError
+
+_LISTENS = 0.5  # [s] between two checks whether the page's process still exists
+
+
+def start_undisturbed(process: Any) -> None:
+    """Start a process with SIGINT blocked, so that Ctrl-C does not end it: the page tells it when to end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class PageProcess:
+    """A process beside the page's, with a queue in each direction.
+
+    Parameters
+    ----------
+    main : callable
+        What runs in the process, called with the arguments and the queues of requests and of answers.
+    arguments : tuple
+        Its first arguments.
+    daemon : bool
+        Whether it ends with the page's process; if so, it cannot start processes itself.
+    name : str, optional
+        Name of the process.
+    """
+
+    def __init__(
+        self, main: Callable[..., None], arguments: tuple[object, ...], daemon: bool = True, name: str | None = None
+    ):
+        context = get_context("spawn")
+        self._asked: Any = context.Queue()
+        self._told: Any = context.Queue()
+        queues = self._asked, self._told
+        self._process = context.Process(target=main, args=(*arguments, *queues), daemon=daemon, name=name)
+        start_undisturbed(self._process)
+
+    def ask(self, what: object) -> None:
+        """Send a request."""
+        self._asked.put(what)
+
+    def told(self, seconds: float = 0.0) -> Any:
+        """The next answer, waiting for at most `seconds` [s]; None if there is none."""
+        try:
+            return self._told.get(timeout=seconds) if seconds > 0.0 else self._told.get_nowait()
+        except queue.Empty:
+            return None
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process is running."""
+        return self._process.is_alive()
+
+    def _close_queues(self) -> None:
+        """Close both queues without waiting for what they still hold."""
+        for line in (self._asked, self._told):
+            line.close()
+            line.cancel_join_thread()
+
+
+class Worker(PageProcess):
+    """A process that answers requests; only the newest pending request counts.
+
+    Parameters
+    ----------
+    does : callable
+        Called in the process with two queues, of requests and of answers.
+    """
+
+    def __init__(self, does: Callable[[Any, Any], None]):
+        super().__init__(_main, (does,))
+
+    def close(self) -> None:
+        """End the process, whatever it is doing."""
+        self._process.terminate()
+        self._process.join()
+        self._close_queues()
+
+
+def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
+    os.nice(2)  # the servo has priority
+    does(asked, told)
+
+
+def newest(asked: Any) -> Any:
+    """Wait for a request and return the newest one; None if the page's process has ended."""
+    parent = os.getppid()
+    while True:
+        try:
+            what = asked.get(timeout=_LISTENS)
+            break
+        except queue.Empty:
+            if os.getppid() != parent:
+                return None
+    while True:
+        try:
+            what = asked.get_nowait()
+        except queue.Empty:
+            return what
+
+
+def verdicts(asked: Any, told: Any) -> None:
+    """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
+    from experiments.live.session.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
+
+    found = GainVerdicts()
+    while (config := newest(asked)) is not None:
+        for k, now in enumerate(found.of(config)):
+            told.put((config, now, k == 0 and now[0].verdict == "certified"))
+            if not asked.empty():
+                break  # the slider has moved on
+
+
+class Uploaded(NamedTuple):
+    """Result of the preparation of a motion file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    path : Path or None
+        File of the clip; None if the preparation failed.
+    text : str
+        Result in one line.
+    """
+
+    name: str
+    path: Path | None
+    text: str
+
+
+def preparation(asked: Any, told: Any) -> None:
+    """Worker for preparing clips: answers an `Uploaded` to a pair (source, target) of files."""
+    from experiments.preparation.command import prepare_file, summary
+    from models.mocap.library import load
+    from models.mocap.readers.own_bvh import write_bvh
+
+    while (files := newest(asked)) is not None:
+        source, target = files
+        begin = time.perf_counter()
+        try:
+            loaded = load(source)
+            if loaded.report is None:  # already on the figure's own skeleton, as this page writes it
+                write_bvh(loaded.clip, target)
+                said = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
+            else:
+                line = summary(prepare_file(source, target, overwrite=True))
+                said = f"{line}, {time.perf_counter() - begin:.0f} s in all"
+            told.put(Uploaded(source.name, target, said))
+        except (ModelError, ValueError, ArithmeticError) as error:
+            told.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))

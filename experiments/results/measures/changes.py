@@ -1,0 +1,58 @@
+"""Changes of river in a run, for the summary and the figures: when the hand passed from one river to another."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.results.measures.blocks import ROWS
+from sim.recording.recording import Recording
+from sim.reference.transition import DWELL
+
+
+class RiverChange(NamedTuple):
+    """One change of river.
+
+    Attributes
+    ----------
+    t : float
+        Time of the first tick at which the hand is in the new river [s].
+    before, after : str
+        Names of the rivers.
+    """
+
+    t: float
+    before: str
+    after: str
+
+    def line(self) -> str:
+        """The change in words."""
+        return f"t = {self.t:.2f} s: {self.before} → {self.after}"
+
+
+def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
+    """All changes of river in a run, in constant memory; none if the field has no named rivers.
+
+    Not counted are the first river, a return to the same river after the hand was in none, and a stay that is shorter
+    than `sim.reference.transition.DWELL`, which a river's clip needs to be played.
+    """
+    if "river_names" not in recording.texts:
+        return ()
+    names = recording.texts["river_names"].split("\n")
+    t, river = recording.channel("ticks", "t"), recording.channel("ticks", "river")
+    changes: list[RiverChange] = []
+    last = current = -1.0
+    since = 0.0
+    for first in range(0, len(t), ROWS):
+        times, rows = t[first : first + ROWS], river[first : first + ROWS]
+        edges = np.flatnonzero(np.diff(rows, prepend=current))
+        for k, end in zip([-1, *edges], [*edges, len(rows)], strict=True):
+            # Row −1: the river at the end of the previous block continues.
+            if k >= 0:
+                current, since = float(rows[k]), float(times[k])
+            lasted = float(times[end] if end < len(rows) else times[-1]) - since
+            if current < 0.0 or current == last or lasted < DWELL:
+                continue
+            if last >= 0.0:
+                changes.append(RiverChange(since, names[int(last)], names[int(current)]))
+            last = current
+    return tuple(changes)

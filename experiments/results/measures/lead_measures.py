@@ -1,0 +1,161 @@
+"""Measures of a run in LEADING, from its recording and the walked path."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.state import Array, IntArray
+from controllers.walking.gait import Gait
+from controllers.walking.walked_path import PATH_HEADING, path_value
+from controllers.walking.walker import walker_at
+from experiments.results.measures.blocks import BLOCK_FRAMES
+from experiments.results.measures.soles import Soles
+from models.humanoid.skeleton import N_POSE
+from models.mocap.motion.quaternions import heading
+from models.world.scene import SceneConfig
+from sim.recording.recording import Recording
+
+_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] weighted equally in the search for the nearest earlier pose
+_REMEMBERED = 6000  # poses kept of the way forwards, one per centimetre of the path
+
+
+@dataclass(frozen=True)
+class LeadSummary:
+    """How a figure was led.
+
+    Attributes
+    ----------
+    length_m : float
+        Length of the walked path.
+    turn_deg_per_s : tuple of three float
+        Largest turn rates of the path while the figure went along it on no foot, on one foot and on two.
+    force_max : float
+        Largest force of the field in the horizontal plane [N].
+    slide_cm, physical_slide_cm : float
+        Foot skate: largest distance that a point of the animation's soles slid while in contact; the same for the
+        physical figure's soles, until its first fall.
+    retrace_cm, retrace_deg : float or None
+        On the way back, largest distance and yaw difference of the animation's root from its path on the way forwards;
+        None if it never went back.
+    physical_retrace_cm, physical_retrace_deg : float or None
+        The same for the physical figure, until its first fall.
+    """
+
+    length_m: float
+    turn_deg_per_s: tuple[float, float, float]
+    force_max: float
+    slide_cm: float
+    physical_slide_cm: float
+    retrace_cm: float | None
+    retrace_deg: float | None
+    physical_retrace_cm: float | None
+    physical_retrace_deg: float | None
+
+    def lines(self) -> list[str]:
+        """Measures in words, one sentence per line."""
+        none, one, two = self.turn_deg_per_s
+        back = "The figure was not led back."
+        if self.retrace_cm is not None:
+            back = f"Back it retraced its way within {self.retrace_cm:.2f} cm and {self.retrace_deg:.2f}°"
+            if self.physical_retrace_cm is not None:
+                back += (
+                    f", the physical figure within {self.physical_retrace_cm:.1f} cm and "
+                    f"{self.physical_retrace_deg:.1f}°"
+                )
+            back += "."
+        return [
+            f"The figure was led {self.length_m:.1f} m, turning by up to {two:.0f}°/s on two feet, {one:.0f}°/s on one "
+            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm, the physical figure's by up "
+            f"to {self.physical_slide_cm:.1f} cm.",
+            f"{back} The hand felt up to {self.force_max:.1f} N.",
+        ]
+
+
+def lead_summary(
+    recording: Recording, gait: Gait, walkers: Array, scene: SceneConfig, fell_at: float | None
+) -> LeadSummary:
+    """Measure a run in constant memory, given the figure's gait and the state of its walker at the end of the run."""
+    ticks, frames = recording.groups["ticks"], recording.groups["frames"]
+    every = round(recording.rates["ticks"] / recording.rates["frames"])
+    root = frames["qpos"].shape[1] - N_POSE
+    soles, pressing, shown, physical = Soles(scene), Soles(scene, 0.0), _Retrace(), _Retrace()
+    farthest, force, turns = -math.inf, 0.0, np.zeros(3)
+    for first in range(0, len(frames["t"]), BLOCK_FRAMES):
+        rows = slice(first, first + BLOCK_FRAMES)
+        t, reference, poses = frames["t"][rows], frames["reference"][rows], frames["qpos"][rows][:, root:]
+        s = ticks["phase"][first * every : (first + len(t)) * every : every]
+        if len(t) > 1:
+            turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
+        force = max(force, _largest(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
+        soles.add(reference)
+        standing = t < (math.inf if fell_at is None else fell_at)
+        shown.add(s, reference, farthest)
+        pressing.add(poses[standing])
+        physical.add(s[standing], poses[standing], farthest)
+        farthest = max(farthest, float(s.max()))
+    none, one, two = (math.degrees(rate) for rate in turns)
+    return LeadSummary(
+        farthest, (none, one, two), force, 100.0 * soles.slide, 100.0 * pressing.slide, *shown.result(),
+        *physical.result(),
+    )  # fmt: skip
+
+
+def _largest(vectors: Array) -> float:
+    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
+
+
+def support_at(gait: Gait, s: Array) -> IntArray:
+    """Number of feet in support at arc lengths s [m], shape (n,)."""
+    lap, counts = s / gait.stride, gait.support
+    return counts[(len(counts) * (lap - np.floor(lap))).astype(int) % len(counts)]
+
+
+def turn_rates(gait: Gait, walkers: Array, s: Array, speed: Array) -> Array:
+    """Largest turn rates [rad/s] of the path at arc lengths s [m] passed at speeds [m/s]: on no foot, one, two."""
+    path = walker_at.py_func(walkers, 0).path
+    rates = np.abs(speed * [path_value(path, float(place), PATH_HEADING)[1] for place in s])
+    feet = support_at(gait, s)
+    return np.array([rates[feet == count].max(initial=0.0) for count in range(3)])
+
+
+class _Retrace:
+    """Distance of a figure that is led back from the path on which it came."""
+
+    def __init__(self) -> None:
+        self._way = np.empty((0, 4))
+        self._distance, self._turn = -1.0, 0.0
+
+    def add(self, s: Array, poses: Array, farthest: float) -> None:
+        """Add a block of arc lengths [m] and poses; `farthest` is the largest arc length before the block."""
+        if len(s) == 0:
+            return
+        front = np.maximum.accumulate(np.concatenate(([farthest], s)))
+        rows = np.stack([s, poses[:, 0], poses[:, 1], heading(poses[:, 3:7])], axis=1)
+        new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
+        self._way = np.concatenate([self._way, rows[new]])[-_REMEMBERED:]
+        for place, ahead in zip(rows, front[1:], strict=True):
+            # Near the turning point the filtered figure lags behind, and its way forwards is not yet recorded there.
+            if ahead - place[0] > 0.1:
+                self._compare(place)
+
+    def _compare(self, place: Array) -> None:
+        near = self._way[np.abs(self._way[:, 0] - place[0]) < 0.3]
+        # Behind the start there is no way forwards to compare with.
+        if len(near) < 2 or place[0] < self._way[0, 0]:
+            return
+        start, step = near[:-1], np.diff(near, axis=0)
+        step[:, 3] = np.remainder(step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
+        length = np.maximum((step[:, 1:3] ** 2).sum(axis=1), 1e-12)
+        share = np.clip(((place[1:3] - start[:, 1:3]) * step[:, 1:3]).sum(axis=1) / length, 0.0, 1.0)
+        apart = np.linalg.norm(start[:, 1:3] + share[:, None] * step[:, 1:3] - place[1:3], axis=1)
+        turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
+        # A swaying pelvis passes a place more than once or turns on the spot, so position and yaw decide together.
+        k = int(np.argmin(np.hypot(apart / _FAR, turn / _TURNED)))
+        self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
+
+    def result(self) -> tuple[float | None, float | None]:
+        """Largest distance [cm] and yaw difference [degrees]; None if the figure never went back."""
+        if self._distance < 0.0:
+            return None, None
+        return 100.0 * self._distance, math.degrees(self._turn)

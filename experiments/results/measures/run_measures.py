@@ -1,0 +1,239 @@
+"""Measures of a run, computed from its recording block by block in constant memory."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from controllers.state import Array, Mask
+from experiments.results.folder import scene_of
+from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
+from experiments.results.measures.changes import river_changes
+from experiments.results.measures.faults import fault_lines
+from experiments.results.measures.figure_measure import FigureMeasure, MeanSquare
+from experiments.results.measures.oscillation import oscillation_summary
+from experiments.results.measures.soles import Soles
+from experiments.results.measures.summary import RunSummary
+from experiments.results.measures.summary_parts import (
+    AnimationSummary,
+    FigureSummary,
+    PathSummary,
+    PushSummary,
+    ReplaySummary,
+    SpeedSummary,
+    TankSummary,
+    TraceSummary,
+)
+from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.spans import spans
+from sim.recording.recording import Recording
+
+Span = tuple[float, float]
+"""Start and end of a span of time [s]."""
+
+SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
+HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
+STILL = 1e-3  # [m] of motion within which the stylus counts as standing still
+SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
+_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
+_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
+
+
+def summarise(
+    recording: Recording,
+    default_poses: Callable[[Array, Array, Array], Array],
+    speed: SpeedSummary,
+    warnings: dict[str, int],
+    handled: Sequence[Span] = (),
+) -> RunSummary:
+    """Measure a run in constant memory.
+
+    Parameters
+    ----------
+    recording : Recording
+        Recording with the channels of `sim.loop.loop.groups`, and the arrays ``curve_span`` (first and last phase),
+        ``curve_closed``, ``clip_seconds`` (duration of a lap at the clips' own pace, NaN where a lap plays no clip),
+        ``scene``, ``body_weight`` and ``com_height``.
+    default_poses : callable
+        Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
+        in order of time.
+    speed, warnings
+        Copied into the summary.
+    handled : sequence of Span
+        Times in which the hand does something other than pushing: it grabs, traces or leads.
+    """
+    path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
+    return RunSummary(
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
+        oscillation=oscillation_summary(recording), trace=_replay_summary(recording),
+    )  # fmt: skip
+
+
+def measured(
+    recording: Recording, default_poses: Callable[[Array, Array, Array], Array], span: Span,
+    handled: Sequence[Span] = (),
+) -> tuple[PathSummary, AnimationSummary | None, FigureSummary | None, TankSummary]:  # fmt: skip
+    """Measure the part of a run between two times; the other arguments are those of `summarise`.
+
+    The animation is None in a run without a figure, the figure None if it is not simulated physically.
+    """
+    path, animation, figure = (
+        PathMeasure(recording, span[0], handled),
+        AnimationMeasure(recording, span[0]),
+        FigureMeasure(recording),
+    )
+    tank = TankSummary(math.inf, 0)
+    per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
+    rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
+    begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)
+    for start in range(begin, end, BLOCK_FRAMES):
+        stop = min(start + BLOCK_FRAMES, end)
+        rows = slice(start * per_frame, stop * per_frame)
+        ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
+        frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
+        pushed = path.add(ticks)
+        if "reference" in frames:
+            default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
+            animation.add(frames, default, pushed[::per_frame])
+        if "joint_error" in frames:
+            figure.add(frames)
+        least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
+        tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
+    shown, physical = (name in recording.groups["frames"] for name in ("reference", "joint_error"))
+    return path.summary(), animation.summary() if shown else None, figure.summary() if physical else None, tank
+
+
+def trace_summary(recording: Recording) -> TraceSummary:
+    """Measure a hand that traces the curve."""
+    ticks, force = recording.groups["ticks"], 0.0
+    for first in range(0, len(ticks["t"]), BLOCK_ROWS):
+        force = max(force, float(np.linalg.norm(ticks["user"][first : first + BLOCK_ROWS], axis=1).max()))
+    return TraceSummary(_deviation_mm(recording, SETTLING), force)
+
+
+def _replay_summary(recording: Recording) -> ReplaySummary | None:
+    if "replayed" not in recording.texts:
+        return None
+    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.texts["distance_from"])
+
+
+def _deviation_mm(recording: Recording, since: float) -> float:
+    """Distance of the stylus from the curve from the time `since` [s] on, RMS [mm]."""
+    ticks, distance = recording.groups["ticks"], MeanSquare()
+    for first in range(0, len(ticks["t"]), BLOCK_ROWS):
+        rows = slice(first, first + BLOCK_ROWS)
+        distance.add(ticks["distance"][rows][ticks["t"][rows] >= since])
+    return 1e3 * distance.root
+
+
+class PathMeasure:
+    """`PathSummary` of ticks that are given in blocks, from the time `since` [s] on; `handled` as for `summarise`."""
+
+    def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
+        self._since, self._handled = since, tuple(handled)
+        start, end = recording.array("curve_span")
+        self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
+        self._alone = MeanSquare()
+        self._phase: float | None = None
+        self._clip_seconds = float(recording.array("clip_seconds"))
+        self._turned, self._first, self._time = 0.0, 0.0, 0.0
+        self._anchor, self._moved = np.full(3, np.inf), 0.0
+        self._released = -math.inf
+        self._replayed = "replayed" in recording.texts
+        self._pushes: list[PushSummary] = []
+        self._pushing = False
+
+    def add(self, ticks: Mapping[str, Array]) -> Mask:
+        """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
+        t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
+        at_work = size > HAND_AT_WORK
+        last = np.maximum.accumulate(np.where(at_work, t, self._released))
+        pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
+        self._released = float(last[-1])
+        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
+        self._add_phase(t, ticks["phase"])
+        self._add_place(t, ticks["p"])
+        handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
+        self._add_pushes(ticks, size, at_work & ~handled)
+        return pushed
+
+    def _add_place(self, t: Array, p: Array) -> None:
+        """Update the time at which the stylus last moved by more than `STILL`."""
+        k = 0
+        while k < len(t):
+            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STILL
+            if not far.any():
+                return
+            k += int(np.argmax(far))
+            self._anchor, self._moved = p[k].copy(), float(t[k])
+
+    def _add_phase(self, t: Array, phase: Array) -> None:
+        if self._phase is None:
+            self._phase, self._first = float(phase[0]), float(t[0])
+        steps = np.diff(phase, prepend=self._phase)
+        if self._closed:
+            steps -= self._span * np.round(steps / self._span)
+        self._turned += float(np.sum(steps))
+        self._phase, self._time = float(phase[-1]), float(t[-1])
+
+    def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
+        for first, last in spans(at_work):
+            block = slice(first, last)
+            away = ticks["p"][block] - ticks["nearest"][block]
+            distance = np.linalg.norm(away, axis=1)
+            k = int(np.argmax(distance))
+            cosine = float(away[k] @ ticks["user"][block][k] / max(distance[k] * size[block][k], 1e-12))
+            t = ticks["t"][block]
+            push = PushSummary(
+                float(t[0]), float(t[-1] - t[0]), float(np.max(size[block])), 1e3 * float(distance[k]), cosine
+            )
+            if first == 0 and self._pushing:
+                push = _joined(self._pushes.pop(), push)
+            self._pushes.append(push)
+        self._pushing = bool(at_work[-1])
+
+    def summary(self) -> PathSummary:
+        """What was taken so far."""
+        laps = self._turned / self._span
+        seconds, clip = self._time - self._first, self._clip_seconds
+        lap_seconds = seconds / laps if laps >= 1.0 else None
+        stopped = self._moved if self._time - self._moved >= SETTLING else None
+        moving = (seconds if stopped is None else stopped - self._first) or math.inf
+        pace = None if math.isnan(clip) else laps * clip / moving
+        alone = 1e3 * self._alone.root if self._alone.count else None
+        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes), stopped, pace)
+
+
+def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
+    """Join the two parts of a push that crosses the border of two blocks."""
+    further = max(before, after, key=lambda push: push.deviation_mm)
+    return PushSummary(
+        before.start, after.start + after.seconds - before.start, max(before.peak_force, after.peak_force),
+        further.deviation_mm, further.along_push,
+    )  # fmt: skip
+
+
+class AnimationMeasure:
+    """`AnimationSummary` of frames that are given in blocks, from the time `since` [s] on."""
+
+    def __init__(self, recording: Recording, since: float = 0.0) -> None:
+        self._since, self._soles = since, Soles(scene_of(recording))
+        self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
+        self._pushed, self._unpushed = 0.0, 0.0
+
+    def add(self, frames: Mapping[str, Array], default: Array, pushed: Mask) -> None:
+        """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
+        self._soles.add(frames["reference"][self._next :: self._stride])
+        self._next = (self._next - len(default)) % self._stride
+        turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
+        largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
+        settled = frames["t"] >= self._since + SETTLING
+        self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
+        self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
+
+    def summary(self) -> AnimationSummary:
+        """What was taken so far."""
+        lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
+        return AnimationSummary(
+            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide
+        )

@@ -1,0 +1,239 @@
+"""The figures of a run, drawn from its recording alone.
+
+They read the arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
+the texts ``tube_name``, ``hand_does`` and ``distance_from`` (by default "tube", "pushes" and "the curve"); for rivers
+``river_curves`` and ``river_names``; from the summary the time from which a bent curve is performed;
+in group ``ticks`` the channels t, p, distance, force, user and torque; in group ``frames`` the channels t, joint_error,
+root_error, residual, ground, flight and down. The recording has SI units and radians; the figures millimetres,
+centimetres and degrees.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from controllers.state import Array, Mask
+from experiments.results.measures.changes import river_changes
+from models.mocap.motion.spans import spans
+from sim.recording.recording import Recording
+from sim.viewer.courses import courses
+from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
+
+POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
+PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
+AXES = ("#2f6db3", "#c2473b", "#7a5195")
+STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e8ec",
+    "axes.axisbelow": True,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+}
+
+
+def draw_figures(recording: Recording, folder: Path) -> list[Path]:
+    """Draw all figures as PNG files into a folder, which is created if it is missing.
+
+    Returns
+    -------
+    list of Path
+        The files, in reading order.
+
+    Raises
+    ------
+    RecordingError
+        If the recording lacks a channel that is drawn.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files: list[Path] = []
+    drawings: dict[str, Callable[[Recording], Figure]] = {
+        "path": path_figure,
+        "deviation": deviation_figure,
+        "forces": forces_figure,
+        "torques": torques_figure,
+        "figure": tracking_figure,
+    }
+    if "joint_error" not in recording.groups["frames"]:
+        del drawings["figure"]  # there was no physical figure
+    for name, draw in drawings.items():
+        with mpl.rc_context(STYLE):
+            drawing = draw(recording)
+            files.append(folder / f"{name}.png")
+            drawing.savefig(files[-1], dpi=150)
+    return files
+
+
+def path_figure(recording: Recording) -> Figure:
+    """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
+    drawn, path = courses(recording.arrays | recording.texts), 1e3 * _rows(recording, "ticks", "p")
+    radius = 1e3 * float(recording.array("tube_radius"))
+    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    figure, axes = _panels(1, 2, height=3.6)
+    for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
+        for course in drawn:
+            points = 1e3 * course.points[:, (i, j)]
+            ax.plot(*points.T, color=course.line, lw=0.8, ls=(0, (4, 3)), label=course.name or "curve φ", zorder=4)
+            discs = [Circle((float(x), float(y)), radius) for x, y in points]
+            ax.add_collection(PatchCollection(discs, color=PALE_TUBE, zorder=1), autolim=False)
+            ax.update_datalim(np.concatenate([points - radius, points + radius]))
+        if radius > 0.0:
+            ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube(recording))
+        ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
+        held = np.where(pushed[:, None], path, np.nan)
+        if np.any(pushed):
+            ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label=f"where the hand {_does(recording)}", zorder=3)
+        ax.margins(0.1)
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    return figure
+
+
+def deviation_figure(recording: Recording) -> Figure:
+    """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
+    t = _rows(recording, "ticks", "t")
+    distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
+    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    figure, axes = _panels(2, 1, height=4.0)
+    for ax in axes:
+        _shade(ax, t, pushed, PALE_USER, f"hand {_does(recording)}")
+        if 0.0 < radius < 1.05 * np.max(distance):
+            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube(recording)}")
+        ax.plot(t, distance, color=CURVE)
+        ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
+        _mark_changes(ax, recording)
+    left_alone = distance if np.all(pushed) else distance[~pushed]
+    source = recording.texts.get("distance_from", "the curve")
+    axes[0].set(title=f"distance of the hand from {source}", ylim=(0, 1.08 * np.max(distance) + 1e-3))
+    axes[1].set(title="magnified", ylim=(0, 1.5 * np.percentile(left_alone, 90) + 1e-3), xlabel="time [s]")
+    if axes[0].get_legend_handles_labels()[0]:
+        legend_above(axes[0])
+    return figure
+
+
+def forces_figure(recording: Recording) -> Figure:
+    """Force of the field on the hand and force of the hand on the stylus, by component [N]."""
+    t = _rows(recording, "ticks", "t")
+    figure, axes = _panels(2, 1, height=4.2)
+    for ax, name, title in zip(
+        axes, ("force", "user"), ("force of the field, limited", "force of the hand"), strict=True
+    ):
+        force = _rows(recording, "ticks", name)
+        ax.plot(t, np.linalg.norm(force, axis=1), color="#b9bec8", lw=2.4, label="norm")
+        for axis, color in enumerate(AXES):
+            ax.plot(t, force[:, axis], color=color, lw=1.0, label="xyz"[axis])
+        ax.set(title=title, ylabel="F [N]", xlim=(t[0], t[-1]))
+    legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def torques_figure(recording: Recording) -> Figure:
+    """Torques of the three motors with their continuous and peak limits [mN m]."""
+    t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
+    continuous = 1e3 * recording.array("motor_continuous")
+    peak = 1e3 * recording.array("motor_peak")
+    figure, axes = _panels(3, 1, height=4.8)
+    for i, ax in enumerate(axes):
+        ax.plot(t, torque[:, i], color=AXES[i])
+        reach = 1.25 * max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
+        for name, limit, dashes in (("continuous", continuous[i], "--"), ("peak", peak[i], ":")):
+            # A limit far above the torques is left out, as it would squeeze the curve.
+            for line in (-limit, limit) if limit < reach else ():
+                ax.axhline(line, color=CURVE, lw=0.8, ls=dashes, label=name if line > 0.0 else None)
+        title = f"motor {i + 1}: {continuous[i]:.0f} mN m for long, {peak[i]:.0f} mN m for a moment"
+        ax.set(title=title, ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-reach, reach))
+    legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def tracking_figure(recording: Recording) -> Figure:
+    """Tracking errors of the physical figure, residual force and ground force; flights and falls shaded.
+
+    Frames in which the figure lies, or is being set back onto the animation, are left out.
+    """
+    t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
+    down = _rows(recording, "frames", "down") > 0.5
+    weight = float(recording.array("body_weight"))
+    residual = 100 * np.linalg.norm(_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
+    ground = 100 * _rows(recording, "frames", "ground")[:, 2] / weight
+    curves = (
+        ("joints: RMS angle to the animation", "[°]", np.rad2deg(_rows(recording, "frames", "joint_error"))),
+        ("root: distance to the animation", "[cm]", 1e2 * _rows(recording, "frames", "root_error")),
+        ("residual force at the root", "[% body weight]", residual),
+        ("ground force, vertical", "[% body weight]", ground),
+    )
+    figure, axes = _panels(4, 1, height=6.4)
+    for ax, (title, unit, values) in zip(axes, curves, strict=True):
+        _shade(ax, t, flight & ~down, PALE_TUBE, "flight")
+        _shade(ax, t, down, PALE_FALL, "fallen")
+        ax.plot(t, np.where(down, np.nan, values), color=CURVE)
+        ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
+        ax.set_ylim(bottom=0)
+        _mark_changes(ax, recording)
+    if np.any(flight | down):
+        legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _rows(recording: Recording, group: str, name: str) -> Array:
+    channel = recording.channel(group, name)
+    return channel[:: max(1, -(-len(channel) // POINTS))]
+
+
+def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=columns == 1)
+    return figure, list(grid.ravel())
+
+
+def legend_above(ax: Axes) -> None:
+    """Put the legend in a row above the axes, where it hides no data."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
+def _does(recording: Recording) -> str:
+    return recording.texts.get("hand_does", "pushes")
+
+
+def _tube(recording: Recording) -> str:
+    return recording.texts.get("tube_name", "tube")
+
+
+def _mark_changes(ax: Axes, recording: Recording) -> None:
+    """Draw a line at every change of river, with the new river's name, and at the start of a performance."""
+    marks = [(change.t, change.after) for change in river_changes(recording)]
+    performance = (recording.summary or {}).get("performance")
+    if isinstance(performance, dict):
+        marks.append((float(cast(dict[str, float], performance)["start"]), "performed"))
+    low, high = ax.get_xlim()
+    last, row = -np.inf, 0
+    for t, name in marks:
+        # Names of marks that are close in time are put on rows below each other.
+        row = row + 1 if t - last < 0.1 * (high - low) else 0
+        last = t
+        ax.axvline(t, color=USER, lw=0.8)
+        ax.annotate(
+            name, (t, 1.0), (2, -2 - 9 * row), xycoords=("data", "axes fraction"), textcoords="offset points", va="top",
+            fontsize=7, color=USER,
+        )  # fmt: skip
+
+
+def _shade(ax: Axes, t: Array, where: Mask, color: str, label: str) -> None:
+    for i, (start, stop) in enumerate(spans(where)):
+        ax.axvspan(float(t[start]), float(t[stop - 1]), color=color, lw=0, label=label if i == 0 else None)

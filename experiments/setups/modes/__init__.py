@@ -1,0 +1,1 @@
+"""One file a mode: the parts of a run, made from its configuration and its map."""

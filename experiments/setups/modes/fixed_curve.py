@@ -1,0 +1,105 @@
+"""Parts common to the modes whose curve is not bent: the hand, the orientation moment, the governor and the walls."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from controllers.curves.stylus import stylus_path
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.orientation import Orientation
+from controllers.safety.energy_tank import river_power
+from controllers.safety.limiter import ForceLimiter
+from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
+from experiments.config.run_config import RunConfig
+from experiments.results.measures.run_measures import trace_summary
+from experiments.results.measures.summary import RunSummary
+from experiments.setups.parts.budget import tank_for
+from experiments.setups.parts.hands import handled, resolved_user, turning_remark, user_hand
+from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
+from experiments.setups.parts.walls import figure_walls
+from sim.users.hand.actions import Push
+
+TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
+
+
+class FixedField(NamedTuple):
+    """A field over a curve that is not bent.
+
+    Attributes
+    ----------
+    law : Law
+        Law of force, with the governor if there is one.
+    course : Trajectory
+        Curve along which it leads.
+    power : float
+        Largest power that its dampers inject [W].
+    springs : sequence of (float, float)
+        Stiffness [N/m] and reach [m] of each of its springs.
+    notes : Notes
+        Titles and labels.
+    urged : float
+        Largest speed to which a governor urges the hand [m/s]; 0 without one.
+    tube : float
+        ε, radius of the tube in which the orientation moment acts [m].
+    pushes : tuple of Push, optional
+        Default pushes of a hand that pushes.
+    """
+
+    law: Law
+    course: Trajectory
+    power: float
+    springs: Sequence[tuple[float, float]]
+    notes: Notes
+    urged: float = 0.0
+    tube: float = TUBE
+    pushes: tuple[Push, ...] | None = None
+
+
+def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: ClipMapParts, field: FixedField) -> Parts:
+    """Parts of a run whose curve is not bent.
+
+    Raises
+    ------
+    ControllerError
+        If a number is out of its interval.
+    """
+    user = resolved_user(config.user, maps.curve, config.seconds, pushes=field.pushes)
+    drag = 0.0 if mode.governor is None else mode.governor.governor_drag
+    power, limiter = field.power + river_power(drag, field.urged), ForceLimiter(config.clock.servo_period)
+    traces = user.traces
+    program = with_moment(field.law.program(), mode.orientation, field.course, field.tube)
+    return Parts(
+        config=replace(config, user=user), maps=maps, field=field.law, program=with_walls(program, mode.walls, maps),
+        course=field.course, user=user_hand(user, maps.curve, config.seconds, config.seed),
+        tank=tank_for(power, field.springs, maps.reach, limiter),
+        notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
+        argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),
+        remarks=turning_remark(user, maps.expressive), summarise=_traced if traces else lambda summary, of: summary,
+    )  # fmt: skip
+
+
+def _traced(summary: RunSummary, of: Measuring) -> RunSummary:
+    return replace(summary, trace=trace_summary(of.recording))
+
+
+def with_walls(program: Program, walls: JointWalls | None, maps: ClipMapParts) -> Program:
+    """A field, plus the soft walls of the figure's joints if the run has them."""
+    if walls is None:
+        return program
+    made = figure_walls(maps.whole_map, walls.wall_stiffness, walls.wall_margin, walls.joint_speed)
+    return program + made.program()
+
+
+def with_moment(program: Program, moment: OrientationMoment | None, course: Trajectory, tube: float) -> Program:
+    """A field, plus the moment towards the curve's orientation if the run has one.
+
+    Raises
+    ------
+    ParameterError
+        If a gain of the moment is negative or not finite.
+    """
+    if moment is None or (moment.orientation_stiffness == 0.0 and moment.orientation_damping == 0.0):
+        return program
+    law = Orientation(course, moment.orientation_stiffness, moment.orientation_damping, tube)
+    return program + law.program()

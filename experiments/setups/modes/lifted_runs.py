@@ -1,0 +1,148 @@
+"""Runs on a lifted map: FOLLOW along one of its curves, or rivers along all of them."""
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.river import River
+from controllers.haptic_map.lifted import Lifted
+from controllers.state import Array
+from experiments.config.modes import Rivers
+from experiments.setups.modes.rivers import BESIDE, river_time
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.defaults import river_gains
+from experiments.setups.parts.hands import NEAR
+from experiments.setups.parts.pace import paced, reached
+from experiments.setups.parts.part_types import RiverChoice
+from sim.body.figure import FigureGains
+from sim.users.hand.actions import Push
+
+_SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
+_SECONDS = 0.6  # [s] duration of a push from one curve to another
+_LEAD = 0.36  # [s] before the transition at which the push begins: with 0.34 to 0.55 the figure stands (nine pushes)
+_CROSSING = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
+_STAY = 3  # laps on the other curve
+
+# A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
+HELD_GAINS = FigureGains(contact_reach=0.004)
+"""Gains of the physical figure on a lifted map, or on a curve that is bent."""
+
+
+def curve_number(haptic_map: Lifted, curve: str) -> int:
+    """Index of the curve of a given name or number as text; 0 for an empty string.
+
+    Raises
+    ------
+    ParameterError
+        If the map has none of that name.
+    """
+    if not curve:
+        return 0
+    if curve in haptic_map.names:
+        return haptic_map.names.index(curve)
+    if curve.isdecimal() and int(curve) < len(haptic_map.names):
+        return int(curve)
+    raise ParameterError(
+        f"no curve {curve!r} in the map; there are {', '.join(haptic_map.names)}, or 0 to {len(haptic_map.names) - 1}"
+    )
+
+
+def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
+    """The curve on which a run begins, timed at its clip's pace.
+
+    Raises
+    ------
+    ParameterError
+        If the map has none of that name.
+    SimError
+        If the Phantom does not reach it.
+    """
+    return reached(haptic_map.curve(curve_number(haptic_map, curve)))
+
+
+def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
+    """A river for every clip, named like it, timed to lead the Phantom at the clip's pace (`paced`).
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach a curve.
+    """
+    stiffness, damping = river_gains(mode)
+    given = tuple(haptic_map.curve(i) for i in range(len(haptic_map.names)))
+    rivers = tuple(lifted_river(paced(curve, damping, stiffness), mode) for curve in given)
+    return side_by_side(RiverBundle(rivers, haptic_map.names), given)
+
+
+def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
+    """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
+    return RiverChoice(bundle, given, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
+
+
+def lifted_river(course: Trajectory, mode: Rivers) -> River:
+    """The river of a clip along its course; it takes a hand at half to twice its own speed."""
+    speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
+    return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEEDS))
+
+
+def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:
+    """Default pushes on rivers: over at the curve's best transition in the second lap, and back three laps later.
+
+    Raises
+    ------
+    ParameterError
+        If the curve has no transition.
+    """
+    first, damping = curve_number(haptic_map, curve), river_gains(mode)[1]
+    own = [at for at in haptic_map.transitions if first in (at.first, at.second)]
+    if not own:
+        pairs = [f"{haptic_map.names[at.first]} – {haptic_map.names[at.second]}" for at in haptic_map.transitions]
+        raise ParameterError(
+            f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
+            f"{', '.join(pairs) or 'none'}; leave out --user push, or begin on another --curve"
+        )
+    best = own[0]
+    second = best.second if best.first == first else best.first
+    laps = [haptic_map.curve(i).duration for i in (first, second)]
+    begin = laps[0]
+    return (
+        pushed_over(haptic_map, first, second, best.angle, begin, damping),
+        pushed_over(haptic_map, second, first, best.angle, begin + _STAY * laps[1], damping),
+    )
+
+
+def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float, drag: float) -> Push:
+    """A push that takes a hand from one curve's river to another's about the transition between them.
+
+    Its direction is towards the other curve. Its force, proportional to the rivers' drag b, takes the hand there within
+    about a quarter of a second: a figure cannot break into a run faster.
+
+    Parameters
+    ----------
+    haptic_map : Lifted
+        The map.
+    first, second : int
+        Indices of the two curves.
+    angle : float
+        θ of the transition [rad].
+    start : float
+        Earliest time [s]; the push begins when the hand next comes to its place.
+    drag : float
+        b of the rivers [N s/m].
+    """
+    curve, angles = haptic_map.curve(first), haptic_map.angles[first]
+    # A closed clip may begin at any angle of the lap.
+    frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
+    at = frame / haptic_map.clips[first][1] - _LEAD
+    place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))
+    way = _point(haptic_map, second, angle) - _point(haptic_map, first, angle)
+    distance = float(np.linalg.norm(way))
+    x, y, z = (float(value) for value in way)
+    p, q, r = (float(value) for value in place)
+    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), NEAR)
+
+
+def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:
+    r, z = haptic_map.site(curve, np.array(angle))
+    return np.array([r * np.cos(angle), r * np.sin(angle), z])

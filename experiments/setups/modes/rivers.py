@@ -1,0 +1,122 @@
+"""Crossing rivers as a run: the default three about a circle, or those of a lifted map."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.river import River
+from controllers.safety.energy_tank import river_power
+from experiments.config.modes import Rivers
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
+from experiments.setups.parts.budget import fastest
+from experiments.setups.parts.defaults import river_gains
+from experiments.setups.parts.governor import governed, speeds_along
+from experiments.setups.parts.pace import paced
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
+
+# In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
+# a hand that crosses at a right angle is not: the difference is √2. Without hysteresis rivers chatter after 4 ms.
+ADMISSION, HYSTERESIS = 1.2, 0.15
+BESIDE = 0.05  # hysteresis of rivers side by side, as those of a lifted map: position tells them apart, not direction
+# In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
+# both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
+SIGMA = {"discrete": 0.15, "smooth": 0.05}
+# [s] time constant of the velocity filter: encoders make 10 mm/s of noise, more than the smooth form's σ. The discrete
+# form needs no filter, since it has a hysteresis.
+LOOK = {"discrete": 0.0, "smooth": 8e-3}
+SLOWEST = 0.03  # [m/s], three times that noise: at lower speeds of the hand the noise decides which river takes it
+GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
+WAVE = 0.6  # height of the wave as a share of the map's half width
+
+
+def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "rivers"."""
+    stiffness, damping = river_gains(mode)
+    course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
+    if mode.governor is not None and mode.crossing != "sum":
+        law = law_of(mode, gated(choice, maps), GATE)
+    else:
+        law, urged = governed(mode.governor, law_of(mode, choice), course, maps)
+    bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
+    power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
+    springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
+    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
+    pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
+    field = FixedField(law, course, power, springs, notes, urged, pushes=pushes)
+    return fixed_curve_parts(config, mode, maps, field)
+
+
+def river_time(mode: Rivers) -> float:
+    """τ = b_d / k_r of a river [s]."""
+    stiffness, damping = river_gains(mode)
+    return damping / stiffness
+
+
+def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
+    """Law of force of several rivers: their sum, or a higher-order law that gives the hand to one river."""
+    bundle, _, pace, hysteresis = choice
+    if mode.crossing == "sum":
+        return bundle
+    return HigherOrder(
+        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis * pace, mode.crossing, LOOK[mode.crossing]
+    )
+
+
+def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
+    """The same rivers, each restricted to the speeds at which the flights of its animation are ballistic enough."""
+    rivers = tuple(
+        replace(river, speeds=speeds_along(maps.haptic_map, curve, i, river.curve))
+        for i, (river, curve) in enumerate(zip(choice.bundle.rivers, choice.given, strict=True))
+    )
+    return choice._replace(bundle=replace(choice.bundle, rivers=rivers))
+
+
+def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice:
+    """The default rivers about a curve (`river_bundle`), timed to lead the Phantom at their own pace (`paced`).
+
+    Their reference speed is the curve's mean speed.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach one of them.
+    """
+    bundle = river_bundle(curve, reach, river_time(mode), river_gains(mode)[1], mode.river_tube)
+    led = tuple(replace(river, curve=paced(river.curve, river.drag, river.drag / river.tau)) for river in bundle.rivers)
+    given = tuple(river.curve for river in bundle.rivers)
+    return RiverChoice(replace(bundle, rivers=led), given, curve.length / curve.duration, HYSTERESIS)
+
+
+def drawn(bundle: RiverBundle) -> Static:
+    """Names and curves of rivers, for figures and replays."""
+    share = np.linspace(0.0, 1.0, 241)
+    curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
+    return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
+
+
+def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:
+    """The default curve; a wave about it, up and down twice a lap; and the curve lifted to the wave's crests.
+
+    The wave crosses the default curve and touches the lifted one; at these places a hand can change over.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        A lap about the z axis.
+    reach : float
+        Half width of the map's domain [m]; the crests are at `WAVE` times it.
+    tau, drag, epsilon : float
+        τ [s], b [N s/m] and ε [m] of the rivers.
+    """
+    times = np.linspace(curve.start, curve.end, 129)
+    level = curve.point(times)
+    level[-1] = level[0]
+    height = WAVE * reach * np.stack((np.zeros(129), np.sin(4.0 * np.pi * np.linspace(0.0, 1.0, 129)), np.ones(129)))
+    height[1, -1] = 0.0
+    curves = [Trajectory(times, level + np.outer(z, [0.0, 0.0, 1.0]), periodic=True) for z in height]
+    return RiverBundle(tuple(River(c, epsilon, tau, drag) for c in curves), ("level", "wave", "high"))

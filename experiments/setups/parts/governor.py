@@ -1,0 +1,110 @@
+"""Speeds along a curve at which the flights of its animation are ballistic enough, and a field that governs them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.curves.stylus import stylus_path
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.law import Law, Program
+from controllers.fields.governor import Governor
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.river_clips import RiverClips, change_clip
+from controllers.state import Array
+from experiments.config.modes import SpeedGovernor
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import Clip
+from sim.reference.reference import map_poses
+
+_FPS = 120.0  # [1/s] frame rate of the animation whose flights are judged
+_FASTEST = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
+
+
+def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:
+    """The animation h∘φ of one pass of a curve at the pace of the map's clips; on a river, at that of its own clip.
+
+    Parameters
+    ----------
+    haptic_map : ClipMap
+        h, from stylus poses to poses of the figure.
+    curve : Trajectory
+        φ, in the hand frame H.
+    river : int
+        Which river of the map the curve is, if it is a map of rivers.
+    """
+    memory, seconds = haptic_map.compiled().memory, haptic_map.lap_seconds
+    if isinstance(haptic_map, RiverClips):
+        change_clip(memory, float(river), curve.start)
+        seconds = haptic_map.loops[river].duration
+    frames = max(64, round(_FPS * seconds)) + 1
+    stylus = stylus_path(curve.point(np.linspace(curve.start, curve.end, frames)))
+    return Clip(map_poses(haptic_map, stylus, memory), (frames - 1) / seconds, "along the curve")
+
+
+def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
+    """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
+
+    The animation h∘φ along the curve is judged: the clip itself where only one clip plays, and between clips their
+    blend, in the map's own time alignment. A blend that never leaves the floor has no flight, even if its clips do.
+
+    Parameters
+    ----------
+    haptic_map, curve, river
+        As in `animation_along`.
+    course : Trajectory, optional
+        The curve along which a field leads, with the same samples at other times (`pace.course_of`); by default
+        the curve itself.
+
+    Returns
+    -------
+    Array, shape (m, 2)
+        At m phases equally spaced from the course's start to its end.
+
+    Raises
+    ------
+    ModelError
+        If the map's poses are not the figure's.
+    """
+    from experiments.flights.ballistics import (
+        clip_ballistics,  # statistics take long to import, for a run without a governor
+    )
+
+    clip, led = animation_along(haptic_map, curve, river), curve if course is None else course
+    shown = np.linspace(led.start, led.end, clip.n_frames)
+    phases = np.interp(shown, np.asarray(led.times), np.asarray(curve.times))
+    share = np.clip((phases - curve.start) / curve.duration, 0.0, 1.0)
+    # |φ̇| when a pass takes as long as the clips do.
+    recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
+    low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration)
+    # Where the least speed is infinite, no speed makes the motion ballistic: none is demanded of the hand.
+    low = np.where(np.isfinite(low), low, 0.0)
+    return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
+
+
+def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
+    """A field with the governor for the animation along its course, and the largest speed [m/s] to which it urges.
+
+    The animation is judged at the pace of the map's own curve, which is the pace of a hand that is led along the course
+    against the Phantom's friction.
+
+    Raises
+    ------
+    ModelError, ControllerError
+        If the map's poses are not the figure's, or a number is out of its interval.
+    """
+    if governor is None:
+        return law, 0.0
+    speeds = speeds_along(maps.haptic_map, maps.curve, course=course)
+    made = Governor(course, speeds, governor.governor_drag, maps.reach)
+    return Governed(law, made), float(speeds[:, 0].max())
+
+
+@dataclass(frozen=True, eq=False)
+class Governed(Law):
+    """Sum of a field along a curve and the governor for the animation along it."""
+
+    field: Law
+    governor: Governor
+
+    def _composed(self) -> Program:
+        return self.field + self.governor

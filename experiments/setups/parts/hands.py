@@ -1,0 +1,200 @@
+"""The simulated hand of a run: where the stylus begins, and which pushes, grabs and turns the user makes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
+from experiments.config.run_config import User
+from experiments.setups.parts.expression import lap_turns
+from sim.users.hand.actions import Grab, Push
+from sim.users.hand.arm import Arm
+from sim.users.intents import (
+    Bend,
+    ChangeOver,
+    CutCorner,
+    Exaggerate,
+    GetLost,
+    Own,
+    Press,
+    Relax,
+    Resist,
+    Trace,
+)
+from sim.users.intents.intent import PersonIntent
+from sim.users.participant import Participant
+from sim.users.person.person import Person
+
+PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' continuous limit
+# [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
+# all of them out (docs/validation/crossing-rivers.md).
+RIVER_PUSH = 1.0
+NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
+PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
+
+_CROSSING = 0.5  # share of the lap at which the wave rises through the level river
+_LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
+_AWAY = 1e-3  # [m] standard deviation of the start position
+_SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
+
+
+class Beginning(NamedTuple):
+    """Position, velocity and acceleration of the stylus when a run begins, in H.
+
+    Attributes
+    ----------
+    point, velocity, acceleration : Array
+        [m], [m/s], [m/s²], shape (3,).
+    """
+
+    point: Array
+    velocity: Array
+    acceleration: Array
+
+
+def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Beginning:
+    """Start state of the stylus: about a millimetre from the start of a curve.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, with the timing that the hand is to have.
+    rng : numpy.random.Generator
+        Source of the random offset.
+    moves : bool
+        Whether the run begins in motion. The offset is then along the curve, not beside it: the field pulls a hand back
+        to its curve within a fiftieth of a second, which a figure at full speed cannot follow.
+    """
+    away = rng.normal(scale=_AWAY, size=3)
+    if not moves:
+        return Beginning(curve.point(curve.start) + away, np.zeros(3), np.zeros(3))
+    speed = float(np.linalg.norm(curve.velocity(curve.start)))
+    phase = curve.start + min(float(np.linalg.norm(away)) / max(speed, _SLOW), _FURTHEST * curve.duration)
+    return Beginning(curve.point(phase), curve.velocity(phase), curve.acceleration(phase))
+
+
+def resolved_user(
+    user: User, curve: Trajectory, seconds: float, grabs: tuple[Grab, ...] = (), pushes: tuple[Push, ...] | None = None
+) -> User:
+    """The user with default pushes, turns and grabs filled in.
+
+    Parameters
+    ----------
+    user : User
+        The user as configured.
+    curve : Trajectory
+        φ, with the timing that the hand is to have.
+    seconds : float
+        Duration of the run [s].
+    grabs : tuple of Grab
+        Default grabs.
+    pushes : tuple of Push, optional
+        Default pushes of a hand that pushes; without them it pushes outwards and inwards once a lap.
+
+    Raises
+    ------
+    ParameterError
+        If the default grabs are for a hand that does not grab (see `User`).
+    """
+    grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
+    if user.does == "turn" and not turns:
+        laps = range(1, max(2, int(seconds / lap)))
+        turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
+    done = user.pushes
+    if user.does == "push" and not done and pushes is not None:
+        done = pushes
+    elif user.does == "push" and not done:
+        begin = first_pushed_lap(curve, grabs)
+        laps = range(max(1, int((seconds - begin) / lap)))
+        done = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
+    return User(does=user.does, pushes=done, turns=turns, grabs=grabs, person=user.person)
+
+
+def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
+    """The hand of a resolved user, for a run of given duration [s] and seed.
+
+    Raises
+    ------
+    SimError
+        If a push or a grab is one that a person cannot do.
+    """
+    if user.person is not None:
+        return participant(user.person, intent_of(user), curve, seconds, seed)
+    if user.does == "trace":
+        times = np.arange(0.0, seconds, 0.01)
+        return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
+    return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
+
+
+def participant(person: Person, intent: PersonIntent, curve: Trajectory, seconds: float, seed: int) -> Participant:
+    """A person with an intent about a curve, for a run of given duration [s] and seed."""
+    own = intent if isinstance(intent, Own) else None
+    return Participant(person, intent.wishes(curve, seconds, seed), seed, own)
+
+
+def intent_of(user: User) -> PersonIntent:
+    """The intent of a person, from the user's grabs, pushes or kind.
+
+    Raises
+    ------
+    SimError
+        If a push or a grab is one that a person cannot do.
+    """
+    if user.grabs:
+        return Bend(user.grabs)
+    return Press(user.pushes) if user.pushes else _INTENTS[user.does]
+
+
+_INTENTS: dict[str, PersonIntent] = {
+    "relaxed": Relax(), "push": Relax(), "trace": Trace(), "exaggerate": Exaggerate(), "cut": CutCorner(),
+    "change": ChangeOver(), "resist": Resist(), "lost": GetLost(),
+}  # fmt: skip
+
+
+def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
+    """Time at which the default hand begins to push [s]: one lap after the start, or after all grabs."""
+    return curve.duration + (edited_until(grabs) if grabs else 0.0)
+
+
+def handled(user: User) -> tuple[tuple[float, float], ...]:
+    """Intervals of time [s] in which a hand grabs or traces."""
+    if user.traces:
+        return ((0.0, np.inf),)
+    return tuple((grab.at, grab.end) for grab in user.grabs)
+
+
+def turning_remark(user: User, expressive: bool) -> tuple[str, ...]:
+    """Remark, if the hand turns the stylus on a map that ignores its orientation."""
+    if user.does == "turn" and not expressive:
+        return ("the hand turns the stylus, and this map does not look at that; --expressive does",)
+    return ()
+
+
+def edited_until(grabs: tuple[Grab, ...]) -> float:
+    """End of all grabs and the pause after them [s]."""
+    return max((grab.end for grab in grabs), default=0.0) + PAUSE
+
+
+def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
+    """A push outwards and one inwards, of peak `force` [N], in the lap that begins at `start` [s]."""
+    return (
+        Push(start + 0.1 * lap, 0.3 * lap, force),
+        Push(start + 0.6 * lap, 0.3 * lap, -force),
+    )
+
+
+def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
+    """Upward pushes from one default river into another, where the wave rises through the curve, once a lap.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        The default curve.
+    seconds : float
+        Duration of the run [s].
+    """
+    lap = curve.duration
+    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD))
+    starts = lap * np.arange(0.25, max(1.0, seconds / lap))
+    return tuple(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)

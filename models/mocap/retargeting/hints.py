@@ -1,0 +1,37 @@
+"""What the user states about a motion file, in place of what would be estimated from it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.errors import ModelError
+from models.mocap.retargeting.upright import AXES
+
+
+@dataclass(frozen=True)
+class Hints:
+    """Facts about a file that the user states in place of estimates.
+
+    Parameters
+    ----------
+    up : str or None
+        The file's axis that points up, such as ``+Y``.
+    rest_frame : int or None
+        A frame of the file in which the body stands upright with level feet, counted from 0.
+    roles : Path or None
+        A file that says which joint plays which role, in place of the joints' names; see `role_file`.
+
+    Raises
+    ------
+    ModelError
+        If there is no such axis, or the frame is negative.
+    """
+
+    up: str | None = None
+    rest_frame: int | None = None
+    roles: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.up is not None and self.up not in AXES:
+            raise ModelError(f"no axis {self.up!r}; expected one of {', '.join(AXES)}")
+        if self.rest_frame is not None and self.rest_frame < 0:
+            raise ModelError(f"rest frame is {self.rest_frame}; expected a frame of the file, counted from 0")

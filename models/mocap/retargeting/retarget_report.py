@@ -1,0 +1,156 @@
+"""How a motion file was interpreted, in words: axes, unit, joints, and what had to be guessed."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from models.arrays import Array
+from models.humanoid.skeleton import JOINTS
+from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.readers.motion_file import printable
+from models.mocap.retargeting.body_lines import SIDES, BodyLines
+from models.mocap.retargeting.calibration import Calibration
+from models.mocap.retargeting.skeleton_roles import Roles
+
+_BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
+_STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
+_NAMED = 12  # unused joints that are named: rigs with faces and fingers have hundreds
+_RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
+COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
+_UNITS = (
+    ("metres", 1.0),
+    ("centimetres", 0.01),
+    ("millimetres", 0.001),
+    ("inches", 0.0254),
+    ("inches / 0.45", 0.05644),
+)
+
+
+class RetargetReport(NamedTuple):
+    """How a motion file was interpreted.
+
+    Attributes
+    ----------
+    taken : dict from figure body to source joint
+        The joint that moves each segment.
+    unused : tuple of str
+        Source joints that move no segment.
+    missing : tuple of str
+        Segments without a joint, and which segment they follow.
+    up : str
+        The file's axis that points up, such as ``+Y``.
+    facing : str
+        The file's axis nearest to the body's first heading.
+    unit : str
+        The file's unit of length, estimated from the legs unless the format defines it.
+    scale : float
+        Metres of the figure per unit of the file.
+    dropped : int
+        Number of frames of a calibration pose in front, such as a T-pose, that are left out.
+    confidence : float
+        Lead of the score of `up` over the next axis, at least 0.25; infinite where the format or the user states it.
+    remarks : tuple of str
+        What could not be determined, and what was assumed instead.
+    """
+
+    taken: dict[str, str]
+    unused: tuple[str, ...]
+    missing: tuple[str, ...]
+    up: str
+    facing: str
+    unit: str
+    scale: float
+    dropped: int = 0
+    confidence: float = np.inf
+    remarks: tuple[str, ...] = ()
+
+    def lines(self) -> tuple[str, ...]:
+        """The report in words, a line per subject."""
+        how = "the format or you said so" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
+        named = ", ".join(self.unused[:_NAMED])
+        lines = (
+            f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",
+            f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs",
+            "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
+            "unused: " + (named or "none") + (f", … ({len(self.unused)} joints)" if len(self.unused) > _NAMED else ""),
+            *([] if self.missing else ["missing: none"]),
+        )
+        return (*(printable(line, 4000) for line in lines), *self.notes())
+
+    def notes(self) -> tuple[str, ...]:
+        """What the file lacks, and what was left out, assumed or repaired, a line each."""
+        frames = "frame" if self.dropped == 1 else f"{self.dropped} frames"
+        lines = (
+            *(["missing: " + ", ".join(self.missing)] if self.missing else []),
+            *([f"left out: the first {frames}, a pose that is not of the motion"] if self.dropped else []),
+            *self.remarks,
+        )
+        return tuple(printable(line, 4000) for line in lines)
+
+
+def beyond_range_remarks(poses: Array) -> Iterator[str]:
+    """Joints that exceed their ranges by more than people's ranges differ."""
+    excess = beyond_ranges(poses)
+    most = excess.max(axis=0)
+    told = [
+        f"{JOINTS[k].replace('_', ' ')} by {np.rad2deg(most[k]):.0f}° ({np.mean(excess[:, k] > _RANGE):.0%} of frames)"
+        for k in np.argsort(-most)
+        if most[k] > _RANGE
+    ]
+    if told:
+        yield f"beyond the figure's range: {', '.join(told)}; see whether the file has it so"
+
+
+def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
+    """Soles whose orientation only a few of n frames tell, and a spine that is never straight."""
+    few = [
+        f"the {side} one in {count or 'no'} frame{'s' * (count != 1)}"
+        for side, count in zip(SIDES, calibrated.stances, strict=True)
+        if count < min(_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
+    ]
+    if few:
+        told = "how the soles lie is a guess, since they hardly stand level"
+        yield f"{told} ({', '.join(few)}); --rest-frame would say it"
+    if calibrated.bend > _BENT:
+        yield "the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it"
+
+
+def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
+    """Limbs of which neither a joint nor a tip says where they end."""
+    ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles}
+    named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
+    without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
+    if without:
+        yield f"nothing tells where {', '.join(without)} end: how they point is a guess"
+
+
+def frame_remarks(broken: Sequence[int], jumps: Sequence[int], fps: float, timed: bool) -> Iterator[str]:
+    """Frames whose time is not stated or long, those that were lost, and jumps that are left."""
+    if not timed:
+        told = f"the file states no frame rate: {fps:g} a second are assumed"
+        yield f"{told}; if it is another, convert it to BVH and correct its Frame Time"
+    if fps < COARSE:
+        yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, correct its Frame Time"
+    if broken:
+        n = len(broken)
+        which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
+        yield f"{which} ({broken[0] / fps:.2f} s) did not belong to the motion around: interpolated"
+    if jumps:
+        times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
+        yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
+
+
+def axis_name(direction: Array) -> str:
+    """The axis nearest to a direction, such as ``+Y``."""
+    axis = int(np.argmax(np.abs(direction)))
+    return f"{'+' if direction[axis] > 0 else '−'}{'XYZ'[axis]}"
+
+
+def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
+    """The unit in which the performer's legs are about as long as the figure's."""
+    if unit is not None:
+        return f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+    name, unit = min(_UNITS, key=lambda known: abs(np.log(leg * known[1] / own_leg)))
+    likely = abs(np.log(leg * unit / own_leg)) < np.log(1.3)
+    return f"{name} (worked out), legs {leg * unit:.2f} m" if likely else f"unknown, legs {leg:.4g} units"

@@ -1,0 +1,33 @@
+"""Rotations of segments: from two directions, by a constant offset from a joint, and from one direction to another."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.arrays import Array
+from models.mocap.motion import quaternions
+from models.mocap.retargeting.body_lines import unit
+
+
+def frames(left: Array, along: Array) -> Array:
+    """Rotations that turn y into `left` and z as nearly as possible into `along`, shape (n, 4)."""
+    x = unit(np.cross(left, along))
+    matrices = np.stack((x, left, np.cross(x, left)), axis=-1)
+    # Where both are parallel, the frame is undefined; the substitute has no weight, since such a trunk is not straight.
+    matrices[np.isnan(matrices).any(axis=(1, 2))] = np.eye(3)
+    return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
+
+
+def carried(source: Array, wanted: Array, weights: Array) -> Array:
+    """G C with C the mean of G⁻¹ T (Markley et al. 2007: the mean that minimises the chordal distance)."""
+    offsets = Rotation.from_quat(quaternions.product(quaternions.conjugate(source), wanted), scalar_first=True)
+    constant = np.asarray(offsets.mean(weights).as_quat(scalar_first=True))
+    return quaternions.product(source, constant)
+
+
+def arcs(u: Array, v: Array) -> Array:
+    """The smallest rotations from unit vectors u to v, (n, 3) → (n, 4); for opposite vectors about any normal axis."""
+    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
+    length = np.linalg.norm(q, axis=1, keepdims=True)
+    aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
+    q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)

@@ -1,0 +1,111 @@
+"""Calibration of a rig's soles: a foot that stands on heel and toes has a level sole, and points along its toes."""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from models.arrays import Array
+from models.mocap.motion import quaternions
+from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
+from models.mocap.retargeting.segment_frames import carried
+
+_Z = np.array([0.0, 0.0, 1.0])
+_TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
+_PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs, and 16 frames a second, need more
+# Height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]: half of it turns
+# the joints of 19 captures by 0.5° RMS, twice by 0.02°.
+_LOW = 0.05
+_ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
+# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the captures of ../shared/mocap, 30° in one of
+# fifty others. A squat on the toes, and single poses with a foot in the air, have 37 to 114°.
+_STRANGE = np.deg2rad(35.0)
+_SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals: half or twice changes none of 17 captures
+# Standard deviation of a sole's likely inclination about that of the mean ankle: half or twice turns the joints of 19
+# captures by 0.3 or 0.2° RMS, in one of them by 3.5°.
+_ANKLE = np.deg2rad(20.0)
+# Least component of the toes' direction along the sole from which a foot's heading is taken: half or twice changes
+# none of 19 captures.
+_POINTING = 0.3
+# Least number of frames from which a sole's orientation is taken: with 2 the joints of one of 17 captures turn by 0.7°
+# RMS, with 6 those of a run, whose stances are short, by 4.6°.
+_LEAST = 3
+
+
+def flat_frames(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
+    """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
+
+    By the file's joints, since the figure's soles, and with them `contacts`, follow from these frames. The feet of a
+    body that walks on the spot stand where they move with the ground under it.
+    """
+    n = len(source)
+    if n == 1:
+        return np.array([0])
+    places = [lines.lowest_joints[:, k]]
+    if not np.isnan(lines.toes[:, k]).any():
+        places.append(lines.toes[:, k])
+    turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
+    heights = lines.lowest_joints @ up
+    low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
+    ground = _ground(lines, up, fps)
+    off = [np.linalg.norm(np.gradient(place, axis=0) - ground, axis=1) for place in places]
+    passing = np.max(off, axis=0) * fps / lines.leg
+    for factor in _PATIENCE:
+        flat = np.flatnonzero(low & (passing < factor * AT_REST) & (turning < factor * _TURNS))
+        if len(flat) >= _LEAST:
+            return flat
+    return np.zeros(0, dtype=np.intp)
+
+
+def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
+    """Motion in a frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
+
+    It is that of the lower ankle in the median, if that ankle moves with it more often than it rests.
+    """
+    n, ankles, rest = len(lines.middle), lines.lowest_joints, AT_REST * lines.leg / fps
+    lower = np.gradient(ankles, axis=0)[np.arange(n), np.argmin(ankles @ up, axis=1)]
+    carried = np.median(lower, axis=0)
+    carried = carried - (carried @ up) * up
+    travels = np.linalg.norm(lines.middle[-1] - lines.middle[0]) > n * rest
+    still, moved = (np.sum(np.linalg.norm(lower - ground, axis=1) < rest) for ground in (0.0, carried))
+    return carried if not travels and moved > still and np.linalg.norm(carried) > rest else np.zeros(3)
+
+
+def calibrated_foot(
+    source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
+) -> tuple[Array, int]:  # fmt: skip
+    """R of a foot, with a level sole in stance and the heading of its toes; and the number of stance frames used.
+
+    Without stance frames, or where these would bend an ankle throughout, the sole has the orientation of an ankle in
+    rest pose on average.
+    """
+    back = quaternions.conjugate(source)
+    resting = carried(source, shank, straight)
+    vertical = quaternions.rotated(back[flat], up)
+    alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
+    neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
+    # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
+    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
+    used = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
+    if used.sum() < min(_LEAST, len(source)):
+        normal = neutral
+        used = np.zeros(0, dtype=bool)
+    else:
+        # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
+        normal = unit(vertical[used].mean(axis=0))
+        for _ in range(_SHIFTS):
+            near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
+            normal = unit((near * likely) @ vertical)
+        if normal @ neutral < np.cos(_STRANGE):
+            normal, used = neutral, np.zeros(0, dtype=bool)
+    x = normal
+    if not np.isnan(toes).any():
+        ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
+        x = ahead - normal * (ahead @ normal)
+    if np.linalg.norm(x) < _POINTING or np.isnan(toes).any():
+        # Without toes, or with toes below the ankle, a foot has the heading of its shank.
+        ahead = quaternions.rotated(back, quaternions.rotated(resting, np.array([1.0, 0.0, 0.0])))[0]
+        x = ahead - normal * (ahead @ normal)
+    x = unit(x)
+    columns = np.column_stack((x, np.cross(normal, x), normal))
+    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
+    return turned, int(used.sum())

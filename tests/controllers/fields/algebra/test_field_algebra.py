@@ -1,0 +1,100 @@
+"""The algebra of fields: each operation against its formula, in Python and compiled."""
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.weights import Weight
+from controllers.fields.follow import Follow
+from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.river import window
+from controllers.state import HandState
+from tests.controllers.fields.field_probes import force_of, largest_jump
+
+A = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0, 0.03).program()
+B = Follow(Trajectory.circle(0.03, 2.0), 100.0, 1.0, 0.028).program()
+HAND = HandState.at([0.04, 0.01, 0.005], [0.1, -0.05, 0.02], 0.3)
+F, G = force_of(A, HAND), force_of(B, HAND)
+SPEED = np.linalg.norm(HAND.v)
+
+
+def _step(x):
+    return 6 * x**5 - 15 * x**4 + 10 * x**3
+
+
+@pytest.mark.parametrize(
+    ("weight", "s"),
+    [
+        (Weight.constant(-2.5), -2.5),
+        (Weight.ball([0.04, 0.0, 0.0], 0.02), window((0.01**2 + 0.005**2) / 0.02**2)),
+        (Weight.ball([0.0, 0.0, 0.1], 0.02), 0.0),
+        (Weight.speed(0.1, 0.2), _step((SPEED - 0.1) / 0.1)),
+        (Weight.speed(0.2, 0.3), 0.0),
+        (Weight.speed(0.0, 0.05), 1.0),
+        (Weight.switch(), 0.0),
+    ],
+)
+def test_gate_and_blend_are_their_formulas(weight, s):
+    np.testing.assert_allclose(force_of(A.gated(weight), HAND), s * F, rtol=1e-12)
+    np.testing.assert_allclose(force_of(A.gated(~weight), HAND), (1 - s) * F, rtol=1e-12)
+    np.testing.assert_allclose(force_of(A.blended(B, weight), HAND), (1 - s) * F + s * G, rtol=1e-12)
+
+
+def test_the_switch_gates():
+    pressed = HandState(HAND.t, HAND.p, HAND.q, HAND.v, HAND.w, switch=True)
+    np.testing.assert_array_equal(force_of(A.gated(Weight.switch()), pressed), F)
+    np.testing.assert_array_equal(force_of(A.blended(B, Weight.switch()), pressed), G)
+
+
+def test_a_limited_field_keeps_its_direction_and_a_weak_one_its_length():
+    size = np.linalg.norm(F)
+    np.testing.assert_allclose(force_of(A.limited(0.3 * size), HAND), 0.3 * F, rtol=1e-12)
+    np.testing.assert_array_equal(force_of(A.limited(2.0 * size), HAND), F)
+    far = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0, np.inf).program().limited(8.0)
+    assert np.linalg.norm(force_of(far, HandState.at([1e100, 0.0, 0.0]))) == pytest.approx(8.0)
+
+
+def test_nested_composition_is_evaluated_as_written():
+    inner = (A + 2.0 * B).limited(1.0)
+    field = inner.blended(B.gated(Weight.speed(0.1, 0.2)), Weight.constant(0.25)) + A
+    total = F + 2.0 * G
+    total *= min(1.0, 1.0 / np.linalg.norm(total))
+    expected = 0.75 * total + 0.25 * _step((SPEED - 0.1) / 0.1) * G + F
+    np.testing.assert_allclose(force_of(field, HAND), expected, rtol=1e-12)
+
+
+def test_composed_fields_have_no_jump():
+    rng = np.random.default_rng(0)
+    field = (A.gated(~Weight.ball([0.05, 0.0, 0.0], 0.02)) + B).limited(1.5)
+    for _ in range(6):
+        start = rng.uniform(-0.02, 0.02, 3) + np.array([0.01, -0.01, 0.0])
+        assert largest_jump(field, start, start + np.array([0.08, 0.03, 0.01]), [0.05, 0.1, 0.0]) < 1e-9
+
+
+def test_laws_in_python_keep_their_order_through_the_algebra():
+    one, two = (PythonLaw(lambda hand, k=k: [k, 0.0, 0.0]) for k in (1.0, 2.0))
+    field = (one.program() + A).blended(two.program().limited(5.0), Weight.constant(0.5))
+    assert [law(HAND)[0] for law in field.python_laws] == [1.0, 2.0]
+    assert len(field.python_feeds) == 2
+    np.testing.assert_allclose(field.wrench(HAND).force, 0.5 * F + np.array([1.5, 0.0, 0.0]), rtol=1e-12)
+    np.testing.assert_array_equal(one.wrench(HAND).force, [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Weight.ball([0, 0, 0], 0.0), "radius"),
+        (lambda: Weight.speed(0.3, 0.2), "low < high"),
+        (lambda: Weight.constant(np.nan), "finite"),
+        (lambda: A.limited(-1.0), "force must be at least 0 N"),
+        (lambda: Program(A.ops[:0], A.params, A.memory, A.kernels, A.laws), "must leave one wrench"),
+        (lambda: Program(A.ops, A.params, A.memory, (), A.laws), "got 0 kernels and 1 laws"),
+        (lambda: PythonLaw(lambda hand: 1.0).wrench(HAND), r"gave numbers of shape \(\); expected a force of three"),
+        (lambda: PythonLaw(lambda hand: [0.0, np.inf, 0.0]).wrench(HAND), "expected finite numbers"),
+    ],
+)
+def test_bad_weights_and_limits_are_refused(make, says):
+    with pytest.raises(ParameterError, match=says):
+        make()

@@ -1,0 +1,229 @@
+"""Laws of one's own: the same to the last bit in Python and compiled, with parameters that have names."""
+
+import math
+import threading
+
+import casadi
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.algebra.description import code_digest
+from controllers.fields.algebra.weights import Weight
+from controllers.fields.follow import Follow
+from controllers.fields.own.compiled_law import CompiledLaw
+from controllers.fields.own.own_law import law
+from controllers.state import HandState
+from tests.controllers.fields.field_probes import run_over
+
+RNG = np.random.default_rng(7)
+SOFTNESS = 1e-3
+
+
+def floor(hand, k=500.0, b=3.0):
+    depth = -1e-3 - hand.p[2]
+    return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
+
+
+def twisted(hand, k=0.2, d=0.01):
+    """A moment that turns the stylus upright, and a force that the switch turns on."""
+    w, x, y, z = hand.q
+    return (
+        0.1 * hand.switch, math.sin(hand.t), -k * hand.v[1],
+        -k * x * w - d * hand.w[0], -k * y - d * hand.w[1], -k * z - d * hand.w[2],
+    )  # fmt: skip
+
+
+def smooth_floor(hand, k=500.0, b=3.0):
+    depth = -1e-3 - hand.p[2]
+    deep = 0.5 * (depth + np.sqrt(depth * depth + SOFTNESS * SOFTNESS))
+    return 0.0, 0.0, deep * (k - b * hand.v[2])
+
+
+def hands(n=300):
+    for _ in range(n):
+        q = RNG.normal(size=4)
+        yield HandState(
+            float(RNG.uniform(0.0, 5.0)), RNG.normal(scale=5e-3, size=3), q / np.linalg.norm(q),
+            RNG.normal(scale=0.1, size=3), RNG.normal(size=3), bool(RNG.random() > 0.5),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("function", [floor, twisted, smooth_floor])
+def test_compiled_and_in_python_a_law_is_the_same_to_the_last_bit(function):
+    plain, compiled = law(function), law(compiled=True)(function)
+    for hand in hands():
+        np.testing.assert_array_equal(np.concatenate(compiled.wrench(hand)), np.concatenate(plain.wrench(hand)))
+
+
+def test_it_may_give_a_moment_in_python_and_compiled():
+    hand = HandState.at([0.0, 0.0, 0.0])._replace(w=np.array([1.0, 2.0, 3.0]))
+    for own in (law(twisted), law(compiled=True)(twisted)):
+        np.testing.assert_allclose(own.wrench(hand).torque, [-0.01, -0.02, -0.03])
+        np.testing.assert_allclose((own(k=0.0, d=1.0) + own).wrench(hand).torque, [-1.01, -2.02, -3.03])
+
+
+def test_parameters_have_names_and_others_make_another_law():
+    for own in (law(floor), law(compiled=True)(floor)):
+        assert repr(own) == "floor(k=500.0, b=3.0)"
+        soft = own(k=100)
+        assert (repr(soft), repr(own)) == ("floor(k=100, b=3.0)", "floor(k=500.0, b=3.0)")
+        deep = HandState.at([0.0, 0.0, -0.011])
+        assert soft.wrench(deep).force[2] == pytest.approx(1.0)
+        assert own.wrench(deep).force[2] == pytest.approx(5.0)
+
+
+def test_one_kernel_serves_a_law_whatever_its_parameters():
+    own = law(compiled=True)(floor)
+    program = (own + own(k=100.0)).limited(8.0)
+    assert len(program.kernels) == 1
+    assert len(program.laws) == 2
+    assert program.wrench(HandState.at([0.0, 0.0, -0.011])).force[2] == pytest.approx(6.0)
+
+
+def test_a_law_without_parameters_and_one_that_numba_has_compiled_already():
+    from numba import njit
+
+    @law(compiled=True)
+    @njit
+    def push(hand):
+        return 1, 0.5, hand.t
+
+    assert isinstance(push, CompiledLaw)
+    np.testing.assert_array_equal(push.wrench(HandState.at([0.0, 0.0, 0.0], t=2.0)).force, [1.0, 0.5, 2.0])
+
+
+def test_it_composes_with_built_in_laws_and_with_laws_in_python():
+    river = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0)
+    compiled, plain = law(compiled=True)(floor), law(twisted)
+    field = (river + compiled(k=300.0)).blended(2.0 * plain, Weight.constant(0.25)).limited(3.0, 0.02)
+    for hand in hands(50):
+        parts = [np.concatenate(part.wrench(hand)) for part in (river, compiled(k=300.0), plain)]
+        total = 0.75 * (parts[0] + parts[1]) + 0.5 * parts[2]
+        for part, most in ((total[:3], 3.0), (total[3:], 0.02)):
+            part *= min(1.0, most / np.linalg.norm(part))
+        np.testing.assert_allclose(np.concatenate(field.wrench(hand)), total, rtol=1e-12, atol=1e-15)
+
+
+def test_in_a_compiled_loop_it_is_asked_every_tick():
+    program = law(compiled=True)(floor).program()
+    rows = [hand.vector() for hand in hands(100)]
+    wrenches = np.empty((100, 6))
+    run_over(*program.compiled(), program.fresh_memory(), np.array(rows), wrenches)
+    expected = [floor(HandState.of(row)) for row in rows]
+    np.testing.assert_array_equal(wrenches[:, :3], expected)
+
+
+def test_what_it_divides_by_zero_reaches_the_limiter_as_no_number():
+    pole = law(compiled=True)(lambda hand: (1.0 / hand.p[0], 0.0, 0.0))
+    wrenches = np.empty((1, 6))
+    program, hand = pole.program(), HandState.at([0.0, 0.0, 0.0])
+    run_over(*program.compiled(), program.fresh_memory(), hand.vector()[None], wrenches)
+    assert np.isinf(wrenches[0, 0])
+    with pytest.raises(ParameterError, match="expected finite numbers"):
+        pole.wrench(hand)
+
+
+def test_its_description_is_plain_data_and_changes_with_the_code_and_the_numbers():
+    def told(function, **parameters):
+        return law(function)(**parameters).description()
+
+    assert told(floor)["law"] == "floor"
+    assert told(floor)["parameters"] == {"k": 500.0, "b": 3.0}
+    assert told(floor, k=300.0)["parameters"] == {"k": 300.0, "b": 3.0}
+    assert told(floor)["code"] == law(compiled=True)(floor).description()["code"]
+    assert told(floor)["code"] != told(smooth_floor)["code"]
+
+
+def test_the_hash_of_the_code_knows_constants_and_functions_that_it_reads():
+    def made(constant, slope):
+        def deep(hand, depth):
+            return slope * (depth - hand.p[2])
+
+        def own(hand, k=1.0):
+            return 0.0, 0.0, k * deep(hand, constant)
+
+        return law(own).description()["code"]
+
+    assert made(1.0, 2.0) == made(1.0, 2.0)
+    assert len({made(1.0, 2.0), made(1.5, 2.0), made(1.0, 2.5)}) == 3
+
+
+def test_the_hash_knows_what_lists_objects_and_tables_hold_and_trusts_nothing_that_it_cannot_read():
+    gains, table = [1.0], {"k": np.array([1.0, 2.0])}
+
+    def own(hand):
+        return 0.0, 0.0, gains[0] * table["k"][1] * hand.p[2]
+
+    before = code_digest(own)
+    assert code_digest(own) == before
+    gains[0] = 2.0
+    between = code_digest(own)
+    table["k"][1] = 3.0
+    assert len({before, between, code_digest(own)}) == 3
+    out = threading.Lock()
+
+    def locked(hand):
+        with out:
+            return 0.0, 0.0, hand.p[2]
+
+    assert code_digest(locked) != code_digest(locked)
+
+
+def test_a_composed_field_is_described_by_its_operations_and_laws():
+    river = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0)
+    told = (river + law(floor)).gated(Weight.switch()).limited(8.0).description()
+    assert told["parameters"] == [8.0, np.inf]
+    (gated,) = told["limit"]
+    ((summed,),) = (gated["gate"],)
+    first, second = summed["add"]
+    assert (first["law"], second["law"]) == ("Follow", "floor")
+    assert first["parameters"]["k_r"] == 200.0
+    other = Follow(Trajectory.circle(0.051, 4.0), 200.0, 4.0).description()
+    assert other["parameters"]["curve"] != first["parameters"]["curve"]
+
+
+def test_the_code_that_runs_is_evaluated_on_symbols():
+    own, mode = law(compiled=True)(smooth_floor), casadi.GlobalOptions.getNumpyMode()
+    casadi.GlobalOptions.setNumpyMode(1)
+    p, v, k = (casadi.SX.sym(name, size) for name, size in (("p", 3), ("v", 3), ("k", 1)))
+    upright, still = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    force = own.expression(HandState(0.0, casadi.vertsplit(p), upright, casadi.vertsplit(v), still), k=k)
+    casadi.GlobalOptions.setNumpyMode(mode)
+    symbolic = casadi.Function("force", [p, v, k], [casadi.vertcat(*force)])
+    for hand in hands(30):
+        np.testing.assert_allclose(
+            own(k=300.0).wrench(hand).force, np.ravel(symbolic(hand.p, hand.v, 300.0)), rtol=1e-13
+        )  # fmt: skip
+
+
+def test_a_branch_on_the_hand_is_no_expression_and_says_so():
+    symbols = casadi.vertsplit(casadi.SX.sym("p", 3))
+    with pytest.raises(ControllerError, match=r"law floor .*test_own_law.py, line .*expected no branch on the hand"):
+        law(floor).expression(HandState(0.0, symbols, (1.0, 0.0, 0.0, 0.0), symbols, symbols))
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: law(lambda: (0, 0, 0)), "first argument of law <lambda> .* must be hand, got no argument"),
+        (lambda: law(lambda p, k=1.0: (0, 0, 0)), "must be hand, got p"),
+        (lambda: law(lambda *hand: (0, 0, 0)), r"must be hand, got \*hand"),
+        (lambda: law(lambda hand, k: (0, 0, 0)), r"argument k of law .* a number as its default, as in k=1.0"),
+        (lambda: law(lambda hand, **more: (0, 0, 0)), "with a number as its default"),
+        (lambda: law(lambda hand, k="stiff": (0, 0, 0)), "k of law .* must be a finite number, got 'stiff'"),
+        (lambda: law(lambda hand, k=np.nan: (0, 0, 0)), "must be a finite number, got nan"),
+        (lambda: law(floor)(stiffness=3.0), "no parameter stiffness; there are k, b"),
+        (lambda: law(floor)(k=np.inf), r"k of law floor \(.*test_own_law.py, line \d+\) must be a finite number"),
+        (lambda: law(lambda hand: (0, 0)).wrench(HandState.at([0, 0, 0])), r"numbers of shape \(2,\)"),
+        (lambda: law(compiled=True)(lambda hand: (0, 0)), "expected a tuple of three numbers"),
+        (lambda: law(compiled=True)(lambda hand: np.zeros(3)), r"returns array\(float64, 1d, C\); expected a tuple"),
+        (lambda: law(compiled=True)(lambda hand: ("a", 0, 0)), "expected a tuple of three numbers"),
+        (lambda: law(compiled=True)(lambda hand: (hand.x, 0, 0)), r"law <lambda> \(.*line \d+\) cannot be compiled"),
+        (lambda: law(compiled=True)(lambda hand: (unknown, 0, 0)), "cannot be compiled.*unknown"),  # noqa: F821
+    ],
+)
+def test_what_is_no_law_is_refused_by_name_and_place(make, says):
+    with pytest.raises(ParameterError, match=says):
+        make()

@@ -1,0 +1,115 @@
+"""Whose legs carry the arms of others is decided by the physical figure, and what none of them bears is said."""
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.cylindrical import Cylindrical
+from experiments.fitting import leg_choice as rule
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.leg_choice import carried, sound, toured, verdict_on
+from experiments.fitting.similarity import arms
+from experiments.fitting.verdict import Verdict
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
+
+R, Z, LAP = (0.0227, 0.0727), (-0.025, 0.025), 4.4
+LEGS = figure_legs(figure_model())
+NAMES = ("run", "walk", "cheer", "angry")
+STANDS = np.inf
+
+
+@pytest.fixture(scope="module")
+def maps() -> list[Cylindrical]:
+    motions = [(clip.poses, clip.fps) for clip in map(embedded, NAMES)]
+    return [Cylindrical(motions, R, Z, LEGS, None, LAP, arms(LEGS), owner) for owner in range(4)]
+
+
+def judged(monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int]) -> list[object]:
+    """Verdicts by whose legs they are and the share of others' arms, and whose legs are sound; what was asked for."""
+    asked: list[object] = []
+
+    def verdict(made: Cylindrical, lap: float) -> Verdict:
+        asked.append((made.legs_of, made.share))
+        return verdicts.get((made.legs_of, made.share), Verdict(0.5, 1.0))
+
+    monkeypatch.setattr(rule, "verdict_on", verdict)
+    monkeypatch.setattr(rule, "sound", lambda made, lap: made.legs_of in fit)
+    return asked
+
+
+def test_legs_are_the_first_that_carry_the_others_well(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
+    asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
+    best, told = carried(maps.__getitem__, NAMES, LAP)
+    assert (best.legs_of, best.share, told) == (1, 1.0, ())
+    assert asked == [(0, 1.0), (1, 1.0)]
+
+
+def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
+    asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
+    best, told = carried(maps.__getitem__, NAMES, LAP)
+    assert (best.legs_of, best.share, told) == (3, 1.0, ())
+    assert asked == [(owner, 1.0) for owner in range(4)]
+
+
+def test_arms_that_no_legs_bear_are_blended_in_by_less(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
+    best, told = carried(maps.__getitem__, NAMES, LAP)
+    assert (best.legs_of, best.share, told) == (2, 0.25, ())
+
+
+def test_legs_that_slide_are_taken_only_where_no_others_stand(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
+    judged(monkeypatch, verdicts, {1, 2, 3})
+    assert carried(maps.__getitem__, NAMES, LAP)[0].legs_of == 1
+    judged(monkeypatch, {(0, 1.0): Verdict(0.01, STANDS)}, {1, 2, 3})
+    assert carried(maps.__getitem__, NAMES, LAP)[0].legs_of == 0
+
+
+def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
+    judged(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
+    best, told = carried(maps.__getitem__, NAMES, LAP)
+    assert (best.legs_of, best.share) == (2, 0.5)
+    assert told == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
+    judged(monkeypatch, {(1, 0.0): Verdict(0.14, STANDS)}, set())
+    assert carried(maps.__getitem__, NAMES, LAP)[1][0].startswith(
+        "the physical figure lacks 14 % of weight with the legs of walk"
+    )
+
+
+def test_the_hand_that_tries_a_map_sees_all_of_it(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
+    places: list[np.ndarray] = []
+
+    def seen(made: Cylindrical, points: np.ndarray) -> np.ndarray:
+        places.append(points)
+        return np.tile(embedded("walk").poses[0], (len(points), 1))
+
+    monkeypatch.setattr(rule, "map_poses", seen)
+    toured(maps[1], LAP)
+    x, y, z = places[0][:, :3].T
+    r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
+    assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
+    for far, high in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        assert np.hypot(r - R[far], z - Z[high]).min() < 0.01  # of 50 mm
+    pace = np.diff(angle) * 120.0 * LAP / (2.0 * np.pi)
+    assert pace.min() == pytest.approx(1.0 / 1.178, abs=0.01)
+    assert pace.max() == pytest.approx(1.0 / 0.822, abs=0.01)
+    assert np.median(pace) == pytest.approx(1.0, abs=0.05) or np.mean(pace) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_walk_carries_arms_that_throw_a_run_down(maps: list[Cylindrical]) -> None:
+    assert sound(maps[1], LAP)
+    walk, run = verdict_on(maps[1], LAP), verdict_on(maps[0], LAP)
+    assert walk.bearable
+    assert run.worse() > walk.worse()
+    assert not run.bearable

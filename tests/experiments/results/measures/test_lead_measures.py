@@ -1,0 +1,233 @@
+"""What is measured of a led run, on motions whose answer is known; and what of a configuration is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.led import Led
+from controllers.walking.gait import Gait
+from experiments.cli import main
+from experiments.config.maps import Led as LedMap
+from experiments.config.modes import Lead
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.fitting.figure_legs import figure_legs
+from experiments.preparation.prepared_clip import PreparedClip
+from experiments.results.measures.lead_measures import LeadSummary, _Retrace, support_at
+from experiments.results.measures.soles import Soles
+from experiments.setups.modes.lead import (
+    gait_remark,
+    lead_parts,
+    leading,
+    leading_hand,
+    led_clips,
+    led_map,
+    led_parts,
+    s_curve,
+    walker_argument,
+)
+from experiments.setups.parts import clips
+from experiments.setups.wiring import wire
+from models.humanoid.skeleton import figure_model, rest_pose
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip, PlanarDisplacement
+from models.world.scene import SceneConfig
+from sim.world.world import phantom_angles
+
+GAIT = Gait(1.4, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.45)
+
+
+def poses_along(places: np.ndarray, aside: float = 0.0, turned: float = 0.0) -> np.ndarray:
+    """Rest poses on a circle of 3 m, at arc lengths [m]."""
+    angles = places / 3.0
+    radius = 3.0 - aside
+    return np.array([
+        PlanarDisplacement(radius * np.sin(a), 3.0 - radius * np.cos(a), a + turned).moved(rest_pose()) for a in angles
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize(("aside", "turned"), [(0.0, 0.0), (0.02, 0.0), (-0.03, np.radians(4.0))])
+def test_how_far_a_figure_is_from_the_way_on_which_it_came(aside: float, turned: float) -> None:
+    measure = _Retrace()
+    forth, back = np.arange(0.0, 4.0, 0.01), np.arange(3.5, 0.5, -0.013)
+    measure.add(forth[:150], poses_along(forth[:150]), -np.inf)
+    measure.add(forth[150:], poses_along(forth[150:]), float(forth[149]))
+    assert measure.result() == (None, None)
+    measure.add(back, poses_along(back, aside, turned), float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance == pytest.approx(100.0 * abs(aside), abs=0.02)
+    assert turn == pytest.approx(np.degrees(turned), abs=0.05)
+
+
+def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_it() -> None:
+    measure = _Retrace()
+    forth = np.arange(0.0, 4.0, 0.01)
+    # The pelvis goes to and fro by 6 cm every 30 cm while it turns by 12°.
+    swing = 2.0 * np.pi * forth / 0.3
+    poses = np.concatenate([
+        poses_along(np.array([s + 0.06 * np.sin(a)]), 0.0, np.radians(12.0) * np.sin(0.5 * a))
+        for s, a in zip(forth, swing, strict=True)
+    ])  # fmt: skip
+    measure.add(forth, poses, -np.inf)
+    measure.add(forth[350:50:-1], poses[350:50:-1], float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance is not None
+    assert turn is not None
+    assert distance < 0.01
+    assert turn < 0.1
+    # Behind where it began there is no way to compare with.
+    measure.add(np.array([-0.1]), poses_along(np.array([-0.1])), float(forth[-1]))
+    assert measure.result() == (distance, turn)
+
+
+def test_a_figure_that_turns_on_the_spot_is_compared_with_the_heading_that_it_had() -> None:
+    # For 10 cm of its path the pelvis goes on by 1 mm only, and turns by 40°; coming back it is 2 mm behind.
+    forth = np.arange(0.0, 2.0, 0.01)
+    still = np.clip(forth - 1.0, 0.0, 0.1)
+    poses = np.concatenate([
+        poses_along(np.array([s - 0.99 * d]), 0.0, np.radians(400.0) * d) for s, d in zip(forth, still, strict=True)
+    ])  # fmt: skip
+    measure = _Retrace()
+    measure.add(forth, poses, -np.inf)
+    back = slice(180, 20, -1)
+    behind = poses[back] - 0.002 * np.eye(1, poses.shape[1])
+    measure.add(forth[back], behind, float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance is not None
+    assert turn is not None
+    assert 0.1 < distance < 0.25
+    assert turn < 0.5
+
+
+def test_how_far_soles_slide_while_they_touch() -> None:
+    measure, standing = Soles(SceneConfig()), rest_pose()
+    lowest = Soles(SceneConfig())
+    lowest.add(standing[None])
+    moved = np.tile(standing, (5, 1))
+    moved[:, 0] += [0.0, 0.01, 0.02, 0.0, 0.0]
+    moved[3, 2] += 0.1
+    measure.add(moved)
+    assert measure.slide == pytest.approx(0.02, abs=1e-9)
+    pressing = Soles(SceneConfig(), 0.0)
+    moved[:, 2] -= 1e-4
+    pressing.add(moved)
+    assert pressing.slide == pytest.approx(0.02, abs=1e-9)
+    hovering = Soles(SceneConfig(), 0.0)
+    moved[:, 2] += 2e-4
+    hovering.add(moved)
+    assert hovering.slide == 0.0
+
+
+def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
+    field = leading(Lead(), GAIT)
+    path = leading_hand(field).path
+    for place in path[::50]:
+        phantom_angles(place)
+    np.testing.assert_allclose(path[[0, -1], :2], [field.walking.start] * 2, atol=1e-9)
+    np.testing.assert_allclose(path[len(path) // 2, 2], 0.0, atol=1e-12)
+    curve = s_curve()
+    assert np.hypot(*np.ptp(path[:, :2], axis=0)) == pytest.approx(0.14, rel=0.1)
+    assert field.walking.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
+
+
+@pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
+def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
+    led, gait = led_map(embedded(name), figure_legs(figure_model()))
+    assert gait.support[0] == most
+    assert support_at(gait, np.array([0.0]))[0] == most
+    assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
+
+
+def test_who_leads_a_clip_that_flies_is_told_so() -> None:
+    legs = figure_legs(figure_model())
+    walk, run = (led_map(embedded(name), legs)[0] for name in ("walk", "run"))
+    jerked = embedded("run").poses.copy()
+    jerked[-20:, 7:11] = jerked[-21, 7:11]
+    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), legs)
+    assert gait_remark("walk", walk) == ()
+    assert "led slowly it goes without flights" in gait_remark("run", run)[0]
+    assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture)[0]
+    standing = np.zeros((8, 2), dtype=bool)
+    standing[:4, 0] = True
+    hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, standing)
+    assert "may fall where it is slow" in gait_remark("hop", hop)[0]
+
+
+def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.MonkeyPatch) -> None:
+    flying, walking = embedded("run"), embedded("walk")
+    captured = {name: Clip(clip.poses[1:], clip.fps, name) for name, clip in (("a", flying), ("b", walking))}
+    prepared = {"a": flying, "b": walking}
+
+    def loaded(paths: list[Path], raw: bool = False) -> list[PreparedClip]:
+        return [PreparedClip((captured if raw else prepared)[path.stem], (f"raw {raw}",)) for path in paths]
+
+    monkeypatch.setattr(clips, "prepared_clips", loaded)
+    (clip,), remarks = led_clips(LedMap(clips=("a.bvh",)))
+    assert clip is captured["a"]
+    assert remarks == ("raw True", "a: flies when prepared, and is led as captured, by steps")
+    assert led_clips(LedMap(clips=("b.bvh",))) == ((walking,), ("raw False",))
+    assert led_clips(LedMap(clips=("a.bvh",), raw=True)) == ((captured["a"],), ("raw True",))
+    (clip,), remarks = led_clips(LedMap(clips=("run",)))
+    np.testing.assert_array_equal(clip.poses, flying.poses)
+    assert remarks == ()
+
+
+def test_what_leaps_too_far_to_stay_on_the_ground_is_led_by_steps_though_it_closes() -> None:
+    run = embedded("run")
+    # Each flight goes 1 m further: a root so low that both feet reached the floor would lie on it.
+    flies = ~contacts(run).planted.any(axis=1)
+    far, flights = run.poses.copy(), np.count_nonzero(flies[1:] & ~flies[:-1])
+    far[:, 0] += np.cumsum(flies) * flights / flies.sum()
+    led, gait = led_map(Clip(far, run.fps, "leaps"), figure_legs(figure_model()))
+    assert not led.flies
+    assert led.grounds
+    assert gait.grounded
+    assert gait.stride < run.displacement.x + flights
+
+
+def test_the_lines_tell_it() -> None:
+    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, 0.2, 0.1, 2.0, 1.0)
+    assert summary.lines() == [
+        "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
+        "by up to 1.5 cm, the physical figure's by up to 2.5 cm.",
+        "Back it retraced its way within 0.20 cm and 0.10°, the physical figure within 2.0 cm and 1.0°. The hand felt "
+        "up to 1.1 N.",
+    ]
+    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, None, None, None, None)
+    assert never.lines()[1].startswith("The figure was not led back.")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"map": "composite"}, "leave out --map"),
+        ({"user": "push"}, "--user push"),
+        ({"walls": True}, "--walls has no meaning with --mode lead"),
+        ({"clips": ("walk", "run")}, "one clip is led, got 2"),
+        ({"clips": ("cheer",)}, "must go somewhere"),
+        ({"floor_scale": -1.0}, "--floor-scale is -1; expected 0.001 or more, and finite"),
+        ({"leash": -1.0}, "--leash is -1; expected 0 N/m or more, and finite"),
+    ],
+)
+def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
+    with pytest.raises(ParameterError, match=says):
+        wire(run_config(mode="lead", **options))
+
+
+def test_the_scale_that_is_used_is_in_the_resolved_configuration() -> None:
+    config = run_config(mode="lead")
+    assert isinstance(config.map, LedMap)
+    maps = led_parts(config, config.map, (embedded("walk"),), figure_model())
+    resolved = lead_parts(config, Lead(), maps).config
+    assert isinstance(resolved, RunConfig)
+    assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).walking.scale)
+
+
+def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:
+    code = main(["run", "--mode", "lead", "--clips", "cheer", "--out", str(tmp_path / "run")])
+    assert code == 2
+    assert "hvf: a clip that is led must go somewhere" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

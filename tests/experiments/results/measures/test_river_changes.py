@@ -1,0 +1,36 @@
+"""Changes of river in a recording: told when the trace changes, neither earlier nor twice."""
+
+from pathlib import Path
+
+import numpy as np
+
+from experiments.results.measures import changes
+from experiments.results.measures.changes import RiverChange, river_changes
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
+
+# The fifth and the last but one have the hand for too short a time.
+RIVER = np.repeat([-1.0, 0.0, -1.0, 0.0, 2.0, 1.0, -1.0, 2.0, 0.0, 1.0], [30, 50, 40, 60, 20, 70, 20, 80, 39, 90])
+
+
+def _recorded(path: Path, names: bool) -> Recording:
+    static: dict[str, str] = {"river_names": "level\nwave\nhigh"} if names else {}
+    with Recorder(path, {}, 0, {"ticks": Group(1000.0, {"t": (), "river": ()})}, static) as recorder:
+        recorder.append("ticks", {"t": np.arange(len(RIVER)) / 1000.0, "river": RIVER})
+    return Recording(path)
+
+
+def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_path: Path, monkeypatch) -> None:
+    expected = (
+        RiverChange(0.2, "level", "wave"), RiverChange(0.29, "wave", "high"), RiverChange(0.409, "high", "wave"),
+    )  # fmt: skip
+    with _recorded(tmp_path / "run.h5", True) as recording:
+        for rows in (1, 2, 7, 70, 1000):
+            monkeypatch.setattr(changes, "ROWS", rows)
+            assert river_changes(recording) == expected
+    assert expected[0].line() == "t = 0.20 s: level → wave"
+
+
+def test_a_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
+    with _recorded(tmp_path / "run.h5", False) as recording:
+        assert river_changes(recording) == ()

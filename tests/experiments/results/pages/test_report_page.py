@@ -1,0 +1,93 @@
+"""The report is one file that says what happened and asks for nothing else."""
+
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from experiments.results.pages import report
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
+from sim.viewer.palette import RIVERS
+
+REPLAY = '<html><body class="a">3 & 4 < 5</body></html>'
+
+
+class Page(HTMLParser):
+    """Texts and attributes of a page."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.texts: list[str] = []
+        self.attributes: dict[str, list[str]] = {}
+        self.tags: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        for name, value in attrs:
+            self.attributes.setdefault(name, []).append(value or "")
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "replay_html", lambda recording, model, target: REPLAY)
+    (tmp_path / "path.png").write_bytes(b"\x89PNG not really")
+
+    def write(radius=0.02, lines=("It worked.",), texts=None):
+        static = {"curve": 0.05 * np.eye(3), "tube_radius": radius, **(texts or {})}
+        with Recorder(tmp_path / f"{radius}.h5", {}, 42, {"ticks": Group(10, {"t": ()})}, static) as recorder:
+            recorder.append("ticks", {"t": np.arange(3000) / 10})
+            recorder.close({})
+        with Recording(tmp_path / f"{radius}.h5") as recording:
+            report.write_report(tmp_path / "r.html", recording, None, "A <run>", lines, [tmp_path / "path.png"])
+        return Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+
+    return write
+
+
+def test_the_replay_is_embedded_unchanged(write):
+    assert write().attributes["srcdoc"] == [REPLAY]
+
+
+def test_lines_are_shown_as_text_even_if_they_look_like_markup(write):
+    page = write(lines=("<script>alert(1)</script>", "a & b"))
+    assert "script" not in page.tags
+    assert {"<script>alert(1)</script>", "a & b"} <= set(page.texts)
+
+
+def test_nothing_is_fetched_from_elsewhere(write):
+    page = write()
+    assert all(value.startswith("data:") for name in ("src", "href") for value in page.attributes[name])
+    assert page.attributes["src"] == ["data:image/png;base64,iVBORyBub3QgcmVhbGx5"]
+
+
+def test_what_is_not_drawn_to_scale_is_said(write):
+    assert "drawn with a radius of 15 mm for its 250 mm" in " ".join(write(radius=0.25).texts)
+    assert "drawn with a radius" not in " ".join(write(radius=0.002).texts)
+    assert "first 60 of 300 seconds" in " ".join(write(radius=0.003).texts)
+
+
+def test_what_surrounds_the_curve_is_called_what_it_is(write):
+    assert "Light blue: the tube around the curve" in " ".join(" ".join(write(radius=0.004).texts).split())
+
+
+def test_each_river_is_named_in_its_colour(write):
+    rivers = {"river_names": "level\nhi & lo", "river_curves": 0.05 * np.ones((2, 3, 1)) * np.eye(3)}
+    page = write(radius=0.004, texts=rivers)
+    assert "The rivers, each in its tube: level , hi & lo ." in " ".join(" ".join(page.texts).split())
+    styles = page.attributes["style"]
+    assert [f"color:{color}" in styles for color in RIVERS[:3]] == [True, True, False]
+
+
+def test_where_there_is_no_tube_none_is_spoken_of(write):
+    assert "Light blue" not in " ".join(write(radius=0.0).texts)
+
+
+def test_seed_and_versions_are_shown(write):
+    text = " ".join(write().texts)
+    assert "seed 42" in text
+    assert f"numpy {np.__version__}" in text

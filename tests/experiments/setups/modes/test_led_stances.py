@@ -1,0 +1,57 @@
+"""Which feet of a capture stand: swings and flights last for some time, and in a flight no foot rests."""
+
+import numpy as np
+import pytest
+
+from experiments.setups.modes.lead import stances
+from models.mocap.dynamics.contacts import Contacts
+
+FPS, FRAMES = 100.0, 101
+FEET = {"left": np.arange(4), "right": np.arange(4, 8)}
+
+
+def marks(*rests: tuple[str, float, float, float]) -> Contacts:
+    """Contacts of a lap of a second: a foot that rests from a time to another at a height, and is 0.2 m high else."""
+    heights, resting = np.full((FRAMES, 10), 0.2), np.zeros((FRAMES, 10), dtype=bool)
+    t = np.arange(FRAMES) / FPS
+    for foot, start, end, height in rests:
+        during = np.ix_((t > start - 1e-9) & (t < end - 1e-9), FEET[foot])
+        heights[during], resting[during] = height, True
+    return Contacts(heights, resting.copy(), resting)
+
+
+def test_a_walk_is_left_as_it_is() -> None:
+    stands = stances(marks(("left", 0.0, 0.6, 0.0), ("right", 0.5, 1.0, 0.0)), FPS)
+    assert stands.shape == (FRAMES - 1, 2)
+    np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(60))
+    np.testing.assert_array_equal(np.flatnonzero(stands[:, 1]), np.arange(50, 100))
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.12])
+def test_a_foot_that_is_up_for_a_moment_stood_all_the_time(gap: float) -> None:
+    # On one foot alone, and beside the other.
+    walk = (("left", 0.0, 0.2, 0.0), ("left", 0.2 + gap, 0.6, 0.0), ("right", 0.1, 0.7, 0.0))
+    both = stances(marks(*walk), FPS)
+    np.testing.assert_array_equal(np.flatnonzero(both[:, 0]), np.arange(60))
+    alone = stances(marks(*walk[:2]), FPS)
+    np.testing.assert_array_equal(np.flatnonzero(alone[:, 0]), np.arange(60))
+
+
+def test_who_hops_on_a_foot_and_who_runs_fly() -> None:
+    hops = stances(marks(("left", 0.0, 0.3, 0.0), ("left", 0.5, 0.8, 0.0)), FPS)
+    assert not hops[30:50].any()
+    runs = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.4, 0.9, 0.0)), FPS)
+    assert not runs[30:40].any()
+    assert not runs[90:].any()
+    # Nobody flies from foot to foot for 30 ms.
+    walks = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.33, 1.0, 0.0)), FPS)
+    assert walks.any(axis=1).all()
+    np.testing.assert_array_equal(np.flatnonzero(walks[:, 0]), np.arange(33))
+
+
+def test_a_heel_that_sinks_into_the_floor_makes_no_flight_of_the_toes() -> None:
+    # 3 cm below the floor for most of its stance, then on it, when the other has not landed yet.
+    feet = (("left", 0.0, 0.4, -0.03), ("left", 0.4, 0.55, 0.0), ("right", 0.52, 1.0, 0.0))
+    stands = stances(marks(*feet), FPS)
+    assert stands.any(axis=1).all()
+    np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(52))

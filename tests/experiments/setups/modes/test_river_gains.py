@@ -1,0 +1,88 @@
+"""Rivers have gains of their own, with which the default hand that pushes goes over from one river into another."""
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.follow import Follow
+from controllers.fields.higher_order import HigherOrder
+from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
+from experiments.config.modes import Follow as FollowMode
+from experiments.config.modes import Rivers
+from experiments.config.words import run_config
+from experiments.setups.modes.rivers import river_time
+from experiments.setups.parts.defaults import resolved, river_gains
+from experiments.setups.parts.part_types import Parts
+from experiments.setups.setups import map_parts, parts_of
+from models.humanoid.skeleton import figure_model
+from sim.users.hand.arm import hand_force
+
+MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s] of what the hand moves, about the Phantom's
+CURVE = Trajectory.circle(0.0477, 4.0)
+SECONDS = 4.0
+MAPS = map_parts(run_config(map="composite", clips=("cheer",)), figure_model())
+
+
+def parts_with(mode: str = "rivers", user: str = "push", **words: object) -> Parts:
+    return parts_of(resolved(run_config(mode, "composite", user, seconds=SECONDS, **words)), MAPS)
+
+
+def rivers_of_a_hand(parts: Parts) -> np.ndarray:
+    """Which river has the default hand, a mass with friction, at each tick from the beginning of the level river on."""
+    assert isinstance(parts.field, HigherOrder)
+    program, arm = parts.field.program(), parts.user.compiled()
+    memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
+    p, v = CURVE.point(0.0), CURVE.velocity(0.0)
+    rivers = np.empty(round(SECONDS / PERIOD))
+    for k in range(len(rivers)):
+        hand[0] = k * PERIOD
+        hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
+        evaluate(*program.compiled(), memory, hand, wrench)
+        rivers[k] = memory[TRACE_RIVER]
+        hand_force(arm, k * PERIOD, p, v, user)
+        slowing = FRICTION * v / max(float(np.linalg.norm(v)), 1e-3)
+        v = v + PERIOD / MASS * (wrench[:3] + user - slowing)
+        p = p + PERIOD * v
+    return rivers
+
+
+def test_the_rivers_gains_are_those_of_their_own_options() -> None:
+    for words, expected in (({}, (16.0 / 150.0, 16.0)), ({"stiffness": 120.0, "damping": 12.0}, (0.1, 12.0))):
+        field = parts_with(**words).field
+        assert isinstance(field, HigherOrder)
+        for river in field.bundle.rivers:
+            assert (river.tau, river.drag) == expected
+    for words, expected in (({}, (300.0, 8.0)), ({"stiffness": 500.0, "damping": 3.0}, (500.0, 3.0))):
+        alone = parts_with("follow", **words).field
+        assert isinstance(alone, Follow)
+        assert (alone.k_r, alone.b_d) == expected
+
+
+def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
+    for words, expected in (({}, (50.0, 20.0)), ({"stiffness": 40.0, "damping": 10.0}, (40.0, 10.0))):
+        mode = resolved(run_config("rivers", "any.npz", "push", **words)).mode
+        assert isinstance(mode, Rivers)
+        assert river_gains(mode) == expected
+        assert river_time(mode) == pytest.approx(expected[1] / expected[0])
+
+
+def test_follow_keeps_a_pushed_hand_s_pace_on_a_map_from_a_file_and_else_flows_as_in_the_paper() -> None:
+    assert resolved(run_config("follow", "any.npz")).mode == FollowMode(flow="parallel")
+    assert resolved(run_config("follow", "any.npz", flow="curve")).mode == FollowMode(flow="curve")
+    assert resolved(run_config("follow")).mode == FollowMode(flow="curve")
+
+
+def test_the_default_push_takes_the_hand_from_the_level_river_into_another_which_keeps_it() -> None:
+    rivers = rivers_of_a_hand(parts_with())
+    assert np.all(rivers[:1900] == 0.0)
+    assert np.all(rivers[2600:] > 0.0)
+    assert np.sum(rivers < 0.0) < 20
+
+
+def test_a_hand_that_does_not_push_stays_and_with_the_gains_of_one_curve_the_push_takes_it_nowhere() -> None:
+    assert np.all(rivers_of_a_hand(parts_with(user="relaxed")) == 0.0)
+    alone = FollowMode()
+    stiff = parts_with(stiffness=alone.stiffness, damping=alone.damping)
+    assert not np.all(rivers_of_a_hand(stiff)[2600:] > 0.0)

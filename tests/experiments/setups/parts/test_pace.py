@@ -1,0 +1,89 @@
+"""Curves that make up for what the device costs: how much it is, and what speed they ask for."""
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from experiments.config.words import run_config
+from experiments.setups.parts import pace
+from experiments.setups.parts.pace import friction_along, inertia_along, paced
+from experiments.setups.wiring import wire
+from experiments.trials.trial.trial_log import TrialLog
+from models.phantom.dynamics import mass_matrix
+from models.world.scene import PHANTOM
+from sim.errors import SimError
+from sim.loop.loop import Loop
+from sim.world.world import World, phantom_angles
+
+CURVE = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01))
+
+
+def test_friction_takes_the_power_that_mujoco_s_joints_lose():
+    model = World().model
+    dofs = [int(model.joint(PHANTOM + name).dofadr[0]) for name in ("theta1", "theta2", "theta3")]
+    phases, step = np.linspace(0.1, 2.0, 7), 1e-5
+    for phase, force in zip(phases, friction_along(CURVE, phases), strict=True):
+        ahead, behind = (np.array(phantom_angles(CURVE.point(phase + d))) for d in (step, -step))
+        rates = (ahead - behind) / (2.0 * step)
+        loss = np.abs(rates) @ model.dof_frictionloss[dofs] + rates**2 @ model.dof_damping[dofs]
+        assert force == pytest.approx(loss / np.linalg.norm(CURVE.velocity(phase)), rel=1e-6)
+        assert 0.03 < force < 0.15
+
+
+def test_inertia_along_a_curve_is_what_changes_the_kinetic_energy():
+    phases, step = np.linspace(0.1, 2.0, 7), 1e-4
+    waved = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01), wave=0.01)
+
+    def energy(phase):
+        behind, theta, ahead = (np.array(phantom_angles(waved.point(phase + d))) for d in (-step, 0.0, step))
+        rates = (ahead - behind) / (2.0 * step)
+        return 0.5 * rates @ np.array(mass_matrix.py_func(tuple(theta))) @ rates
+
+    for phase, force in zip(phases, inertia_along(waved, phases)[0], strict=True):
+        power = (energy(phase + 1e-3) - energy(phase - 1e-3)) / 2e-3
+        assert force == pytest.approx(power / np.linalg.norm(waved.velocity(phase)), rel=2e-3, abs=2e-5)
+    assert np.ptp(inertia_along(CURVE, phases)[0]) > 0.02
+
+
+def _turn_rate(lap: float) -> float:
+    """Of a hand that FOLLOW leads round a circle of 32 mm, over the lap's own, from the third second on."""
+    session = wire(run_config(radius=0.032, reach=0.01, lap=lap, seconds=5.0, figure="none"))
+    log = TrialLog(session.servo, session.world)
+    Loop(session.servo, session.world, log).run(5.0)
+    (x, y, _), t = log.ticks["p"][3000:].T, log.ticks["t"][3000:]
+    angle = np.unwrap(np.arctan2(y, x))
+    return float((angle[-1] - angle[0]) / (t[-1] - t[0])) * lap / (2.0 * np.pi)
+
+
+def test_a_hand_that_goes_round_outside_a_bend_keeps_the_curves_angle(monkeypatch):
+    assert _turn_rate(0.6) == pytest.approx(1.0, abs=0.004)
+    monkeypatch.setattr(pace, "_LONGER", 0.0)
+    assert _turn_rate(0.6) < 0.985
+
+
+def test_the_speed_that_is_asked_for_is_that_of_the_curve_and_what_the_device_costs():
+    found = paced(CURVE, 8.0, 300.0)
+    assert found.periodic
+    np.testing.assert_array_equal(found.positions, CURVE.positions)
+    own = np.asarray(CURVE.times)
+    middles = 0.5 * (own[1:] + own[:-1])
+    asked = np.linalg.norm(np.diff(CURVE.point(own), axis=0), axis=1) / np.diff(np.asarray(found.times))
+    speed = np.linalg.norm(CURVE.velocity(middles), axis=1)
+    along, bending = inertia_along(CURVE, middles)
+    cost = friction_along(CURVE, middles) + along
+    np.testing.assert_allclose(asked, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
+    # The more a field drags and the stiffer it is, the less the device matters; without a spring no bend is kept.
+    assert found.duration < paced(CURVE, 80.0, 300.0).duration < paced(CURVE, 80.0, 3000.0).duration < CURVE.duration
+    assert paced(CURVE, 80.0, 0.0).duration > paced(CURVE, 80.0, 3000.0).duration
+
+
+def test_an_open_curve_stays_open_and_begins_when_it_did():
+    way = Trajectory([1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]])
+    found = paced(way, 8.0, 300.0)
+    assert not found.periodic
+    assert found.start == 1.0
+
+
+def test_a_curve_out_of_reach_is_told():
+    with pytest.raises(SimError, match="does not reach"):
+        paced(Trajectory.circle(0.9, 2.0), 8.0, 300.0)

@@ -1,0 +1,83 @@
+"""Clips of a run: anybody's motion file is prepared once, kept by its content, and taken as captured only if asked."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.config.words import run_config
+from experiments.setups.parts.clips import load_clips
+from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation import prepare
+from models.mocap.readers.own_bvh import write_bvh
+from tests.models.mocap.retargeting.rigs import random_rig, write_rig
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    path = tmp_path / "captured.bvh"
+    write_rig(random_rig(np.random.default_rng(4)), embedded("cheer"), path)
+    return path
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
+    """Files that were prepared, by a stand-in that takes no time."""
+    found: list[Path] = []
+
+    class Made:
+        def __init__(self, path: Path):
+            found.append(path)
+            loaded = load(path).clip
+            self.near = path.stem != "cartwheel"
+            self.clip = Clip(loaded.poses[::2], loaded.fps / 2.0, loaded.name)
+
+    Made.__module__ = prepare.__name__
+    monkeypatch.setattr(prepare, "prepared", Made)
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "cache"))
+    return found
+
+
+def test_a_foreign_file_is_prepared_once_and_kept_to_the_last_bit(foreign: Path, calls: list[Path]) -> None:
+    (first,), remarks = load_clips([str(foreign)])
+    (again,), _ = load_clips([str(foreign)])
+    assert calls == [foreign]
+    np.testing.assert_array_equal(first.poses, again.poses)
+    assert first.fps == again.fps == load(foreign).clip.fps / 2.0
+    assert any("--raw" in remark for remark in remarks)
+
+
+def test_a_run_says_of_which_capture_no_feasible_motion_is_near(foreign: Path, calls: list[Path]) -> None:
+    far = foreign.rename(foreign.with_stem("cartwheel"))
+    for _ in range(2):
+        _, remarks = load_clips([str(far)])
+        assert "no feasible motion is near it" in remarks[-1]
+    assert len(calls) == 1
+
+
+def test_another_content_under_the_same_name_is_prepared_anew(foreign: Path, calls: list[Path]) -> None:
+    load_clips([str(foreign)])
+    write_rig(random_rig(np.random.default_rng(4)), embedded("angry"), foreign)
+    load_clips([str(foreign)])
+    assert len(calls) == 2
+
+
+def test_raw_takes_the_capture_as_it_is(foreign: Path, calls: list[Path]) -> None:
+    (clip,), _ = load_clips([str(foreign)], raw=True)
+    np.testing.assert_array_equal(clip.poses, load(foreign).clip.poses)
+    assert not calls
+
+
+def test_the_figures_own_files_and_embedded_clips_are_taken_as_they_are(tmp_path: Path, calls: list[Path]) -> None:
+    write_bvh(embedded("walk"), tmp_path / "own.bvh")
+    clips, remarks = load_clips(["walk", str(tmp_path / "own.bvh")])
+    np.testing.assert_allclose(clips[0].poses, clips[1].poses, atol=1e-5)
+    assert not calls
+    assert not remarks
+
+
+def test_a_run_says_in_its_configuration_whether_captures_are_raw() -> None:
+    assert not run_config(clips=("walk",)).map.raw
+    assert run_config(clips=("walk",), raw=True).map.raw
+    assert run_config(mode="lead", raw=True).map.raw
