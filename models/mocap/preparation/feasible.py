@@ -34,9 +34,10 @@ _STRONG = 0.75  # share of the torque limits of the legs beyond which torque is 
 _KNOT, _STEP = 0.05, 0.0125  # spacing of knots and of instants [s]; 80 and 20 ms halve the time, but a run falls
 _TOLERANCE, _LAST = 0.01, 3  # iteration ends when the last 3 steps together lower the cost by less than 1 %
 # Excess [rad] over a joint's range from which its cost is linear, an exact penalty (Nocedal & Wright 2006, ch. 17).
-# Where it is squared, a captured ankle 100° beyond its range outweighs all else, and the motion found for spinkick
-# lacks 3.5 % of weight instead of 2.3; with 0.1, snu/backflip falls.
-_EXACT = 0.03
+# Where it is squared throughout, a captured ankle 100° beyond its range outweighs all else, and the motion found for
+# spinkick lacks 3.5 % of weight instead of 2.3. With 0.1, snu/backflip falls; with 0.03, a wrist of a later capture
+# passes its range by 67° for a moment.
+_EXACT = 0.05
 _GOOD = 0.25  # ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1)
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
