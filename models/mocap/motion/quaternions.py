@@ -61,12 +61,12 @@ def logarithm_derivative(v: Array) -> Array:
     The inverse of the right Jacobian of SO(3) (Solà, Deray and Atchuthan 2018, arXiv:1812.01537, eq. 144),
 
     .. math:: J_r^{-1}(v) = I + \tfrac12 [v]_\times
-        + \left(\frac1{\theta^2} - \frac{1 + \cos\theta}{2\theta\sin\theta}\right) [v]_\times^2 , \theta = |v| < \pi .
+        + \frac{1 - \frac\theta2 \cot\frac\theta2}{\theta^2} [v]_\times^2 , \quad \theta = |v| < 2\pi .
 
     Parameters
     ----------
     v : Array
-        Rotation vectors, shape (..., 3) [rad].
+        Rotation vectors, shape (..., 3) [rad]; not only the shortest.
     """
     across = cross_matrix(v)
     half = np.maximum(np.linalg.norm(v, axis=-1)[..., None, None], 2e-3) / 2.0  # below it the share is that of 0, 1/12
