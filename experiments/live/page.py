@@ -36,7 +36,7 @@ from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
-from sim.viewer.views import DEFAULT_SIZE, VIEWS, is_phone, look, look_from
+from sim.viewer.views import VIEWS, View, is_phone, look_from, open_with
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] least time between two pictures
@@ -67,13 +67,12 @@ class Page:
         with contextlib.redirect_stdout(io.StringIO()):  # the command prints the address of the gate instead
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
-        look(self.server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
         self.stage: LiveStage | None = None
         self._ball: HandBall | None = None
         self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
         self._lay_out(config, shadows)
-        self.server.on_client_connect(_looks)
+        open_with(self.server, _first_view)
         self.server.on_client_disconnect(self._left)
         self._cap, said = cap_there()
         if said:
@@ -276,6 +275,6 @@ class Page:
         self._plots.write(desk.history)
 
 
-def _looks(client: viser.ClientHandle) -> None:
-    """Set the initial view of a new browser: workspace and stage; on a phone the workspace, above the panel."""
-    look_from(client, VIEWS["workspace" if is_phone(client) else "both"])
+def _first_view(client: viser.ClientHandle) -> View:
+    """Workspace and stage; on a phone the workspace, above the panel."""
+    return VIEWS["workspace" if is_phone(client) else "both"]

@@ -13,7 +13,7 @@ from controllers.state import Array
 from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
-from sim.viewer.views import DEFAULT_SIZE, VIEWS, look, look_from
+from sim.viewer.views import VIEWS, look_from, open_with
 
 _FPS = 30.0
 
@@ -50,15 +50,13 @@ class LivePage:
         self._stage = LiveStage(self._server.scene, model, drawn, radius, p_WH, name, ghost)
         self._stage.draw_slice(np.zeros((0, 3)), np.zeros((0, 3)))
         light(self._server.scene)
-        look(self._server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
+        open_with(self._server, lambda client: VIEWS["both"])
         self._shown = 0.0
 
         @views.on_click
         def _(event: Any) -> None:
             if event.client is not None:
                 look_from(event.client, VIEWS[views.value])
-
-        self._server.on_client_connect(lambda client: look_from(client, VIEWS["both"]))
 
     def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
         """Show a moment with notes below its time, at most 30 times a second; calls in between are ignored."""

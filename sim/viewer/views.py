@@ -1,5 +1,6 @@
 """Camera views of a live page, placed such that a view fills the part of the window that the panel leaves free."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +83,27 @@ def look_from(client: viser.ClientHandle, view: View) -> None:
     """
     width = min(float(client.camera.image_width), DEFAULT_SIZE[0])
     look(client.camera, view, (width, width / client.camera.aspect))
+
+
+def open_with(server: viser.ViserServer, view_of: Callable[[viser.ClientHandle], View]) -> None:
+    """Show a view of its own to each new browser, and again where its view is reset.
+
+    A browser may apply the server's initial camera after the one it is sent when it connects (viser 1.1 does the one
+    in an effect of its page, the other as a message comes), so the view is sent again to one that reports the initial
+    camera.
+    """
+    look(server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
+    initial = server.initial_camera.position
+
+    def connected(client: viser.ClientHandle) -> None:
+        look_from(client, view_of(client))
+
+        @client.camera.on_update
+        def _(camera: viser.CameraHandle) -> None:
+            if np.allclose(camera.position, initial, atol=1e-4):
+                look_from(client, view_of(client))
+
+    server.on_client_connect(connected)
 
 
 def is_phone(client: viser.ClientHandle) -> bool:

@@ -1,9 +1,13 @@
 """A view of the live page is in the middle of what the panel leaves free, and all of it is there."""
 
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from sim.viewer.views import FIELD_OF_VIEW, PANEL, PHONE, SHEET, VIEWS, View, camera_of, screen_axes
+from sim.viewer.views import FIELD_OF_VIEW, PANEL, PHONE, SHEET, VIEWS, View, camera_of, open_with, screen_axes
 
 
 def seen(view: View, width: float, height: float) -> np.ndarray:
@@ -32,3 +36,22 @@ def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int
     assert inside.all()
     spread = np.ptp(pixels, axis=0) / free
     assert spread.max() == pytest.approx(1.0)  # no smaller than it has to be
+
+
+def test_a_browser_that_applies_the_initial_camera_late_is_shown_its_view_again() -> None:
+    calls: dict[str, Callable[..., None]] = {}
+    server: Any = SimpleNamespace(
+        initial_camera=SimpleNamespace(), on_client_connect=lambda call: calls.update(connect=call)
+    )
+    camera = SimpleNamespace(image_width=900, aspect=900 / 520, on_update=lambda call: calls.update(update=call))
+    open_with(server, lambda client: VIEWS["both"])
+    calls["connect"](SimpleNamespace(camera=camera))
+    fitted = camera_of(VIEWS["both"], 900, 520)
+    np.testing.assert_allclose(camera.position, fitted.position)
+    camera.position = server.initial_camera.position.astype(np.float32)
+    calls["update"](camera)
+    np.testing.assert_allclose(camera.position, fitted.position)
+    np.testing.assert_allclose(camera.look_at, fitted.look_at)
+    camera.position = turned = fitted.position + np.array([0.1, 0.0, 0.0])
+    calls["update"](camera)
+    np.testing.assert_array_equal(camera.position, turned)
