@@ -22,6 +22,8 @@ class Command:
     """A frame in which the body stands upright with level feet, where the motion does not tell."""
     roles: Path | None = None
     """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
+    frame_rate: float | None = None
+    """Frames per second, where the file does not state them (AMC) or states them wrongly."""
     overwrite: bool = False
     """Replace the target if it exists."""
     json: Json = False
@@ -33,7 +35,8 @@ class Command:
         from models.mocap.readers.own_bvh import write_bvh
         from models.mocap.retargeting.hints import Hints
 
-        hints, writers = Hints(self.up, self.rest_frame, self.roles), {".bvh": write_bvh, ".glb": write_gltf}
+        hints = Hints(self.up, self.rest_frame, self.roles, self.frame_rate)
+        writers = {".bvh": write_bvh, ".glb": write_gltf}
         report = convert(self.source, self.target, self.overwrite, hints, writers).report
         own = "the figure's own skeleton: nothing to retarget"
         say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))

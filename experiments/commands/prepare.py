@@ -28,6 +28,8 @@ class Command:
     """A frame in which the body stands upright with level feet, where the motion does not tell."""
     roles: Path | None = None
     """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
+    frame_rate: float | None = None
+    """Frames per second, where the file does not state them (AMC) or states them wrongly."""
     report: Path | None = None
     """Folder for a page that shows what was done."""
     overwrite: bool = False
@@ -40,7 +42,7 @@ class Command:
         from models.mocap.retargeting.hints import Hints
 
         with working("preparing"):
-            hints = Hints(self.up, self.rest_frame, self.roles)
+            hints = Hints(self.up, self.rest_frame, self.roles, self.frame_rate)
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
         told = {
             "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,

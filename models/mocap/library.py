@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -79,17 +80,18 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     path : Path
         BVH, AMC or DeepMimic.
     hints : Hints or None
-        Facts about a foreign file that the user states in place of estimates.
+        Facts about the file that the user states in place of estimates; of an own one, the frame rate alone counts.
 
     Raises
     ------
     MotionFileError
         If the file cannot be read, or its skeleton is not a human's.
     """
-    motion = read_motion(path)
+    hints, motion = hints or Hints(), read_motion(path)
+    if hints.frame_rate is not None:
+        motion = replace(motion, fps=hints.frame_rate, timed=True)
     if (clip := own_clip(motion)) is not None:
         return Loaded(clip, None)
-    hints = hints or Hints()
     roles = roles_of(motion.joints, motion.parents) if hints.roles is None else stated_roles(hints.roles, motion)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")

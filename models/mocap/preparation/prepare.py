@@ -120,7 +120,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_LONGEST:.0f} s")
     if captured.fps < COARSE and captured.duration > _LONGEST:
         what = f"lasts {captured.duration:.0f} s, since a frame lasts {1.0 / captured.fps:.2g} s"
-        raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}")
+        raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
     timed = paced(resampled(captured, FPS))
     even = resampled(timed.clip, FPS)
     for within in (False, True):

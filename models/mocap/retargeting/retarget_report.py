@@ -129,9 +129,9 @@ def frame_remarks(broken: Sequence[int], jumps: Sequence[int], fps: float, timed
     """Frames whose time is not stated or long, those that were lost, and jumps that are left."""
     if not timed:
         told = f"the file states no frame rate: {fps:g} a second are assumed"
-        yield f"{told}; if it is another, convert it to BVH and correct its Frame Time"
+        yield f"{told}; if it is another, state it with --frame-rate"
     if fps < COARSE:
-        yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, correct its Frame Time"
+        yield f"a frame lasts {1.0 / fps:.2g} s, longer than a camera's: if that is not so, state its --frame-rate"
     if broken:
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"

@@ -13,6 +13,7 @@ from models.mocap.library import embedded, embedded_names, load, read_motion
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.prepare import prepared
+from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repaired
 from models.mocap.retargeting.hints import Hints
@@ -202,7 +203,7 @@ def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
     assert not any("a frame lasts" in line for line in load(tmp_path / "r.bvh").report.remarks)
     for seconds, told in (("0.5", "0.5"), ("33.3333", "33")):
         (tmp_path / "r.bvh").write_text(re.sub(r"Frame Time: \S+", f"Frame Time: {seconds}", text))
-        told = f"a frame lasts {told} s, longer than a camera's: if that is not so, correct its Frame Time"
+        told = f"a frame lasts {told} s, longer than a camera's: if that is not so, state its --frame-rate"
         assert told in load(tmp_path / "r.bvh").report.remarks
     with pytest.raises(ModelError, match=r"since a frame lasts 33 s; expected a Frame Time in seconds, such as"):
         prepared(tmp_path / "r.bvh")
@@ -216,3 +217,25 @@ def test_a_frame_rate_that_the_file_does_not_state_is_said(tmp_path):
     assert retarget(motion, roles)[1].remarks == ()
     (said,) = retarget(replace(motion, timed=False), roles)[1].remarks
     assert said.startswith("the file states no frame rate: 30 a second are assumed; ")
+
+
+def test_a_stated_frame_rate_counts_in_place_of_the_files(tmp_path):
+    """Of anybody's file and of an own one, which is otherwise taken as it is."""
+    for name, write in (
+        ("r.bvh", lambda clip, path: write_rig(Rig(), clip, path)),
+        ("own.bvh", lambda *to: write_bvh(*to)),
+    ):
+        write(at_rate("walk", 30.0), tmp_path / name)
+        right = load(tmp_path / name).clip
+        text = (tmp_path / name).read_text()
+        (tmp_path / name).write_text(re.sub(r"Frame Time: \S+", "Frame Time: 33.3333", text))
+        stated = load(tmp_path / name, Hints(frame_rate=30.0))
+        assert stated.clip.fps == 30.0
+        np.testing.assert_array_equal(stated.clip.poses, right.poses)
+        assert stated.report is None or stated.report.remarks == ()
+
+
+@pytest.mark.parametrize("rate", [0.0, -60.0, float("nan"), float("inf"), 1e6])
+def test_a_frame_rate_that_is_none_is_refused(rate):
+    with pytest.raises(ModelError, match=r"frame rate is .* a second; expected 0\.1 to 10000, such as 60"):
+        Hints(frame_rate=rate)
