@@ -38,8 +38,8 @@ from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
 from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
 from experiments.setups.modes.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
-from experiments.setups.modes.rivers import SLOWEST, default_choice, river_bundle
-from experiments.setups.parts.hands import river_pushes
+from experiments.setups.modes.rivers import default_choice, river_bundle
+from experiments.setups.parts.hands import SLOWEST, river_pushes
 from experiments.setups.parts.pace import course_of, reached
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
@@ -173,8 +173,10 @@ def _river_clips_parts(
         return changing, not_followed(changing, names, config.figure, figure)
 
     pace, lap = place.curve.length / place.curve.duration, place.curve.duration
-    slow = (f"a lap of {lap:.0f} s leads the hand at {1e3 * pace:.0f} mm/s, at which noise of the encoders decides "
-            f"which river has it; below {1e3 * SLOWEST:.0f} mm/s choose a shorter --lap",)  # fmt: skip
+    slow = (
+        f"a lap of {lap:.0f} s leads the hand at {1e3 * pace:.0f} mm/s: so slow, a push that takes it out of one river "
+        f"takes it out of all; choose a --lap of {place.curve.length / SLOWEST:.1f} s at most, or a larger --radius",
+    )
     return replace(parts.said(slow if pace < SLOWEST else ()), plays_rivers=True, refined=refined)
 
 

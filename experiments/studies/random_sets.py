@@ -134,6 +134,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "remarks": session.remarks, "off_pace": () if kind == "lifted" else off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
+        "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else 1.0,
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
         **animation_measures(frames["reference"][::_EVERY], rate / _EVERY), "cpu": time.process_time() - began,
     }  # fmt: skip
@@ -162,8 +163,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
 
     lines = [
         "| map | sets, of which told off their pace before | stand (95 % interval) | residual of those %: median, "
-        "largest; within 12 | lowest sole cm; above -1 | skate cm: median, most; within 2 | joints beyond °; within |",
-        "|---|---|---|---|---|---|---|",
+        "largest; within 12 | lowest sole cm; above -1 | skate cm: median, most; within 2 | joints beyond °; within "
+        "| time in which a river has the hand %: least |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
@@ -177,7 +179,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
             f"| {np.median(residual):.1f}, {residual.max():.1f}; {np.sum(residual <= 12.0)} "
             f"| {lowest.min():.1f}; {np.sum(lowest > -1.0)} "
             f"| {np.median(skate):.1f}, {skate.max():.1f}; {np.sum(skate <= 2.0)} "
-            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} |"
+            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} | {min(row['held'] for row in of):.0%} |"
         )
     return lines
 

@@ -1,6 +1,7 @@
 """Crossing rivers as a run: the default three about a circle, or those of a lifted map."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -27,9 +28,10 @@ BESIDE = 0.05  # hysteresis of rivers side by side, as those of a lifted map: po
 # both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
 # [s] time constant of the velocity filter: encoders make 10 mm/s of noise, more than the smooth form's σ. The discrete
-# form needs no filter, since it has a hysteresis.
-LOOK = {"discrete": 0.0, "smooth": 8e-3}
-SLOWEST = 0.03  # [m/s], three times that noise: at lower speeds of the hand the noise decides which river takes it
+# form, which has a hysteresis, needs it where that is more than a sixth of the rivers' speed: unfiltered, laps of 8 s
+# chatter between rivers and laps of 14 s throw a relaxed hand out (docs/validation/crossing-rivers.md).
+LOOK = 8e-3
+UNFILTERED = 0.06  # [m/s]
 GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
 WAVE = 0.6  # height of the wave as a share of the map's half width
 
@@ -63,8 +65,14 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
     if mode.crossing == "sum":
         return bundle
     return HigherOrder(
-        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis * pace, mode.crossing, LOOK[mode.crossing]
-    )
+        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis * pace, mode.crossing,
+        look_of(mode.crossing, pace),
+    )  # fmt: skip
+
+
+def look_of(crossing: Literal["discrete", "smooth"], pace: float) -> float:
+    """Time constant [s] of the low-pass of the velocity that selects a river of a speed [m/s]; 0 for none."""
+    return LOOK if crossing == "smooth" or pace < UNFILTERED else 0.0
 
 
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:

@@ -31,10 +31,12 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
 NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
+SLOWEST = 0.03  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
+_PACE = 0.0749  # [m/s] of the default rivers, at which these and `RIVER_PUSH` were measured
 _AWAY = 1e-3  # [m] standard deviation of the start position
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
 
@@ -185,7 +187,11 @@ def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Pus
 
 
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
-    """Upward pushes from one default river into another, where the wave rises through the curve, once a lap.
+    r"""Upward pushes from one default river into another, where the wave rises through the curve, once a lap.
+
+    At a share s of the default rivers' speed a push lasts 1/s times as long. Against a river's damping it then needs s
+    times the force, and against its stiffness the same force, since distances are the same: it gets √s times the force,
+    between the two. There is none in rivers slower than `SLOWEST`.
 
     Parameters
     ----------
@@ -195,6 +201,11 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
         Duration of the run [s].
     """
     lap = curve.duration
-    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD))
+    pace = curve.length / lap
+    if pace < SLOWEST:
+        return ()
+    share = min(1.0, pace / _PACE)
+    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD / share))
+    over, force, up = _OVER / share, np.sqrt(share) * RIVER_PUSH, (0.0, 0.0, 1.0)
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
-    return tuple(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)
+    return tuple(Push(float(start), over, float(force), up, (x, y, z), NEAR) for start in starts)

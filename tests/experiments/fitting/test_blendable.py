@@ -67,16 +67,6 @@ def test_one_lap_is_advised_to_a_run() -> None:
     assert sum("--lap" in remark for remark in session.remarks) == 1
 
 
-def test_rivers_that_noise_tells_apart_are_named_before_the_run() -> None:
-    def said(lap: float) -> list[str]:
-        config = run_config(map="rivers", mode="rivers", clips=("walk", "cheer"), lap=lap, seconds=1.0)
-        return [remark for remark in map_parts(config, figure_model()).remarks if "noise" in remark]
-
-    (slow,) = said(21.0)
-    assert slow.startswith("a lap of 21 s leads the hand at 14 mm/s")
-    assert not said(8.0)
-
-
 def test_a_lifted_map_names_what_lies_next_to_no_motion(tmp_path: Path) -> None:
     clips = [embedded(name) for name in ("walk", "backflip")]
     angles = [2.0 * np.pi * np.linspace(0.0, 1.0, clip.n_frames) for clip in clips]
