@@ -38,8 +38,8 @@ class Residual:
     def brief(self) -> str:
         """RMS and peak of force and moment in percent, in words."""
         return (
-            f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.0f} % of weight, moment "
-            f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} % of weight × height of the centre of mass"
+            f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.1f} % of weight, moment "
+            f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.1f} % of weight × height of the centre of mass"
         )
 
     def missed(self) -> tuple[str, ...]:
@@ -55,7 +55,7 @@ class Residual:
     def verdict(self) -> str:
         """Which of the bounds are met, in words."""
         missed = self.missed()
-        bounds = f"bounds of Hicks et al. 2015 ({100 * FORCE:g} %, {100 * MOMENT:g} %)"
+        bounds = f"bounds of Hicks et al. 2015 (force {100 * FORCE:g} %, moment {100 * MOMENT:g} %)"
         return f"{bounds}: all met" if not missed else f"{bounds} missed by {', '.join(missed)}"
 
 
