@@ -225,7 +225,7 @@ class FigureSummary:
         when = ", ".join(f"{at:.1f}" for at in self.falls[:_TOLD]) + (", …" if len(self.falls) > _TOLD else "")
         times = "" if len(self.falls) == 1 else f" ({len(self.falls)} falls)"
         return (
-            f"The physical figure fell at {when} s{times}; what is said of it is of the {self.up_seconds:.1f} of "
+            f"The physical figure fell at {when} s{times}; its measures are over the {self.up_seconds:.1f} of "
             f"{self.seconds:.1f} s in which it was up."
         )
 
