@@ -80,7 +80,11 @@ def _rotations(channels: Array, joint: int) -> Rotation:
 
 
 def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array:
-    """λ of an end at equal steps of the lap: the share of its movement that it has done, minus the share of the lap.
+    r"""λ of an end at equal steps of the lap, from its velocity v over the ground.
+
+    .. math:: \frac{d\lambda}{ds} = \frac{|v|^2}{\langle|v|^2\rangle} - 1, \qquad \langle\lambda\rangle = 0
+
+    It falls with slope −1 while the end stands, and makes up for that while it swings.
 
     Parameters
     ----------

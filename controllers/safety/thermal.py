@@ -5,8 +5,8 @@ r"""Thermal model of the motors: i²t of each, and the torque ceiling that follo
 
 Copper loss is proportional to the square of the current, and the winding cools: h is the mean square of the torque over
 the winding's time constant, and h = c² the steady state at the continuous torque c. p is the stall torque. With the
-ceiling L no demand takes h above c². (Maxon's data sheets give c, p and the time constant; the `ForceLimiter` has the
-same law for the force at the tip.)
+ceiling L no demand takes h above c², as long as T/τ_th ≤ c²/p² for the period T (0.0001 against 0.05 for a Phantom at
+1 kHz). Maxon's data sheets give c, p and the time constant; the `ForceLimiter` has the same law for the force.
 """
 
 import numpy as np

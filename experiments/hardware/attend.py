@@ -17,7 +17,7 @@ from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import link_now
 from experiments.hardware.run_options import RunHardware
-from sim.hardware.controls import HardwareRun, Look, Recorded
+from sim.hardware.controls import HardwareRun, RecorderStatus, RunStatus
 
 _POLL = 0.05  # [s] between two polls, each of which is also the heartbeat of the controls
 _DISARMED = "Disarmed: the motors are off."
@@ -29,13 +29,13 @@ class _Key(enum.Enum):
     END = 2
 
 
-def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> Look:
+def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> RunStatus:
     """Arm, poll and print changes of state for `seconds` [s] from the first arming on; returns the last poll.
 
     With `options.arm` no operator is asked: the device is armed at once, and a fault ends the run.
     """
     terminal = sys.stdin.isatty() and not options.arm
-    until, state, look, recording = None, None, run.poll(), True
+    until, state, status, recording = None, None, run.poll(), True
     if terminal:
         _forget_keys()
         console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
@@ -45,41 +45,41 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
     with contextlib.suppress(KeyboardInterrupt), console.status("") as line:
         while until is None or time.monotonic() < until:
             time.sleep(_POLL)
-            look = run.poll()
-            line.update(link_now(look.row))
-            if not look.alive:
+            status = run.poll()
+            line.update(link_now(status.row))
+            if not status.alive:
                 console.print("The servo has stopped; the device's watchdog lets go.")
-                return look
-            if look.recorded is not None and not look.recorded.alive and recording:
+                return status
+            if status.recorded is not None and not status.recorded.alive and recording:
                 recording = False
-                console.print(_recording_ended(look.recorded), highlight=False)
-            if look.state is not state:
-                state = look.state
-                console.print(_told(look, options.dead_man, terminal), highlight=False)
+                console.print(_recording_ended(status.recorded), highlight=False)
+            if status.state is not state:
+                state = status.state
+                console.print(_told(status, options.dead_man, terminal), highlight=False)
                 if terminal and state is State.FAULT:
                     _forget_keys()
-            if look.fault is not Fault.NONE and not terminal:
-                return look
+            if status.fault is not Fault.NONE and not terminal:
+                return status
             key = _key() if terminal else _Key.NONE
             if key is _Key.END:
                 break
-            if key is _Key.ENTER and _obeyed(run, look):
+            if key is _Key.ENTER and _obeyed(run, status):
                 until = until or time.monotonic() + seconds
     run.request(DISARM)
-    return look
+    return status
 
 
-def _recording_ended(recorded: Recorded) -> str:
+def _recording_ended(recorded: RecorderStatus) -> str:
     why = f" ({os.strerror(recorded.error)})" if recorded.error else ""
     return f"The recording has ended{why} after {recorded.rows} ticks; what it has is kept, and the run goes on."
 
 
-def _obeyed(run: HardwareRun, look: Look) -> bool:
+def _obeyed(run: HardwareRun, status: RunStatus) -> bool:
     """Do what Enter means in the current state; returns whether it arms the device."""
-    if look.state not in (State.DISARMED, State.FAULT):
+    if status.state not in (State.DISARMED, State.FAULT):
         run.request(DISARM)
         return False
-    if look.state is State.FAULT:
+    if status.state is State.FAULT:
         run.request(CLEAR)
         time.sleep(2.0 * _POLL)
     run.request(ARM)
@@ -100,7 +100,7 @@ def _forget_keys() -> None:
     termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
 
 
-def _told(look: Look, dead_man: bool, terminal: bool) -> str:
+def _told(status: RunStatus, dead_man: bool, terminal: bool) -> str:
     again = " Enter arms it." if terminal else ""
     said = {
         State.DISARMED: _DISARMED + again,
@@ -109,7 +109,7 @@ def _told(look: Look, dead_man: bool, terminal: bool) -> str:
         + " the force that is asked for has to be small first.",
         State.RAMPING: "The force comes in.",
         State.ACTIVE: "Active." + (" Enter lets go." if terminal else ""),
-        State.FAULT: f"The device let go at {float(look.row['t']):.3f} s: {look.fault.words(look.value)}."
+        State.FAULT: f"The device let go at {float(status.row['t']):.3f} s: {status.fault.words(status.value)}."
         + (" Enter clears it, and arms again." if terminal else ""),
     }
-    return f"{float(look.row['t']):8.2f} s  {said[look.state]}"
+    return f"{float(status.row['t']):8.2f} s  {said[status.state]}"

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import Link
-from sim.hardware.controls import Look
+from sim.hardware.controls import RunStatus
 from sim.hardware.servo_process import Ended, Ready
 from sim.recording.recording import Recording, RecordingError
 
@@ -101,7 +101,7 @@ class Outcome:
         ]
 
 
-def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -> Outcome:
+def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStatus) -> Outcome:
     """The outcome of a run that has ended."""
     found = _recorded(recording)
     compute, lateness = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -24,17 +24,17 @@ from sim.recording.recording import Recording
 
 
 class Channels(Mapping[str, Array]):
-    """Channels of a recording at one rate, by name: ``run.ticks["force"]``, shape (n, ...)."""
+    """Channels of a run at one rate, by name: ``run.ticks["force"]``, shape (n, ...)."""
 
-    def __init__(self, path: Path, group: str):
-        self._path, self._group = path, group
+    def __init__(self, run: "Run", group: str):
+        self._run, self._group = run, group  # the run, since a temporary folder is deleted with it
 
     def __getitem__(self, name: str) -> Array:
-        with Recording(self._path) as recording:
+        with Recording(self._run.folder / RECORDING) as recording:
             return recording.channel(self._group, name)[:]
 
     def __iter__(self) -> Iterator[str]:
-        with Recording(self._path) as recording:
+        with Recording(self._run.folder / RECORDING) as recording:
             return iter(sorted(recording.groups[self._group]))
 
     def __len__(self) -> int:
@@ -51,7 +51,8 @@ class Run:
     Attributes
     ----------
     folder : Path
-        Folder of the recording; unless ``record`` was given, a temporary one that is deleted with the `Run` object.
+        Folder of the recording; unless ``record`` was given, a temporary one that is deleted with the last reference to
+        the run or its channels.
     summary : RunSummary
         Measures as numbers; `str` of a run gives them in words.
     """
@@ -72,8 +73,13 @@ class Run:
             folder = Path(record)
             check_folder(folder, overwrite)
             clear_folder(folder)
-        summary = record_session(session, folder, config, seconds, started, console)
-        session.haptic_map.check()
+        try:
+            summary = record_session(session, folder, config, seconds, started, console)
+            session.haptic_map.check()
+        except BaseException:
+            if record is None:
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
         run = Run(folder, summary, session)
         if record is None:
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
@@ -86,12 +92,12 @@ class Run:
     @property
     def ticks(self) -> Channels:
         """Channels at the rate of the servo."""
-        return Channels(self.folder / RECORDING, "ticks")
+        return Channels(self, "ticks")
 
     @property
     def frames(self) -> Channels:
         """Channels at the rate of the figure's control."""
-        return Channels(self.folder / RECORDING, "frames")
+        return Channels(self, "frames")
 
     def to_bvh(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write the animation as the hand made it.

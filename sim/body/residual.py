@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.state import Array
+from models.mocap.preparation.bounds import beyond
 
 FORCE, MOMENT = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h
 SUPPORTS = 1.0  # [N] vertical ground reaction force from which the ground supports the figure
@@ -37,9 +38,11 @@ class Residual:
 
     def brief(self) -> str:
         """RMS and peak of force and moment in percent, in words."""
+        force, force_max = _percent(self.force_rms, FORCE), _percent(self.force_max, FORCE)
+        moment, moment_max = _percent(self.moment_rms, MOMENT), _percent(self.moment_max, MOMENT)
         return (
-            f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.0f} % of weight, moment "
-            f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} % of weight × height of the centre of mass"
+            f"force {force} % and {force_max} % of weight, moment {moment} % and {moment_max} % of weight × height of "
+            "the centre of mass"
         )
 
     def missed(self) -> tuple[str, ...]:
@@ -55,8 +58,13 @@ class Residual:
     def verdict(self) -> str:
         """Which of the bounds are met, in words."""
         missed = self.missed()
-        bounds = f"bounds of Hicks et al. 2015 ({100 * FORCE:g} %, {100 * MOMENT:g} %)"
+        bounds = f"bounds of Hicks et al. 2015 (force {100 * FORCE:g} %, moment {100 * MOMENT:g} %)"
         return f"{bounds}: all met" if not missed else f"{bounds} missed by {', '.join(missed)}"
+
+
+def _percent(share: float, bound: float) -> str:
+    """A share in percent, with the decimals that tell it from a bound that it exceeds."""
+    return beyond(100.0 * share, 100.0 * bound) if share > bound else f"{100.0 * share:.1f}"
 
 
 class ResidualMeasure:

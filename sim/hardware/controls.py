@@ -50,7 +50,7 @@ SILENT = 0.2
 _START, _END = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
 
 
-class Recorded(NamedTuple):
+class RecorderStatus(NamedTuple):
     """Status of the recorder.
 
     Attributes
@@ -75,7 +75,7 @@ class Recorded(NamedTuple):
     apart: float
 
 
-class Look(NamedTuple):
+class RunStatus(NamedTuple):
     """Status of a hardware run.
 
     Attributes
@@ -90,7 +90,7 @@ class Look(NamedTuple):
         Value of the fault.
     row : dict
         The last tick, by `sim.hardware.gated_servo.CHANNELS`.
-    recorded : Recorded, optional
+    recorded : RecorderStatus, optional
         Status of the recorder; None if nothing is recorded.
     """
 
@@ -99,7 +99,7 @@ class Look(NamedTuple):
     fault: Fault
     value: float
     row: dict[str, Array]
-    recorded: Recorded | None
+    recorded: RecorderStatus | None
 
 
 class HardwareRun:
@@ -192,7 +192,7 @@ class HardwareRun:
         self._order[ORDER_REQUEST] = event
         self._orders.write(self._order)
 
-    def poll(self) -> Look:
+    def poll(self) -> RunStatus:
         """Send a heartbeat to the servo, and return the status of the run."""
         self._order[ORDER_BEAT] += 1.0
         self._orders.write(self._order)
@@ -203,9 +203,9 @@ class HardwareRun:
             self._heard = tick, now
         alive = self.servo.is_alive() and now - self._heard[1] < SILENT
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
-        return Look(alive, state, fault, float(row["fault_value"]), row, self._recorded())
+        return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._recorded())
 
-    def _recorded(self) -> Recorded | None:
+    def _recorded(self) -> RecorderStatus | None:
         if self.recorder is None:
             return None
         status = np.zeros(RECORDER_SIZE)
@@ -213,7 +213,7 @@ class HardwareRun:
         error = int(status[RECORDER_ERROR])
         force = status[RECORDER_FORCE : RECORDER_FORCE + 3]
         alive = self.recorder.is_alive() and error == 0
-        return Recorded(
+        return RecorderStatus(
             alive,
             int(status[RECORDER_ROWS]),
             int(status[RECORDER_DROPPED]),

@@ -150,6 +150,9 @@ def test_bounds_of_hicks_are_kept_or_missed_by_force_and_moment_rms_and_peak() -
     assert made.force_rms == pytest.approx(np.sqrt((0.049**2 + 0.06**2) / 2))
     assert made.missed() == ("RMS force", "peak force", "RMS moment", "peak moment")
     assert Residual(1.0, 0.01, 0.06, 0.001, 0.002).missed() == ("peak force",)
+    brief = Residual(1.0, 0.01, 0.0504, 0.001, 0.0101).brief()  # a peak that misses its bound is printed beyond it
+    assert "1.0 % and 5.04 % of weight" in brief
+    assert "0.1 % and 1.01 % of weight ×" in brief
 
 
 class Bare:

@@ -56,6 +56,27 @@ def test_what_is_printed_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
         assert "0x" not in repr(value), repr(value)
 
 
+def test_channels_of_a_run_that_is_not_kept_can_be_read(sim: hvf.Simulation) -> None:
+    assert sim.run(0.1).ticks["p"].shape == (100, 3)
+
+
+def test_a_run_that_fails_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Failing(hvf.HapticMap):
+        def pose(self, x: np.ndarray) -> np.ndarray:
+            if x[1] > 1e-3:
+                raise ValueError("beyond what this map was made for")
+            return hvf.rest_pose()
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    moves = hvf.Simulation(
+        field=hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8), haptic_map=Failing(),
+        figure=hvf.Figure(kind="kinematic"),
+    )  # fmt: skip
+    with pytest.raises(Exception, match="beyond what this map"):
+        moves.run(0.5)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_notebook_shows_the_replay(run: hvf.Run) -> None:
     page = run._repr_html_()
     assert page.startswith("<iframe srcdoc=")

@@ -101,7 +101,7 @@ class AnimationSummary:
     def soles(self) -> str:
         """Height and skate of the soles, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        return f"Its lowest sole is at {lowest:+.1f} cm, and its feet skate {self.foot_skate_cm:.1f} cm at most."
+        return f"The animation's lowest sole is at {lowest:+.1f} cm; feet skate {self.foot_skate_cm:.1f} cm at most."
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class FigureSummary:
         when = ", ".join(f"{at:.1f}" for at in self.falls[:_TOLD]) + (", …" if len(self.falls) > _TOLD else "")
         times = "" if len(self.falls) == 1 else f" ({len(self.falls)} falls)"
         return (
-            f"The physical figure fell at {when} s{times}; what is said of it is of the {self.up_seconds:.1f} of "
+            f"The physical figure fell at {when} s{times}; its measures are over the {self.up_seconds:.1f} of "
             f"{self.seconds:.1f} s in which it was up."
         )
 

@@ -40,8 +40,8 @@ def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float,
     """
     stores = (sum(_store(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
     power, capacity, initial = (max(number, _LEAST) for number in (power, *stores))
-    # The fourth argument is the time in which a full tank may be emptied [s]: two servo periods at least.
-    return EnergyTank(limiter.period, power, capacity, max(0.05, 2.0 * limiter.period), initial)
+    drain_time = max(EnergyTank.drain_time, 2.0 * limiter.period)  # two periods are the least that a tank accepts
+    return EnergyTank(limiter.period, power, capacity, drain_time, initial)
 
 
 def _store(spring: tuple[float, float], most: float, force: float) -> float:
@@ -50,5 +50,5 @@ def _store(spring: tuple[float, float], most: float, force: float) -> float:
 
 
 def fastest(curve: Trajectory) -> float:
-    """Greatest |φ̇| [m/s]."""
+    """Greatest |φ̇| at `_SAMPLES` phases [m/s]."""
     return float(np.linalg.norm(curve.velocity(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())

@@ -46,7 +46,6 @@ class Fidelity(NamedTuple):
         RMS distance of the roots [m], both over the floor as the best planar displacement lays them upon each other.
     extremes : tuple of Extreme
         The five joints that differ most, the largest first.
-
     gait : bool
         Whether the clip is a gait, of which less change is accepted.
     """

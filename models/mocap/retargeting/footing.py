@@ -104,7 +104,8 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
     # Not `contacts.standing_parts`: there is no floor yet over which a sole could be low.
     stands = (np.ptp(soles[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
-    stances = int(np.sum(np.diff(np.concatenate(([0], np.where(stands, lower[1] + 1, 0)))) > 0))
+    begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also where the other foot takes over
+    stances = int(begins.sum())
     slopes = _slopes(middle[lower][stands], stances) if stances >= _STEPS else np.zeros(2)
     angle = float(np.arctan(np.linalg.norm(slopes)))
     if not _SLOPE[0] < angle < _SLOPE[1]:

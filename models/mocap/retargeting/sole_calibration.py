@@ -9,7 +9,7 @@ from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
 from models.mocap.retargeting.segment_frames import carried
 
-_Z = np.array([0.0, 0.0, 1.0])
+_X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
 _PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs, and 16 frames a second, need more
 # Height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]: half of it turns
@@ -57,7 +57,7 @@ def flat_frames(lines: BodyLines, k: int, source: Array, up: Array, fps: float) 
 
 
 def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
-    """Motion in a frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
+    """Displacement per frame of the ground under a body that walks on the spot, as on a treadmill; else 0, shape (3,).
 
     It is that of the lower ankle in the median, if that ankle moves with it more often than it rests.
     """
@@ -73,39 +73,56 @@ def _ground(lines: BodyLines, up: Array, fps: float) -> Array:
 def calibrated_foot(
     source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
 ) -> tuple[Array, int]:  # fmt: skip
-    """R of a foot, with a level sole in stance and the heading of its toes; and the number of stance frames used.
+    """Rotations of the figure's foot, whose sole is level in stance and which points along its toes.
 
-    Without stance frames, or where these would bend an ankle throughout, the sole has the orientation of an ankle in
-    rest pose on average.
+    Parameters
+    ----------
+    source, shank : arrays of shape (frames, 4)
+        Rotations of the file's foot and of the figure's shank.
+    toes : array of shape (frames, 3)
+        From the ankle to the toes, of any length; NaN if the file has no toes.
+    up : array of shape (3,)
+        Unit vector upwards.
+    flat : array of int
+        Stance frames, as of `flat_frames`.
+    straight : array of shape (frames,)
+        Weights of the frames, by how nearly thighs and trunk are in line: ankles are likely near their rest pose there.
+
+    Returns
+    -------
+    rotations : array of shape (frames, 4)
+    used : int
+        Number of stance frames from which the sole's normal is taken; 0 if it is that of an ankle in rest pose.
     """
     back = quaternions.conjugate(source)
     resting = carried(source, shank, straight)
-    vertical = quaternions.rotated(back[flat], up)
-    alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
-    neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
-    # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
-    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
-    used = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
-    if used.sum() < min(_LEAST, len(source)):
-        normal = neutral
-        used = np.zeros(0, dtype=bool)
-    else:
-        # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
-        normal = unit(vertical[used].mean(axis=0))
-        for _ in range(_SHIFTS):
-            near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
-            normal = unit((near * likely) @ vertical)
-        if normal @ neutral < np.cos(_STRANGE):
-            normal, used = neutral, np.zeros(0, dtype=bool)
-    x = normal
-    if not np.isnan(toes).any():
-        ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
-        x = ahead - normal * (ahead @ normal)
-    if np.linalg.norm(x) < _POINTING or np.isnan(toes).any():
-        # Without toes, or with toes below the ankle, a foot has the heading of its shank.
-        ahead = quaternions.rotated(back, quaternions.rotated(resting, np.array([1.0, 0.0, 0.0])))[0]
-        x = ahead - normal * (ahead @ normal)
+    neutral, forward = (quaternions.rotated(back, quaternions.rotated(resting, axis))[0] for axis in (_Z, _X))
+    normal, used = _normal(quaternions.rotated(back[flat], up), neutral, min(_LEAST, len(source)))
+    ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
+    x = ahead - normal * (ahead @ normal)
+    if not np.linalg.norm(x) >= _POINTING:  # no toes, or toes below the ankle: the heading of the shank
+        x = forward - normal * (forward @ normal)
     x = unit(x)
     columns = np.column_stack((x, np.cross(normal, x), normal))
-    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
-    return turned, int(used.sum())
+    constant = np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True))
+    return quaternions.product(source, constant), used
+
+
+def _normal(vertical: Array, neutral: Array, least: int) -> tuple[Array, int]:
+    """Normal of a sole in the axes of the file's foot, and the number of frames from which it is taken.
+
+    `vertical` (m, 3) is the vertical in the stance frames, `neutral` the normal of an ankle in rest pose on average:
+    the result where fewer than `least` frames agree, or where theirs would bend the ankle throughout.
+    """
+    alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
+    # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
+    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
+    used = alike[np.argmax(alike @ likely)] if len(vertical) else np.zeros(0, dtype=bool)
+    if used.sum() < least:
+        return neutral, 0
+    # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
+    normal = unit(vertical[used].mean(axis=0))
+    for _ in range(_SHIFTS):
+        near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
+        normal = unit((near * likely) @ vertical)
+    return (neutral, 0) if normal @ neutral < np.cos(_STRANGE) else (normal, int(used.sum()))

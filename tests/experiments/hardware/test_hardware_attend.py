@@ -13,7 +13,7 @@ from rich.console import Console
 from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
 from experiments.hardware.attend import attend
-from sim.hardware.controls import Look, Recorded
+from sim.hardware.controls import RecorderStatus, RunStatus
 from sim.hardware.gated_servo import ROW_SIZE, columns
 
 ROW = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
@@ -21,7 +21,7 @@ Script = dict[int, Callable[["Stand"], object]]
 
 
 class Stand:
-    """A run without processes: what is asked for happens at once; the script has what else happens, by look."""
+    """A run without processes: what is asked for happens at once; the script has what else happens, by poll."""
 
     def __init__(self, script: Script):
         self.script, self.looks, self.asked = script, 0, list[int]()
@@ -37,10 +37,10 @@ class Stand:
     def fails(self) -> None:
         self.state, self.fault = State.FAULT, Fault.TOO_FAST
 
-    def poll(self) -> Look:
+    def poll(self) -> RunStatus:
         self.script.get(self.looks, lambda stand: None)(self)
         self.looks += 1
-        return Look(True, self.state, self.fault, 1.6, ROW, self.recorded)
+        return RunStatus(True, self.state, self.fault, 1.6, ROW, self.recorded)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_a_recording_that_has_ended_is_said_once_and_with_its_reason(keys, capsy
 
 
 def _fills_the_disk(stand: Stand) -> None:
-    stand.recorded = Recorded(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
+    stand.recorded = RecorderStatus(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
 
 
 def asked(script: Script, arm: bool = False) -> list[int]:

@@ -23,7 +23,7 @@ from controllers.safety.arming import ARM, CLEAR, State
 from controllers.safety.faults import Fault
 from models.world.scene import SceneConfig
 from sim.errors import SimError
-from sim.hardware.controls import HardwareRun, Look
+from sim.hardware.controls import HardwareRun, RunStatus
 from sim.hardware.emulated_process import SHOWN_SIZE, SHOWN_TORQUE, SHOWN_TRIPS, EmulatedEnd, host_device
 from sim.hardware.gated_servo import ROW_SIZE
 from sim.hardware.recorder_process import RecordingJob, record_rows
@@ -41,7 +41,7 @@ def job(path: Path) -> RecordingJob:
     return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD))
 
 
-def until(run: HardwareRun, what: Callable[[Look], bool], seconds: float = 60.0) -> Look:
+def until(run: HardwareRun, what: Callable[[RunStatus], bool], seconds: float = 60.0) -> RunStatus:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         look = run.poll()
@@ -307,7 +307,7 @@ def test_a_device_that_is_gone_is_a_fault(tmp_path: Path) -> None:
             active(run)
             hosted.kill()
 
-            def gone(look: Look) -> bool:
+            def gone(look: RunStatus) -> bool:
                 if look.fault is Fault.READING_STALE:  # a process that is killed is silent before its socket closes
                     run.request(CLEAR)
                 return look.fault is Fault.UNPLUGGED

@@ -182,4 +182,4 @@ def test_falls_are_told_and_what_follows_does_not_count_until_the_figure_is_back
     # The time without ground force when it should stand, 2 to 2.3 s, is left out; its flight is not.
     assert figure.lost_contact_seconds == 0.0
     assert figure.flight_seconds == pytest.approx(0.2)
-    assert "fell at 1.5, 3.8 s (2 falls); what is said of it is of the 2.8 of 4.0 s" in " ".join(summary.lines())
+    assert "fell at 1.5, 3.8 s (2 falls); its measures are over the 2.8 of 4.0 s" in " ".join(summary.lines())
