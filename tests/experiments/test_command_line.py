@@ -89,6 +89,15 @@ def test_other_commands_name_the_option_and_the_file_too(
     assert told in refused(arguments, capsys)
 
 
+def test_a_configuration_without_clips_is_refused_and_not_run_with_the_default_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")
+    said = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
+    assert "takes 1 to 4 clips, got 0" in said
+
+
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
     said = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
