@@ -131,7 +131,7 @@ def _check(study: StudyConfig) -> None:
     trials = max(count, study.users.number * study.repetitions * count // groups)
     if trials > _MOST:
         raise StudyError(
-            f"{where}: {study.users.number} users, {count} conditions and {study.repetitions} repetitions are too many; "
+            f"{where}: {study.users.number} users, {count} conditions, {study.repetitions} repetitions are too many; "
             f"expected at most {_MOST} trials"
         )
     for (one, its), (other, others) in itertools.combinations(study.factors.items(), 2):
