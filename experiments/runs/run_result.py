@@ -77,8 +77,11 @@ class Run:
         started, console = time.perf_counter(), Console(stderr=True, quiet=True)
         if record is None:
             folder = Path(tempfile.mkdtemp(prefix="hvf-"))
-            summary = record_session(session, folder, config, seconds, started, console)
-            session.haptic_map.check()
+            try:
+                summary = record_session(session, folder, config, seconds, started, console)
+            except BaseException:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
             run = Run(folder, summary, session)
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
             return run
@@ -88,7 +91,6 @@ class Run:
             check_holds(folder, overwrite)
             clear_folder(folder)
             summary = record_session(session, folder, config, seconds, started, console)
-            session.haptic_map.check()
             write_animations(folder, session)
             said = asdict(summary) | {"lines": summary.lines()}
             (folder / SUMMARY).write_text(json_text(said) + "\n", encoding="utf-8")

@@ -288,6 +288,8 @@ class Simulation:
         ModelError, ControllerError, SimError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
+        if record is not None and not str(record):
+            raise ParameterError("record is empty; expected a folder, or None for a temporary one")
         least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
         if not least <= seconds < np.inf:
             raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")

@@ -124,6 +124,47 @@ def test_a_folder_into_which_a_run_is_being_written_is_refused_and_keeps_what_it
     assert (tmp_path / "run.h5").read_bytes() == b"precious"
 
 
+class Shrinking(hvf.HapticMap):
+    """A map whose poses lose their joints after some calls."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+        self.asked += 1
+        return hvf.rest_pose()[: 75 if self.asked < 30 else 3]
+
+
+def test_a_map_that_fails_in_a_tick_says_so_itself_and_leaves_no_folder(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    field = hvf.Follow(CURVE, k_r=300, b_d=8)
+    sim = hvf.Simulation(field=field, haptic_map=Shrinking(), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(hvf.ParameterError, match=r"gave a pose of shape \(3,\); expected 75 finite numbers"):
+        sim.run(0.1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_swept_tuned_or_recorded_is_refused_before_it_begins() -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    with pytest.raises(hvf.ParameterError, match="threads is 0"):
+        next(hvf.sweep(sim, {"field.k_r": [100.0]}, threads=0))
+    with pytest.raises(hvf.ParameterError, match="record is empty"):
+        sim.run(0.1, record="")
+    with pytest.raises(hvf.ParameterError, match="the space is empty"):
+        hvf.tune(sim, {}, lambda run: 1.0)
+    for bounds in ((500.0, 50.0), (50.0,), (50.0, float("inf"))):
+        with pytest.raises(hvf.ParameterError, match=r"^field\.k_r is .*expected the lowest and the highest value"):
+            hvf.tune(sim, {"field.k_r": bounds}, lambda run: 1.0)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cost", [float("nan"), None, (1.0, 2.0)])
+def test_a_cost_that_is_no_number_ends_a_search(cost: Any) -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    with pytest.raises(hvf.ParameterError, match=r"^the cost at {'field\.k_r': .*expected 1 finite"):
+        hvf.tune(sim, {"field.k_r": (100.0, 101.0)}, lambda run: cost, seconds=0.1, search=hvf.Search(candidates=1))
+
+
 @pytest.mark.slow
 def test_a_certificate_is_of_the_very_field() -> None:
     alone = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8)))
