@@ -204,3 +204,17 @@ def test_an_interrupted_run_of_the_arm_says_where_its_recording_is(
     monkeypatch.setattr("experiments.runs.run_arm.run_arm", interrupted)
     assert main(["arm", "--out", str(tmp_path)]) == 130
     assert f"hvf report {tmp_path} writes its page" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["picture.foo", "picture", "folder.png"])
+def test_a_picture_that_is_no_png_is_refused_before_it_is_drawn(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "folder.png").mkdir()
+    assert "ends in .png" in refused(["picture", str(tmp_path), str(tmp_path / name)], capsys)
+
+
+def test_a_film_that_no_encoder_takes_is_refused_with_its_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "8192 at most" in refused(["render", str(tmp_path), "--width", "1000000"], capsys)
