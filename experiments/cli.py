@@ -76,6 +76,8 @@ def _kept(command: Any) -> str:
     """What an interrupted command leaves on disk, and how to go on, in words."""
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
+    if isinstance(command, command_class("arm")) and (command.out / RECORDING).exists():
+        return f"what was recorded until then is in {command.out}: hvf report {command.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"

@@ -69,7 +69,7 @@ class HapticMap(ABC):
     @property
     def nq(self) -> int:
         """Numbers of a configuration."""
-        return len(self.pose(np.array(_ORIGIN)))
+        return int(np.size(self.pose(np.array(_ORIGIN))))
 
     @property
     def nv(self) -> int:

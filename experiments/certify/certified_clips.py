@@ -43,7 +43,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
 
 def played(recording: Recording) -> tuple[Clip, ...]:
     """The animation of a recorded run as it was played, after the first second; empty without a reference."""
-    if "reference" not in recording.groups["frames"]:
+    if "reference" not in recording.groups.get("frames", {}):
         return ()
     rate = recording.rates["frames"]
     stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_LONGEST * rate)

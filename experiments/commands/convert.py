@@ -23,7 +23,7 @@ class Command:
     roles: Path | None = None
     """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
     frame_rate: float | None = None
-    """Frames per second, where the file does not state them (AMC) or states them wrongly."""
+    """Frames per second, where the file does not state them (AMC) or states them wrongly [Hz]."""
     overwrite: bool = False
     """Replace the target if it exists."""
     json: Json = False

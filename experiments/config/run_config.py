@@ -161,7 +161,7 @@ class Replay:
     """
 
     kind: Literal["replay"] = "replay"
-    run: str = Field(kw_only=False)
+    run: str = Field(kw_only=False, min_length=1)
 
 
 def _with_kind(value: object) -> object:

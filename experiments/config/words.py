@@ -144,8 +144,6 @@ def run_config(
         map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
     if mode != "lead" and user and user not in _USERS:
         raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
-    if not given.get("clips", True):
-        del given["clips"]
     chosen = {"mode": mode, "map": map, "replay": replay}
     taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
     mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))

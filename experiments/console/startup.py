@@ -3,7 +3,25 @@
 import os
 import sys
 import time
+from types import TracebackType
 
+for _number in range(3):  # a file that is opened later would take the place of a closed stream, and get what is printed
+    try:
+        os.fstat(_number)
+    except OSError:
+        os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+sys.stdout, sys.stderr = sys.stdout or open(os.devnull, "w"), sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+
+
+def _stopped_early(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Say in a line that the program was interrupted while it was still importing; the exit code is the signal's."""
+    if issubclass(kind, KeyboardInterrupt):
+        print("hvf: stopped; nothing is left half done", file=sys.stderr)
+    else:
+        sys.__excepthook__(kind, error, trace)
+
+
+sys.excepthook = _stopped_early
 STARTED = time.perf_counter()
 """Start of the program on `time.perf_counter` [s], from which the time to the first tick is measured."""
 # The matrices are small, so that BLAS threads only slow each other down. NumPy reads this when it is imported.

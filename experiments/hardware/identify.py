@@ -10,7 +10,7 @@ from controllers.safety.arming import State
 from experiments.files.device_files import identified_json, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import IdentifyHardware
-from experiments.results.folder import DEVICE, RECORDING
+from experiments.results.folder import DEVICE, RECORDING, of_device
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified, Motion, identify_linkage, motions_of
 from sim.recording.recording import Recording
@@ -67,7 +67,7 @@ def recorded_motions(path: Path) -> list[Motion]:
     """
     file = path / RECORDING if path.is_dir() else path
     with Recording(file) as recording:
-        if "clock" not in recording.groups.get("ticks", ()):
+        if not of_device(recording):
             raise SimError(f"{file}: is no recording of a hardware run; expected one of hvf hardware run")
         tick, clock, theta, torque, state = (
             recording.channel("ticks", name)[:] for name in ("tick", "clock", "theta", "torque", "state")

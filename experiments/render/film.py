@@ -27,6 +27,7 @@ Show = Literal["both", "workspace", "stage"]
 
 WORKSPACE_SHARE = 0.42  # of the width, if both are shown
 LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # smallest frame on which letters can be read [pixels]
+MOST_SIZE = 8192  # of either side [pixels]: the widest frame of H.264's levels
 _SHIRT = "#3d6ba1"  # colour of the figure's shirt in its model
 _NAMES = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
 _GHOSTS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
@@ -64,10 +65,11 @@ class Film:
     fps: float = 30.0
 
     def __post_init__(self) -> None:
-        if self.width < LEAST_WIDTH or self.height < LEAST_HEIGHT or self.width % 2 or self.height % 2:
+        small, large = self.width < LEAST_WIDTH or self.height < LEAST_HEIGHT, max(self.width, self.height) > MOST_SIZE
+        if small or large or self.width % 2 or self.height % 2:
             raise SimError(
                 f"--width and --height are {self.width} and {self.height}; expected even numbers of pixels, "
-                f"{LEAST_WIDTH} x {LEAST_HEIGHT} or more"
+                f"{LEAST_WIDTH} x {LEAST_HEIGHT} or more, {MOST_SIZE} at most"
             )
         if not 1.0 <= self.fps <= 240.0:
             raise SimError(f"--fps is {self.fps:g}; expected 1 to 240 frames per second")

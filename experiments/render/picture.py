@@ -14,6 +14,7 @@ from experiments.results.folder import RECORDING
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import PlanarDisplacement
 from models.mocap.motion.quaternions import heading
+from sim.errors import SimError
 from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
@@ -32,8 +33,10 @@ def draw_picture(folder: Path, target: Path) -> None:
     Raises
     ------
     SimError
-        If the recording cannot be drawn, or this machine cannot draw.
+        If the recording cannot be drawn, the target is no PNG file, or this machine cannot draw.
     """
+    if target.suffix.lower() != ".png" or target.is_dir():
+        raise SimError(f"{target}: is no PNG file to write; expected a name that ends in .png")
     with Recording(folder / RECORDING) as recording:
         world = shown_world(recording, FINER * WIDTH, FINER * HEIGHT)
         moments = timeline(recording, folder, world, FPS, 0.0, None, "default")

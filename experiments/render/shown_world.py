@@ -10,9 +10,10 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
-from experiments.results.folder import scene_of
+from experiments.results.folder import of_device, scene_of
 from models.humanoid.skeleton import N_POSE, figure_spec
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
+from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, TUBE, rgb
@@ -93,9 +94,11 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
 
     Raises
     ------
-    RecordingError
-        If the recording lacks a channel that is drawn.
+    SimError
+        If the recording is of a device, or lacks a channel that is drawn.
     """
+    if of_device(recording):
+        raise SimError(f"{recording.path}: is of a device, without the figure; expected the recording of a simulation")
     kind = recording.texts.get("figure", "robot")
     scene = SceneConfig() if kind == "robot" else scene_of(recording)
     spec = {"robot": robot_spec, "none": device_spec}.get(kind, world_spec)(scene)

@@ -110,6 +110,11 @@ def of_arm(recording: Recording) -> bool:
     return "arm_ticks" in recording.config
 
 
+def of_device(recording: Recording) -> bool:
+    """Whether a recording is of a device, whose figure is only shown beside it and not recorded."""
+    return "clock" in recording.groups.get("ticks", {})
+
+
 def _stored(cls: type[_Config], recording: Recording) -> _Config:
     try:
         return from_dict(cls, recording.config, "the recording's configuration")
@@ -119,14 +124,14 @@ def _stored(cls: type[_Config], recording: Recording) -> _Config:
 
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
     """The clips of a recording, as poses of the figure."""
-    names = recording.texts["clip_names"].split("\n") if recording.texts["clip_names"] else []
+    names = recording.text("clip_names").split("\n") if recording.text("clip_names") else []
     rates = recording.array("clip_fps")
     return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
 
 
 def world_of(recording: Recording) -> mujoco.MjModel:
     """The MuJoCo model to which the recorded qpos belongs: with the figure if there was one."""
-    kind = cast(FigureKind, recording.texts["figure"])
+    kind = cast(FigureKind, recording.text("figure"))
     return World(scene_of(recording), kind).full_model()
 
 

@@ -12,7 +12,7 @@ from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
-from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm
+from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm, of_device
 from experiments.runs.arm_recording import arm_channels
 from experiments.setups.parts.devices import check_hand
 from experiments.setups.robot_arm import wire_arm
@@ -109,13 +109,15 @@ def reproduce(folder: Path) -> Reproduced:
     ------
     SimError
         If the folder holds no recording, the file of its map or the hand that it replays has changed, a person drove
-        the run live, or it is of a `Simulation` put together in Python.
+        the run live, or it is of a device or of a `Simulation` put together in Python.
     OSError
         If a file cannot be read.
     """
     with Recording(folder / RECORDING) as recording:
         if "live" in recording.texts:
             raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
+        if of_device(recording):
+            raise SimError(f"{folder}: is of a device, which moves differently each time; expected a simulated run")
         remarks = _others(recording.versions)
         servo, world, channels = _again_arm(recording) if of_arm(recording) else _again(recording)
         comparison = _Comparison(recording, channels)

@@ -132,6 +132,7 @@ def record(
     with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
+        session.haptic_map.check()  # before it is asked again for the measures, outside the tick
         summary = measured(out, session, speed)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     return summary

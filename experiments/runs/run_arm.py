@@ -1,5 +1,6 @@
 """Runs a configuration of the robot arm and writes its folder."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,11 +16,12 @@ from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
 from experiments.console.progress import simulating
 from experiments.files.json_text import json_text
-from experiments.results.folder import RECORDING, REPORT, SUMMARY, check_folder, check_holds, claimed
+from experiments.results.folder import RECORDING, REPORT, SUMMARY, arm_config_of, check_folder, check_holds, claimed
 from experiments.results.measures.arm_summary import ArmSummary, arm_summary
 from experiments.results.pages.arm_figure import arm_figure
 from experiments.results.pages.figures import STYLE
 from experiments.results.pages.report import write_report
+from experiments.results.pages.report_of import lines_of
 from experiments.runs.arm_recording import arm_groups, record_arm
 from experiments.setups.robot_arm import HOME, SCALE, wire_arm
 from models.phantom.parameters import PREMIUM_1_5
@@ -53,15 +55,25 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
             (out / name).unlink(missing_ok=True)
         summary = _recorded(config, servo, world, curve, out, console)
         (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
-        with Recording(out / RECORDING) as recording:
-            with mpl.rc_context(STYLE):
-                arm_figure(recording, HOME, SCALE).savefig(out / FIGURE, dpi=150)
-            said = summary.lines()
-            write_report(
-                out / REPORT, recording, world.model, "FOLLOW leads a robot arm", said, [out / FIGURE], _TARGET
-            )
+        write_arm_report(out, world, summary.lines())
     console.print(f"Written to {out}: {REPORT} (open it in a browser), {SUMMARY}, {RECORDING}.")
     return summary
+
+
+def write_arm_report(folder: Path, world: RobotWorld, lines: Sequence[str]) -> None:
+    """Draw the figure and the page of a run of the arm from its recording; `lines` are its summary in words."""
+    with Recording(folder / RECORDING) as recording:
+        with mpl.rc_context(STYLE):
+            arm_figure(recording, HOME, SCALE).savefig(folder / FIGURE, dpi=150)
+        title = "FOLLOW leads a robot arm"
+        write_report(folder / REPORT, recording, world.model, title, list(lines), [folder / FIGURE], _TARGET)
+
+
+def finish_arm(folder: Path) -> None:
+    """Draw figure and page of a run of the arm again; of an interrupted run the page says how much is recorded."""
+    with Recording(folder / RECORDING) as recording:
+        config, lines = arm_config_of(recording), lines_of(recording, folder)
+    write_arm_report(folder, wire_arm(config)[1], lines)
 
 
 def _recorded(

@@ -14,7 +14,16 @@ from rich.console import Console
 
 from controllers.state import Array
 from experiments.files.json_text import json_text
-from experiments.results.folder import EDITED, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
+from experiments.results.folder import (
+    EDITED,
+    RECORDING,
+    REPORT,
+    SUMMARY,
+    check_folder,
+    check_holds,
+    claimed,
+    clear_folder,
+)
 from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations
@@ -69,24 +78,25 @@ class Run:
         started, console = time.perf_counter(), Console(stderr=True, quiet=True)
         if record is None:
             folder = Path(tempfile.mkdtemp(prefix="hvf-"))
-        else:
-            folder = Path(record)
-            check_folder(folder, overwrite)
-            clear_folder(folder)
-        try:
-            summary = record_session(session, folder, config, seconds, started, console)
-            session.haptic_map.check()
-        except BaseException:
-            if record is None:
+            try:
+                summary = record_session(session, folder, config, seconds, started, console)
+            except BaseException:
                 shutil.rmtree(folder, ignore_errors=True)
-            raise
-        run = Run(folder, summary, session)
-        if record is None:
+                raise
+            run = Run(folder, summary, session)
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
             return run
-        write_animations(folder, session)
-        (folder / SUMMARY).write_text(json_text(asdict(summary) | {"lines": summary.lines()}) + "\n", encoding="utf-8")
-        run.report()
+        folder = Path(record)
+        check_folder(folder, overwrite)
+        with claimed(folder):
+            check_holds(folder, overwrite)
+            clear_folder(folder)
+            summary = record_session(session, folder, config, seconds, started, console)
+            write_animations(folder, session)
+            said = asdict(summary) | {"lines": summary.lines()}
+            (folder / SUMMARY).write_text(json_text(said) + "\n", encoding="utf-8")
+            run = Run(folder, summary, session)
+            run.report()
         return run
 
     @property

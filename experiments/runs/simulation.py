@@ -1,6 +1,7 @@
 """Simulations from Python: put parts together, run them in memory or into a folder, step them tick by tick."""
 
 import itertools
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,7 @@ from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
+from experiments.console.estimates import check_length
 from experiments.runs.run_result import Run
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
@@ -206,7 +208,7 @@ class Simulation:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If the rates are not multiples of each other, or a replayed hand has a user.
+        If a part is of another kind, the rates are not multiples of each other, or a replayed hand has a user.
     """
 
     field: Law
@@ -219,6 +221,7 @@ class Simulation:
     tank: EnergyTank | None = None
 
     def __post_init__(self) -> None:
+        _check_kinds(self)
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
             raise ParameterError(SIMULATED_TOO)
@@ -285,9 +288,12 @@ class Simulation:
         ModelError, ControllerError, SimError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
+        if record is not None and not str(record):
+            raise ParameterError("record is empty; expected a folder, or None for a temporary one")
         least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
         if not least <= seconds < np.inf:
             raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
+        check_length(Path(record or tempfile.gettempdir()), seconds, self.clock.servo_period)
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 
     def __iter__(self) -> Iterator[Tick]:
@@ -315,3 +321,27 @@ class Simulation:
             "device": to_dict(self.device),
             "seed": self.seed,
         }
+
+
+_KINDS: dict[str, tuple[tuple[type, ...], str]] = {
+    "field": ((Law,), "a law of force, such as hvf.Follow(curve, k_r=300, b_d=8), or a function under @hvf.law"),
+    "user": ((User,), "hvf.User(…)"),
+    "device": ((Phantom, Replay), "hvf.Phantom(…) or hvf.Replay(run)"),
+    "figure": ((Figure,), 'hvf.Figure(…), such as hvf.Figure(kind="none")'),
+    "clock": ((Clock,), "hvf.Clock(…)"),
+    "seed": ((int, np.integer), "a whole number, 0 or more and less than 9223372036854775808"),
+    "tank": ((EnergyTank, type(None)), "hvf.EnergyTank(…)"),
+}
+
+
+def _check_kinds(sim: Simulation) -> None:
+    """Refuse parts of another kind by name, with what would be right."""
+    for name, (kinds, expected) in _KINDS.items():
+        if not isinstance(getattr(sim, name), kinds):
+            raise ParameterError(f"{name} is {getattr(sim, name)!r}; expected {expected}")
+    if not (isinstance(sim.haptic_map, HapticMap) or hasattr(sim.haptic_map, "parts")):
+        raise ParameterError(
+            f"haptic_map is {sim.haptic_map!r}; expected a map, such as hvf.Cylindrical(clips, around=curve)"
+        )
+    if not 0 <= sim.seed < 2**63:
+        raise ParameterError(f"seed is {sim.seed!r}; expected {_KINDS['seed'][1]}")

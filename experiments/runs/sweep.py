@@ -50,8 +50,10 @@ def sweep(
     Raises
     ------
     ParameterError
-        If there is no such parameter, or several laws have it.
+        If there is no such parameter, or several laws have it; or if there is no thread.
     """
+    if threads < 1:
+        raise ParameterError(f"threads is {threads}; expected 1 or more")
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
     simulations = [with_values(sim, chosen) for chosen in combinations]
 

@@ -100,13 +100,15 @@ def tune(
     Raises
     ------
     ParameterError
-        If the space has an unknown parameter, or none of its candidates may be tried.
+        If the space is empty or has an unknown parameter or a range that is none, none of its candidates may be tried,
+        or a cost is not finite.
     """
     import optuna  # an optional dependency, which takes half a second to import
 
     from experiments.tuning.samplers import REFUSED_MOST
 
     search, users = search or Search(), tuple(panel) or (sim.user,)
+    _check_space(space)
     # A session in the middle of the space: reports unknown parameters and compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _study(search, _name(sim, space, cost, len(users), seconds, search))
@@ -120,7 +122,7 @@ def tune(
         allowed = verdict == "certified" or (verdict == "unknown" and search.allow_unknown)
         trial.set_constraint("certificate", 0.0 if allowed else 1.0)
         if allowed:
-            study.tell(trial, _means(candidate, users, cost, seconds, search.threads))
+            study.tell(trial, _means(candidate, users, cost, seconds, search, trial.params))
         else:
             study.tell(trial, state=optuna.trial.TrialState.PRUNED)
     tried = len(study.get_trials(states=complete))
@@ -130,6 +132,15 @@ def tune(
     front = tuple((dict(t.params), tuple(t.values)) for t in study.best_trials)
     values, costs = min(front, key=lambda entry: entry[1])
     return TunedSimulation(with_values(sim, values), values, costs, front, tried, refused)
+
+
+def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse a space without parameters, and a range that is none."""
+    if not space:
+        raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
+    for path, bounds in space.items():
+        if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
+            raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
 
 
 def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
@@ -170,12 +181,17 @@ def _asked(study: Any, search: Search, ranges: Mapping[str, Any], number: int) -
     return study.ask(dict(ranges))
 
 
-def _means(candidate: Simulation, users: Sequence[User], cost: Cost, seconds: float, threads: int) -> list[float]:
+def _means(
+    candidate: Simulation, users: Sequence[User], cost: Cost, seconds: float, search: Search, values: Mapping[str, Any]
+) -> list[float]:  # fmt: skip
     """Costs of a candidate, means over the users."""
 
     def run(user: User) -> Run:
         return replace(candidate, user=user).run(seconds)
 
-    with ThreadPoolExecutor(max(1, threads)) as pool:
-        runs = pool.map(run, users)
-        return [float(mean) for mean in np.mean([np.atleast_1d(cost(run)) for run in runs], axis=0)]
+    with ThreadPoolExecutor(max(1, search.threads)) as pool:
+        costs = [np.atleast_1d(np.asarray(cost(run), dtype=np.float64)) for run in pool.map(run, users)]
+    for found in costs:
+        if found.shape != (search.costs,) or not np.all(np.isfinite(found)):
+            raise ParameterError(f"the cost at {dict(values)} is {found.tolist()}; expected {search.costs} finite")
+    return [float(mean) for mean in np.mean(costs, axis=0)]

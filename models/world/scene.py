@@ -15,6 +15,7 @@ from models.robot_arm.spec import arm_spec
 PHANTOM = "phantom/"
 FIGURE = "figure/"
 ROBOT = "robot/"
+MOST_SUBSTEPS = 1000  # of a servo period: a step of 1 µs at 1 kHz; a tick keeps a row for each
 FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -50,7 +51,7 @@ class SceneConfig:
         Raises
         ------
         ModelError
-            If either rate is not positive, or the step does not divide the period.
+            If either rate is not positive, the step does not divide the period, or divides it into too many.
         """
         if not (0.0 < self.physics_step <= self.servo_period <= 0.1):
             raise ModelError(
@@ -58,6 +59,11 @@ class SceneConfig:
                 "expected 0 < physics_step ≤ servo_period ≤ 0.1 s"
             )
         ratio = self.servo_period / self.physics_step
+        if ratio > MOST_SUBSTEPS + 0.5:
+            raise ModelError(
+                f"the physics step {self.physics_step:g} s divides the servo period {self.servo_period:g} s into "
+                f"{ratio:.3g} steps; expected at most {MOST_SUBSTEPS}, {self.servo_period / MOST_SUBSTEPS:g} s or more"
+            )
         if abs(ratio - round(ratio)) > 1e-6:
             raise ModelError(
                 f"the physics step {self.physics_step} s does not divide the servo period {self.servo_period} s "

@@ -205,6 +205,18 @@ class Recording:
             raise RecordingError(f"{self.path}: no array {name}; there are {sorted(self.arrays)}")
         return self.arrays[name]
 
+    def text(self, name: str) -> str:
+        """A text of `static`, constant during the run.
+
+        Raises
+        ------
+        RecordingError
+            If there is no text of that name.
+        """
+        if name not in self.texts:
+            raise RecordingError(f"{self.path}: no text {name}; there are {sorted(self.texts)}")
+        return self.texts[name]
+
     @property
     def complete(self) -> bool:
         """Whether the run ended normally, with a summary."""

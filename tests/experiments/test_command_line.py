@@ -1,6 +1,7 @@
 """What the ``hvf`` command says to bad input: one line, exit code 2, nothing lost."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -89,6 +90,15 @@ def test_other_commands_name_the_option_and_the_file_too(
     assert told in refused(arguments, capsys)
 
 
+def test_a_configuration_without_clips_is_refused_and_not_run_with_the_default_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")
+    said = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
+    assert "takes 1 to 4 clips, got 0" in said
+
+
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
     said = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
@@ -161,3 +171,50 @@ def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None
             os.close(writing)
         assert ended.returncode == 141
         assert ended.stderr == b""
+
+
+@pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
+def test_a_stream_that_is_closed_costs_neither_the_result_nor_the_exit_code(closed: str, tmp_path: Path) -> None:
+    from models.mocap.library import embedded
+    from models.mocap.readers.own_bvh import write_bvh
+
+    write_bvh(embedded("cheer"), tmp_path / "in.bvh")
+    number = ["stdin", "stdout", "stderr"].index(closed)
+    main_of = f"import os, sys; os.close({number}); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    command = ["-m", "experiments.cli", "convert", str(tmp_path / "in.bvh"), str(tmp_path / "out.bvh")]
+    ended = subprocess.run([sys.executable, "-c", main_of, *command], capture_output=True, check=False, timeout=60)
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "out.bvh").read_text(encoding="utf-8").startswith("HIERARCHY")
+
+
+def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
+    code = "import experiments.console.startup; raise KeyboardInterrupt"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert ended.stderr == "hvf: stopped; nothing is left half done\n"
+    assert ended.returncode == -signal.SIGINT
+
+
+def test_an_interrupted_run_of_the_arm_says_where_its_recording_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(config: object, out: Path, overwrite: bool) -> None:
+        (out / "run.h5").write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("experiments.runs.run_arm.run_arm", interrupted)
+    assert main(["arm", "--out", str(tmp_path)]) == 130
+    assert f"hvf report {tmp_path} writes its page" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["picture.foo", "picture", "folder.png"])
+def test_a_picture_that_is_no_png_is_refused_before_it_is_drawn(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "folder.png").mkdir()
+    assert "ends in .png" in refused(["picture", str(tmp_path), str(tmp_path / name)], capsys)
+
+
+def test_a_film_that_no_encoder_takes_is_refused_with_its_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "8192 at most" in refused(["render", str(tmp_path), "--width", "1000000"], capsys)

@@ -50,6 +50,10 @@ def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> N
 def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 8000 ticks" in capsys.readouterr().out
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    (folder / "report.html").unlink()
+    assert main(["report", str(folder)]) == 0
+    assert (folder / "report.html").read_text(encoding="utf-8") == page
     altered = tmp_path / "altered"
     shutil.copytree(folder, altered)
     with h5py.File(altered / "run.h5", "r+") as file:

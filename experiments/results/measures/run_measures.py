@@ -114,7 +114,7 @@ def trace_summary(recording: Recording) -> TraceSummary:
 def _replay_summary(recording: Recording) -> ReplaySummary | None:
     if "replayed" not in recording.texts:
         return None
-    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.texts["distance_from"])
+    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.text("distance_from"))
 
 
 def _deviation_mm(recording: Recording, since: float) -> float:

@@ -76,7 +76,10 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     if freedom < 1 or not scale > 0.0:
         return NO_FIT
     centre = float(data[measure].mean())
-    data = data.assign(_y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]).astype(float))
+    # Without the factors' own columns: in the formula a factor named "C" would hide patsy's function of that name.
+    data = data[["user", "_c"]].assign(
+        _y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]).astype(float)
+    )
     fixed = "_y ~ _x * C(_c, Sum)" if data["_c"].nunique() > 1 else "_y ~ _x"
     try:
         with warnings.catch_warnings():

@@ -1,6 +1,7 @@
 """Experimental design of a study: its conditions, their assignment to users, and their counterbalanced order."""
 
 import itertools
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ from experiments.trials.design.errors import StudyError
 from experiments.trials.design.study_config import StudyConfig, Words
 from experiments.trials.trial.measures import MEASURES
 
+_MOST = 1_000_000  # trials of a study: as many as the largest population has people
 _TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
 
 
@@ -124,6 +126,14 @@ def _check(study: StudyConfig) -> None:
             had = f"one level, {next(iter(levels))!r}" if levels else "no levels"
             raise StudyError(f"{where}: factor {name!r} has {had}; expected two or more, or its words under [run]")
     _check_between(study, where)
+    groups = math.prod(len(study.factors[name]) for name in study.between)
+    count = math.prod(map(len, study.factors.values()))
+    trials = max(count, study.users.number * study.repetitions * count // groups)
+    if trials > _MOST:
+        raise StudyError(
+            f"{where}: {study.users.number} users, {count} conditions, {study.repetitions} repetitions are too many; "
+            f"expected at most {_MOST} trials"
+        )
     for (one, its), (other, others) in itertools.combinations(study.factors.items(), 2):
         shared = _words(its.values()) & _words(others.values())
         if shared:

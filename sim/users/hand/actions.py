@@ -19,6 +19,14 @@ TURN_COLUMNS = 5
 """A turn as a row: start, duration, rotation vector at its peak (3)."""
 
 
+def _check_vectors(what: str, action: object, names: Sequence[str]) -> None:
+    """Refuse a vector of an action that has not three components."""
+    for name in names:
+        vector = getattr(action, name)
+        if vector is not None and np.shape(vector) != (3,):
+            raise SimError(f"the {name} of a {what} is {vector!r}; expected three numbers")
+
+
 @dataclass(frozen=True)
 class Push:
     r"""A push of the hand: a smooth bump of force in one direction.
@@ -58,6 +66,7 @@ class Push:
         numbers = [self.at, self.seconds, self.force, self.radius, *(self.direction or ()), *(self.place or ())]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a push has a number that is not finite: {self}")
+        _check_vectors("push", self, ("direction", "place"))
         if self.seconds <= 0.0 or self.at < 0.0 or self.radius <= 0.0:
             raise SimError(f"a push needs at ≥ 0 s, seconds > 0 and radius > 0 m, got {self}")
         if self.direction is not None and np.linalg.norm(self.direction) < 1e-12:
@@ -121,6 +130,7 @@ class Grab:
         numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *(self.place or ())]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a grab has a number that is not finite: {self}")
+        _check_vectors("grab", self, ("carry", "place"))
         if self.seconds <= 0.0 or self.reach <= 0.0 or self.at < 0.0 or self.hold < 0.0:
             raise SimError(f"a grab needs seconds and reach > 0, at and hold ≥ 0 s, got {self}")
 
@@ -181,6 +191,7 @@ class Turn:
     def __post_init__(self) -> None:
         if not np.all(np.isfinite([self.at, self.seconds, self.angle, *self.axis])):
             raise SimError(f"a turn has a number that is not finite: {self}")
+        _check_vectors("turn", self, ("axis",))
         if self.seconds <= 0.0 or self.at < 0.0 or abs(self.angle) > np.pi:
             raise SimError(f"a turn needs at ≥ 0 s, seconds > 0 and an angle within ±π, got {self}")
         if np.linalg.norm(self.axis) < 1e-12:

@@ -249,6 +249,7 @@ def test_every_mode_and_map_is_among_those() -> None:
         ("300.0", "-3", "--stiffness is -3; expected 0 N/m or more, and finite"),
         ("0.0477", "NaN", "--radius is nan; expected more than 0 m, and finite"),
         ('"phantom"', '"gloves"', "device is of kind 'gloves'; expected 'phantom', 'replay'"),
+        ('"kind": "phantom"', '"kind": "replay", "run": ""', "device.replay.run is ''"),
         ("{", "", "is not JSON"),
     ],
 )

@@ -18,10 +18,13 @@ from controllers.certificates.report import (
     hashes_of,
 )
 from controllers.safety.arming import TRANSITIONS, mermaid
+from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
 from experiments.cli import main
 from experiments.config.modes import Follow
+from experiments.config.part import to_dict
 from experiments.config.run_config import Clock, Phantom, RunConfig
+from experiments.config.words import run_config
 from experiments.files.certificate_files import OPTIONS
 from experiments.files.device_files import (
     Calibration,
@@ -41,6 +44,7 @@ from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.identification import NAMES, Identified
+from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
 KNOWN = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True)
@@ -230,6 +234,20 @@ def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_wa
         file.write_text(content)
     assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
     assert kept.exists()
+
+
+def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_again_or_drawn(
+    tmp_path: Path, capsys
+) -> None:
+    config = run_config(figure="none", seconds=1.0)
+    static = {"curve": [[0.0, 0.0, 0.0]], "clip_names": "", "clip_fps": np.zeros(0)}
+    channels = {"ticks": Group(1e3, {"t": (), "clock": ()})}
+    with Recorder(tmp_path / "run.h5", to_dict(config), 1, channels, static) as recorder:
+        recorder.append("ticks", {"t": np.zeros(5), "clock": np.zeros(5)})
+    assert run_and_clips(tmp_path, config) == (config, ())
+    for arguments in (["reproduce"], ["picture", str(tmp_path / "a.png")], ["render"]):
+        assert main([arguments[0], str(tmp_path), *arguments[1:]]) == 2
+        assert "is of a device" in capsys.readouterr().err
 
 
 def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> None:

@@ -2,7 +2,9 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import hvf
 from controllers.certificates.loop.hand import NO_HANDS
 from experiments.cli import main
 from experiments.files.device_files import save_device
+from experiments.results.folder import claimed
 from experiments.runs.sweep import with_values
 
 CURVE = hvf.circle(lap=2.0)
@@ -89,6 +92,77 @@ def test_a_number_that_is_not_there_is_named(path: str, said: str) -> None:
 def test_a_run_that_is_too_short_is_refused_before_anything_is_made() -> None:
     with pytest.raises(hvf.ParameterError, match=r"expected 0\.004 s or more"):
         simulation(hvf.Follow(CURVE, k_r=300, b_d=8)).run(0.001)
+
+
+def test_a_run_that_no_disk_holds_is_refused_before_anything_is_made() -> None:
+    with pytest.raises(hvf.ParameterError, match="expected less than"):
+        simulation(hvf.Follow(CURVE, k_r=300, b_d=8)).run(1e300)
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ({"field": lambda hand: (0.0, 0.0, 0.0)}, r"^field is <function .*expected a law of force, .*@hvf\.law"),
+        ({"haptic_map": hvf.clips("walk")[0]}, r"^haptic_map is <clip 'walk'.*expected a map"),
+        ({"figure": "none"}, r"^figure is 'none'; expected hvf\.Figure"),
+        ({"user": None}, r"^user is None"),
+        ({"seed": 1.5}, r"^seed is 1\.5; expected a whole number"),
+        ({"seed": -1}, r"^seed is -1"),
+    ],
+)
+def test_a_part_of_another_kind_is_named_with_what_would_be_right(part: dict[str, Any], said: str) -> None:
+    with pytest.raises(hvf.ParameterError, match=said):
+        replace(simulation(hvf.Follow(CURVE, k_r=300, b_d=8)), **part)
+
+
+def test_a_folder_into_which_a_run_is_being_written_is_refused_and_keeps_what_it_holds(tmp_path: Path) -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    with claimed(tmp_path):
+        (tmp_path / "run.h5").write_bytes(b"precious")
+        with pytest.raises(hvf.SimError, match="another run is being written into it"):
+            sim.run(0.1, record=tmp_path, overwrite=True)
+    assert (tmp_path / "run.h5").read_bytes() == b"precious"
+
+
+class Shrinking(hvf.HapticMap):
+    """A map whose poses lose their joints after some calls."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+        self.asked += 1
+        return hvf.rest_pose()[: 75 if self.asked < 30 else 3]
+
+
+def test_a_map_that_fails_in_a_tick_says_so_itself_and_leaves_no_folder(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    field = hvf.Follow(CURVE, k_r=300, b_d=8)
+    sim = hvf.Simulation(field=field, haptic_map=Shrinking(), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(hvf.ParameterError, match=r"gave a pose of shape \(3,\); expected 75 finite numbers"):
+        sim.run(0.1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_swept_tuned_or_recorded_is_refused_before_it_begins() -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    with pytest.raises(hvf.ParameterError, match="threads is 0"):
+        next(hvf.sweep(sim, {"field.k_r": [100.0]}, threads=0))
+    with pytest.raises(hvf.ParameterError, match="record is empty"):
+        sim.run(0.1, record="")
+    with pytest.raises(hvf.ParameterError, match="the space is empty"):
+        hvf.tune(sim, {}, lambda run: 1.0)
+    for bounds in ((500.0, 50.0), (50.0,), (50.0, float("inf"))):
+        with pytest.raises(hvf.ParameterError, match=r"^field\.k_r is .*expected the lowest and the highest value"):
+            hvf.tune(sim, {"field.k_r": bounds}, lambda run: 1.0)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cost", [float("nan"), None, (1.0, 2.0)])
+def test_a_cost_that_is_no_number_ends_a_search(cost: Any) -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    with pytest.raises(hvf.ParameterError, match=r"^the cost at {'field\.k_r': .*expected 1 finite"):
+        hvf.tune(sim, {"field.k_r": (100.0, 101.0)}, lambda run: cost, seconds=0.1, search=hvf.Search(candidates=1))
 
 
 @pytest.mark.slow

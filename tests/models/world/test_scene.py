@@ -75,6 +75,8 @@ def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
         (1e-3, 3e-4, "does not divide"),
         (1e-3, 2e-3, "expected 0 < physics_step"),
         (1e-3, 0.0, "expected 0 < physics_step"),
+        (1e-3, 1e-9, r"into 1e\+06 steps; expected at most 1000, 1e-06 s or more"),
+        (1e-3, 1e-300, "expected at most 1000"),
         (-1.0, 1e-3, "expected 0 < physics_step"),
         (float("nan"), 1e-3, "expected 0 < physics_step"),
     ],

@@ -272,6 +272,8 @@ def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
             recording.channel("frames", "t")
         with pytest.raises(RecordingError, match=r"no array tube; there are \['curve'\]"):
             recording.array("tube")
+        with pytest.raises(RecordingError, match=r"no text title; there are \[\]"):
+            recording.text("title")
 
 
 def recorded(path, closed=True):

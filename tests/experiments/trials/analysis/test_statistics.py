@@ -160,3 +160,11 @@ def test_a_failed_condition_does_not_weigh_against_the_other_level() -> None:
     made.loc[lost, ["state", "tracking_error"]] = ["failed", np.nan]
     (river,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
     assert abs(river.difference) < 0.3
+
+
+def test_a_factor_may_have_the_name_of_a_function_of_the_formula() -> None:
+    made, renamed = frame(-1.0), frame(-1.0).rename(columns={"map": "C"})
+    (found,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+    factors = {"guidance": FACTORS["guidance"], "C": FACTORS["map"]}
+    (same,) = statistics(renamed, factors, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+    assert same == found

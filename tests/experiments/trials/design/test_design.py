@@ -81,6 +81,8 @@ def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
         ({"users": {"does": "fly"}}, "no user 'fly'"),
         ({"between": ["map"]}, "no factor 'map'"),
         ({"between": ["stiffness"], "users": {"number": 1}}, "2 groups between users and 1 users"),
+        ({"repetitions": 10**11}, "100000000000 repetitions are too many; expected at most 1000000 trials"),
+        ({"factors": {f"f{k}": {str(n): {} for n in range(10)} for k in range(12)}}, "1000000000000 conditions"),
         ({"run": {"seconds": 3}}, "sets 'seconds' as a word of its runs"),
         ({"factors": {"clips": {"a": {"clips": ["gone.bvh"]}, "b": {"clips": ["walk"]}}}}, "gone.bvh"),
         ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),

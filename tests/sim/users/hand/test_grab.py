@@ -93,6 +93,7 @@ def test_the_device_tells_of_the_switch() -> None:
     [
         {"at": -1.0, "carry": (0.0, 0.0, 0.0)},
         {"at": 0.0, "carry": (0.0, np.nan, 0.0)},
+        {"at": 0.0, "carry": (0.0, 0.0)},
         {"at": 0.0, "carry": (0.0, 0.0, 0.0), "seconds": 0.0},
         {"at": 0.0, "carry": (0.0, 0.0, 0.0), "hold": -0.1},
         {"at": 0.0, "carry": (0.0, 0.0, 0.0), "place": (0.0, 0.0, 0.0), "reach": 0.0},

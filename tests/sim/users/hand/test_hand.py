@@ -70,6 +70,7 @@ def test_a_push_at_a_place_waits_until_the_hand_comes_there() -> None:
         {"at": 0.0, "seconds": 0.0, "force": 1.0},
         {"at": 0.0, "seconds": 1.0, "force": float("nan")},
         {"at": 0.0, "seconds": 1.0, "force": 1.0, "direction": (0.0, 0.0, 0.0)},
+        {"at": 0.0, "seconds": 1.0, "force": 1.0, "direction": (1.0, 0.0)},
         {"at": 0.0, "seconds": 1.0, "force": 1.0, "place": (0.0, 0.0, 0.0), "radius": 0.0},
     ],
 )

@@ -133,6 +133,7 @@ def test_a_run_with_turns_replays_bit_for_bit():
         {"angle": np.nan},
         {"angle": 4.0},
         {"axis": (0.0, 0.0, 0.0)},
+        {"axis": (1.0, 0.0)},
         {"axis": (0.0, np.inf, 0.0)},
     ],
 )
