@@ -16,11 +16,13 @@ class Command:
     """Folder of a run."""
     target: Positional[Path]
     """PNG file to write."""
+    overwrite: bool = False
+    """Replace the target if it exists."""
 
     def __call__(self) -> int:
         """Render."""
         from experiments.render.picture import draw_picture
 
         with working("drawing"):
-            draw_picture(self.folder, self.target)
+            draw_picture(self.folder, self.target, self.overwrite)
         return 0

@@ -27,16 +27,19 @@ GHOST_AT = np.array([-0.95, 0.45])  # position of the ghost relative to the figu
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
 
-def draw_picture(folder: Path, target: Path) -> None:
+def draw_picture(folder: Path, target: Path, overwrite: bool = False) -> None:
     """Render the picture of a run into a PNG file.
 
     Raises
     ------
     SimError
-        If the recording cannot be drawn, the target is no PNG file, or this machine cannot draw.
+        If the recording cannot be drawn, the target is no PNG file or exists and is not to be overwritten, or this machine
+        cannot draw.
     """
     if target.suffix.lower() != ".png" or target.is_dir():
         raise SimError(f"{target}: is no PNG file to write; expected a name that ends in .png")
+    if target.exists() and not overwrite:
+        raise SimError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
     with Recording(folder / RECORDING) as recording:
         world = shown_world(recording, FINER * WIDTH, FINER * HEIGHT)
         moments = timeline(recording, folder, world, FPS, 0.0, None, "default")

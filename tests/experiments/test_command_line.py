@@ -214,6 +214,12 @@ def test_a_picture_that_is_no_png_is_refused_before_it_is_drawn(
     assert "ends in .png" in refused(["picture", str(tmp_path), str(tmp_path / name)], capsys)
 
 
+def test_a_picture_that_exists_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.png").write_bytes(b"mine")
+    assert "exists and is left" in refused(["picture", str(tmp_path), str(tmp_path / "mine.png")], capsys)
+    assert (tmp_path / "mine.png").read_bytes() == b"mine"
+
+
 def test_a_film_that_no_encoder_takes_is_refused_with_its_size(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
