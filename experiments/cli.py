@@ -23,6 +23,7 @@ import tyro
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
 from experiments.console.welcome import WELCOME, next_step
+from experiments.hardware.run_options import RunHardware
 from experiments.results.folder import RECORDING
 from models.errors import ModelError
 from sim.errors import SimError
@@ -76,8 +77,9 @@ def _kept(command: Any) -> str:
     """What an interrupted command leaves on disk, and how to go on, in words."""
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
-    if isinstance(command, command_class("arm")) and (command.out / RECORDING).exists():
-        return f"what was recorded until then is in {command.out}: hvf report {command.out} writes its page"
+    recorded = command.which if isinstance(command, command_class("hardware")) else command
+    if isinstance(recorded, command_class("arm") | RunHardware) and (recorded.out / RECORDING).exists():
+        return f"what was recorded until then is in {recorded.out}: hvf report {recorded.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"

@@ -36,6 +36,7 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
+from sim.hardware.undisturbed import start_undisturbed
 from sim.recording.recording import Recording
 
 
@@ -156,7 +157,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
     end = EmulatedEnd(theirs, shown, make.scene.servo_period)
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=host_device, args=(make, end, realtime), name="device", daemon=True)
-    process.start()
+    start_undisturbed(process)
     theirs.close()
     try:
         yield ours
@@ -171,7 +172,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
     page = context.Process(target=show_status, args=(config, run.status, run.recorder_status), name="page", daemon=True)
-    page.start()
+    start_undisturbed(page)
     try:
         yield
     finally:

@@ -33,8 +33,8 @@ def draw_picture(folder: Path, target: Path, overwrite: bool = False) -> None:
     Raises
     ------
     SimError
-        If the recording cannot be drawn, the target is no PNG file or exists and is not to be overwritten, or this machine
-        cannot draw.
+        If the recording cannot be drawn, the target is no PNG file or exists and is not to be overwritten, or this
+        machine cannot draw.
     """
     if target.suffix.lower() != ".png" or target.is_dir():
         raise SimError(f"{target}: is no PNG file to write; expected a name that ends in .png")

@@ -44,6 +44,7 @@ from sim.hardware.servo_process import (
     serve,
 )
 from sim.hardware.shared import Ring, SharedNumbers
+from sim.hardware.undisturbed import start_undisturbed
 
 SILENT = 0.2
 """Time without a tick after which the servo counts as dead [s]."""
@@ -163,9 +164,9 @@ class HardwareRun:
             If the servo could not start; the message says why.
         """
         if self.recorder is not None:
-            self.recorder.start()
+            start_undisturbed(self.recorder)
             self._wait_for(self.recorder)
-        self.servo.start()
+        start_undisturbed(self.servo)
         self._their_end.close()
         said = self._hear(_START)
         if isinstance(said, Ready):

@@ -194,15 +194,23 @@ def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
     assert ended.returncode == -signal.SIGINT
 
 
-def test_an_interrupted_run_of_the_arm_says_where_its_recording_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("command", "implementation"),
+    [(["arm"], "runs.run_arm.run_arm"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
+)
+def test_an_interrupted_run_of_arm_or_device_says_where_its_recording_is(
+    command: list[str],
+    implementation: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def interrupted(config: object, out: Path, overwrite: bool) -> None:
-        (out / "run.h5").write_bytes(b"")
+    def interrupted(*_: object) -> None:
+        (tmp_path / "run.h5").write_bytes(b"")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.runs.run_arm.run_arm", interrupted)
-    assert main(["arm", "--out", str(tmp_path)]) == 130
+    monkeypatch.setattr(f"experiments.{implementation}", interrupted)
+    assert main([*command, "--out", str(tmp_path)]) == 130
     assert f"hvf report {tmp_path} writes its page" in capsys.readouterr().err
 
 

@@ -2,7 +2,6 @@
 
 import os
 import queue
-import signal
 import time
 from collections.abc import Callable
 from multiprocessing import get_context
@@ -10,17 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.errors import ModelError
+from sim.hardware.undisturbed import start_undisturbed
 
 _LISTENS = 0.5  # [s] between two checks whether the page's process still exists
-
-
-def start_undisturbed(process: Any) -> None:
-    """Start a process with SIGINT blocked, so that Ctrl-C does not end it: the page tells it when to end."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-    try:
-        process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class PageProcess:

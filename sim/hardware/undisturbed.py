@@ -1,0 +1,13 @@
+"""Start of processes that Ctrl-C does not end."""
+
+import signal
+from multiprocessing.process import BaseProcess
+
+
+def start_undisturbed(process: BaseProcess) -> None:
+    """Start a process with SIGINT blocked, also while it imports: whoever started it tells it when to end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

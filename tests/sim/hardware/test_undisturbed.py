@@ -1,0 +1,21 @@
+"""Ctrl-C does not reach the processes of a run, from the moment at which they start."""
+
+import multiprocessing
+import signal
+
+from sim.hardware.undisturbed import start_undisturbed
+
+
+def report_blocked(answer) -> None:
+    answer.send(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+
+def test_a_process_starts_with_the_interrupt_blocked_and_its_parent_goes_on_with_it_unblocked() -> None:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=report_blocked, args=(theirs,), daemon=True)
+    start_undisturbed(process)
+    theirs.close()
+    assert ours.recv()
+    process.join()
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
