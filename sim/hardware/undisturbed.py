@@ -1,11 +1,13 @@
 """Start of processes that Ctrl-C does not end."""
 
 import signal
+from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
 
 
 def start_undisturbed(process: BaseProcess) -> None:
     """Start a process with SIGINT blocked, also while it imports: whoever started it tells it when to end."""
+    resource_tracker.ensure_running()  # now, since the first process that is spawned starts it, which unblocks SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
     try:
         process.start()
