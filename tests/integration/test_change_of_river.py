@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rivers") / "run"
-    run(run_config(mode="rivers", map="rivers", clips=(), seconds=6.0, user="push"), folder, False, 0.0)
+    run(run_config(mode="rivers", map="rivers", seconds=6.0, user="push"), folder, False, 0.0)
     return folder
 
 
