@@ -39,7 +39,7 @@ from experiments.fitting.river_tour import not_followed
 from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
 from experiments.setups.modes.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.modes.rivers import default_choice, river_bundle
-from experiments.setups.parts.hands import SLOWEST, river_pushes
+from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of, reached
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
@@ -172,12 +172,7 @@ def _river_clips_parts(
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, not_followed(changing, names, config.figure, figure)
 
-    pace, lap = place.curve.length / place.curve.duration, place.curve.duration
-    slow = (
-        f"a lap of {lap:.0f} s leads the hand at {1e3 * pace:.0f} mm/s: so slow, a push that takes it out of one river "
-        f"takes it out of all; choose a --lap of {place.curve.length / SLOWEST:.1f} s at most, or a larger --radius",
-    )
-    return replace(parts.said(slow if pace < SLOWEST else ()), plays_rivers=True, refined=refined)
+    return replace(parts, plays_rivers=True, refined=refined)
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

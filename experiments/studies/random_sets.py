@@ -134,7 +134,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "remarks": session.remarks, "off_pace": () if kind == "lifted" else off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
-        "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else 1.0,
+        "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
         **animation_measures(frames["reference"][::_EVERY], rate / _EVERY), "cpu": time.process_time() - began,
     }  # fmt: skip
@@ -169,6 +169,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
+        held = f"{min(row['held'] for row in of):.0%}" if kind == "rivers" else "–"
         stood = [row for row in of if row["fell"] is None]
         low, high = proportion_confint(len(stood), len(of), method="wilson")
         residual = 100 * np.array([row["residual"] for row in stood] or [np.nan])
@@ -179,7 +180,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
             f"| {np.median(residual):.1f}, {residual.max():.1f}; {np.sum(residual <= 12.0)} "
             f"| {lowest.min():.1f}; {np.sum(lowest > -1.0)} "
             f"| {np.median(skate):.1f}, {skate.max():.1f}; {np.sum(skate <= 2.0)} "
-            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} | {min(row['held'] for row in of):.0%} |"
+            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} | {held} |"
         )
     return lines
 

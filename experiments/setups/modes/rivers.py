@@ -17,6 +17,7 @@ from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.parts.budget import fastest
 from experiments.setups.parts.defaults import river_gains
 from experiments.setups.parts.governor import governed, speeds_along
+from experiments.setups.parts.hands import SLOWEST
 from experiments.setups.parts.pace import paced
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
 
@@ -50,7 +51,18 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
     field = FixedField(law, course, power, springs, notes, urged, pushes=pushes)
-    return fixed_curve_parts(config, mode, maps, field)
+    parts = fixed_curve_parts(config, mode, maps, field)
+    return replace(parts, remarks=parts.remarks + slow_remark(choice.pace))
+
+
+def slow_remark(pace: float) -> tuple[str, ...]:
+    """That rivers of a speed [m/s] are too slow for a push across, if they are."""
+    if pace >= SLOWEST:
+        return ()
+    return (
+        f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slow, a push that takes it out of one takes it out of "
+        f"all, and --user push does not push; above {1e3 * SLOWEST:.0f} mm/s it does (a shorter --lap, a larger --radius)",
+    )
 
 
 def river_time(mode: Rivers) -> float:

@@ -7,10 +7,8 @@ from controllers.curves.trajectory import Trajectory
 from experiments.config.words import run_config
 from experiments.setups.modes.rivers import LOOK, UNFILTERED, look_of
 from experiments.setups.parts.hands import RIVER_PUSH, river_pushes
-from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
-from models.humanoid.skeleton import figure_model
 from sim.loop.loop import Loop
 
 RADIUS = 0.0477
@@ -49,12 +47,12 @@ def test_the_velocity_that_selects_a_river_is_filtered_where_noise_counts() -> N
     assert look_of("discrete", 0.99 * UNFILTERED) == look_of("smooth", 0.0749) == LOOK
 
 
-def test_a_lap_too_slow_for_pushes_is_said_before_the_run() -> None:
+@pytest.mark.parametrize("name", ["rivers", "cylindrical"])
+def test_rivers_too_slow_for_pushes_are_said_before_the_run(name: str) -> None:
     def said(lap: float) -> list[str]:
-        config = run_config(mode="rivers", map="rivers", figure="none", clips=("walk",), lap=lap)
-        return [remark for remark in map_parts(config, figure_model()).remarks if "mm/s" in remark]
+        config = run_config(mode="rivers", map=name, figure="none", clips=("walk",), lap=lap)
+        return [remark for remark in wire(config).remarks if "mm/s" in remark]
 
     (slow,) = said(21.0)
-    assert slow.startswith("a lap of 21 s leads the hand at 14 mm/s")
-    assert slow.endswith("choose a --lap of 10.0 s at most, or a larger --radius")
+    assert slow.startswith("the rivers lead the hand at 14.3 mm/s")
     assert not said(8.0)
