@@ -61,7 +61,7 @@ def slow_remark(pace: float) -> tuple[str, ...]:
         return ()
     return (
         f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slow, a push that takes it out of one takes it out of "
-        f"all, and --user push does not push; above {1e3 * SLOWEST:.0f} mm/s it does (a shorter --lap, a larger --radius)",
+        f"all, and --user push does not; above {1e3 * SLOWEST:.0f} mm/s it does (a shorter --lap, a larger --radius)",
     )
 
 
