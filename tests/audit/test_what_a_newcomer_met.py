@@ -295,9 +295,9 @@ def test_a_certificate_of_gains_is_verified_with_these_gains(
     assert "changed: gains" in capsys.readouterr().err
 
 
-def _drawn(out: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def _drawn(out: Path, picture: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     kept = {name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "DISPLAY")}
-    command = [sys.executable, "-m", "experiments.cli", "picture", str(out), str(out / "x.png")]
+    command = [sys.executable, "-m", "experiments.cli", "picture", str(out), str(picture)]
     return subprocess.run(
         command, env=kept | {"PYTHONPATH": str(ROOT)} | environment, capture_output=True, text=True, check=False
     )
@@ -305,14 +305,17 @@ def _drawn(out: Path, **environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", [None, "glfw", "bogus"])
-def test_a_picture_is_drawn_without_a_display_and_whatever_mujoco_gl_says(backend: str | None, run: Path) -> None:
-    done = _drawn(run) if backend is None else _drawn(run, MUJOCO_GL=backend)
+def test_a_picture_is_drawn_without_a_display_and_whatever_mujoco_gl_says(
+    backend: str | None, run: Path, tmp_path: Path
+) -> None:
+    picture = tmp_path / "x.png"  # an existing one is left as it is
+    done = _drawn(run, picture) if backend is None else _drawn(run, picture, MUJOCO_GL=backend)
     assert "Traceback" not in done.stderr
     if done.returncode == 2:  # a machine without EGL and OSMesa
         assert "expected EGL or OSMesa: apt-get install" in done.stderr
         pytest.skip("nothing can be drawn on this machine")
     assert done.returncode == 0, done.stderr
-    assert (run / "x.png").stat().st_size > 10_000
+    assert picture.stat().st_size > 10_000
 
 
 def _json(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> Any:
