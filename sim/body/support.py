@@ -9,7 +9,7 @@ There are two such times. A point that leaves the floor within `unload_time` is 
 the others before, so that its leg need not catch up; where no other bears the load, before a flight, it bears load
 until `lift_time` before it leaves. With the longer time alone the legs would stop pushing too soon: with 0.05 s a
 run has 12.0 % of weight instead of 6, and jumping falls. With the shorter time alone a foot that leaves while the other
-stands is held too long: a dance has 4.1 % instead of 1.9, a spin falls (docs/validation/prepared-captures.md).
+stands is held too long: a dance has 4.1 % instead of 1.9, a spin falls (docs/validation/preparation-choices.md).
 """
 
 import numpy as np

@@ -48,7 +48,7 @@ _N, _W = 51, 57  # ends of the first blocks of errors: torques, wrench
 class FeasibleWeights:
     """Weights of the errors before squaring, per sampled instant.
 
-    Chosen on three walks and a run of the tuning half (`docs/validation/prepared-captures.md`). The jerk's weight
+    Chosen on three walks and a run of the tuning half (`docs/validation/preparation-choices.md`). The jerk's weight
     matters: with a smaller one two walks needed 21 and 9 % instead of 7 and 5, and with 5e-5 the run stood.
 
     Parameters

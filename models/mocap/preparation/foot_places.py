@@ -7,7 +7,7 @@ least, and the others are lifted (`stances.clearance`). Before and after the tur
 its place.
 
 As long as feet had one heading in a stance, snu/pirouette, whose foot turns by 275°, was 9.0° RMS from the capture
-instead of 3.7, and was followed with 12.3 instead of 7.2 % of weight (docs/validation/prepared-captures.md).
+instead of 3.7, and was followed with 12.3 instead of 7.2 % of weight (docs/validation/preparation-choices.md).
 """
 
 from collections.abc import Sequence
