@@ -60,7 +60,7 @@ def _as_given(curve: Trajectory) -> Trajectory:
 
 def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajectory]:
     # Imported late: loads splines, which a check of gains does not need.
-    from experiments.setups.modes.lead import s_curve
+    from experiments.setups.parts.leading_hand import s_curve
 
     return {"": s_curve()}
 

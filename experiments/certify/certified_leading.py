@@ -19,7 +19,8 @@ from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.modes.lead import leading, led_map
+from experiments.setups.modes.lead import leading
+from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip
 

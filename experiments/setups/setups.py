@@ -10,10 +10,11 @@ from experiments.config.run_config import RunConfig
 from experiments.setups.figure_maps import MAP_SETUPS
 from experiments.setups.modes.bunny import bunny_parts
 from experiments.setups.modes.follow import follow_parts
-from experiments.setups.modes.lead import lead_parts, led_clips, led_parts
+from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
 from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import MapParts, Parts
 from models.mocap.motion.clip import Clip
 

@@ -26,7 +26,7 @@ from controllers.walking.walked_path import STEP
 from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP, Conditions, Trial
-from experiments.setups.modes.lead import s_curve
+from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.hand.arm import Arm
 

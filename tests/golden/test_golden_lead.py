@@ -14,7 +14,8 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from controllers.walking.gait import Gait
 from controllers.walking.walker import walker_at
 from experiments.config.modes import Lead
-from experiments.setups.modes.lead import leading, leading_hand
+from experiments.setups.modes.lead import leading
+from experiments.setups.parts.leading_hand import leading_hand
 from sim.users.hand.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")

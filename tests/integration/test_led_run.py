@@ -10,6 +10,7 @@ import pytest
 from experiments.config.words import run_config
 from experiments.runs.run import run
 from experiments.setups.modes import lead
+from experiments.setups.parts import leading_hand
 from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow
@@ -102,7 +103,8 @@ def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
-    monkeypatch.setattr(lead, "_BEND", 0.4 * np.pi)
+    for module in (lead, leading_hand):
+        monkeypatch.setattr(module, "BEND", 0.4 * np.pi)
     clip = str(MOCAP / "deepmimic/humanoid3d_run.txt")
     run(run_config(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))

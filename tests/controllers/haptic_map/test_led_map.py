@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from controllers.walking.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.modes.lead import led_map
+from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded

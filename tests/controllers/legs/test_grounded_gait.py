@@ -6,7 +6,7 @@ import pytest
 from controllers.haptic_map.led import Led
 from controllers.legs.cyclic_runs import runs
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.modes.lead import led_map
+from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded

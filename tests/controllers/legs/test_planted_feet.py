@@ -12,7 +12,8 @@ from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
 from experiments.config.modes import Lead
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.modes.lead import leading, led_map
+from experiments.setups.modes.lead import leading
+from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip

@@ -23,7 +23,7 @@ from experiments.certify.certified_leading import certify_leading, leading_energ
 from experiments.certify.trial_simulation import Conditions, simulate
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
-from experiments.setups.modes.lead import s_curve
+from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted
 from models.mocap.library import embedded

@@ -17,18 +17,10 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
 from experiments.results.measures.lead_measures import LeadSummary, _Retrace, support_at
 from experiments.results.measures.soles import Soles
-from experiments.setups.modes.lead import (
-    gait_remark,
-    lead_parts,
-    leading,
-    leading_hand,
-    led_clips,
-    led_map,
-    led_parts,
-    s_curve,
-    walker_argument,
-)
+from experiments.setups.modes.lead import lead_parts, leading, walker_argument
 from experiments.setups.parts import clips
+from experiments.setups.parts.leading_hand import leading_hand, s_curve
+from experiments.setups.parts.led_figure import gait_remark, led_clips, led_map, led_parts
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.dynamics.contacts import contacts

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.setups.modes.lead import stances
+from experiments.setups.parts.led_figure import stances
 from models.mocap.dynamics.contacts import Contacts
 
 FPS, FRAMES = 100.0, 101

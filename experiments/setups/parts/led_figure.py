@@ -1,0 +1,180 @@
+"""Map parts of a led figure: the clip that is led, its map and gait, and remarks about both."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.led import Led
+from controllers.legs.cyclic_runs import runs
+from controllers.legs.limbs import Limb
+from controllers.motion.captures import Capture
+from controllers.state import Mask
+from controllers.walking.gait import Gait
+from experiments.config.maps import Led as LedMap
+from experiments.config.run_config import RunConfig
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.led_balance import balanced_on_ground
+from experiments.setups.parts.clips import BLINK, load_clips
+from experiments.setups.parts.leading_hand import s_curve
+from experiments.setups.parts.part_types import MapParts
+from models.humanoid.skeleton import CONTACT_RADIUS
+from models.mocap.dynamics.contacts import Contacts, contacts
+from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.spans import spans
+from models.mocap.preparation.laps import lap_of
+
+_PHASES = 256
+_UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
+_SWING = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
+
+
+@dataclass(frozen=True, kw_only=True)
+class LedParts(MapParts[Led]):
+    """Map parts of a led figure, with its gait."""
+
+    gait: Gait
+
+
+def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
+    """Map parts of a led figure.
+
+    Raises
+    ------
+    ParameterError
+        If there is not one clip, or it does not travel on foot.
+    """
+    if len(clips) != 1:
+        raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
+    made, gait = led_map(clips[0], figure_legs(figure))
+    return LedParts(
+        haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
+        refined=lambda: (balanced_on_ground(made, gait, figure), ()),
+        remarks=lap_remark(clips[0]) + gait_remark(clips[0].name, made),
+    )  # fmt: skip
+
+
+def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+    """The clip that is led, and remarks about it: prepared, or as captured if the prepared one has flights.
+
+    The flights of a prepared run are ballistic at the run's own pace only; a led figure moves at other paces and would
+    land early or late. A clip as captured is led by steps (`gait_remark`). Embedded clips are the same either way.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or a file cannot be read.
+    """
+    clips, remarks = load_clips(part.clips, part.raw)
+    if part.raw or all(contacts(clip).planted.any(axis=1).all() for clip in clips):
+        return clips, remarks
+    captured, remarks_captured = load_clips(part.clips, raw=True)
+    if all(np.array_equal(clip.poses, raw.poses) for clip, raw in zip(clips, captured, strict=True)):
+        return clips, remarks
+    names = ", ".join(clip.name for clip in captured)
+    return captured, (*remarks_captured, f"{names}: flies when prepared, and is led as captured, by steps")
+
+
+def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
+    """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
+
+    A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
+    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise.
+
+    Raises
+    ------
+    ParameterError
+        If the clip does not travel, or has no frame in which a foot stands.
+    """
+    lap, closes = lap_of(clip), clip.closes(CLOSES)
+    marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
+    clip = lap.clip
+    if not closes:
+        return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+    made = _led(clip, legs, marks.planted[:-1], None)
+    if made[0].flies and not made[0].grounds:
+        steps = _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+        return steps if steps[0].grounds else made
+    return made
+
+
+def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
+    """Map and gait of one lap; `stands` marks the feet on the floor in each of its frames but the last."""
+    phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
+    sampled = stands[np.round(phases * steps).astype(int) % steps]
+    support = sampled.sum(axis=1).astype(np.int64)
+    if not support.any():
+        raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
+    first = _middle_of_longest(support == support.max())
+    led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stands, capture)
+    if not led.flies:
+        support = np.maximum(support, 1)
+    speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
+    return led, Gait(led.stride, speed, np.roll(support, -first), led.reach, grounded)
+
+
+def lap_remark(clip: Clip) -> tuple[str, ...]:
+    """Remarks, if only a part of a clip is led, or if the clip does not repeat itself."""
+    lap, remarks = lap_of(clip), list[str]()
+    if lap.clip.n_frames < clip.n_frames:
+        remarks.append(
+            f"of the clip {clip.name!r} the lap that repeats itself best is led, {lap.start:.2f} to {lap.end:.2f} s"
+        )
+    if lap.gap > _UNLIKE:
+        remarks.append(
+            f"the clip {clip.name!r} does not repeat itself (its ends are {np.degrees(lap.gap):.0f}° apart): it is "
+            "closed over its ends, and the physical figure may fall there"
+        )
+    return tuple(remarks)
+
+
+def stances(marks: Contacts, fps: float) -> Mask:
+    """Stance of each foot of a capture, shape (n − 1, 2), for n frames of which the last begins the next lap.
+
+    Contact marks are cleaned in three steps. A foot that is up for less than `_SWING` stands throughout. Where no foot
+    is settled, one that stood and is still planted goes on standing: it has not left the floor, but sunk into it. A
+    flight shorter than `BLINK` is none: the feet that stood before it go on standing.
+    """
+    stands, rests = marks.settled[:-1], marks.planted[:-1]
+    n = len(stands)
+    for foot in range(stands.shape[1]):
+        for start, end in runs(~stands[:, foot]):
+            if end - start < _SWING * fps:
+                stands[np.arange(start, end) % n, foot] = True
+    for start, end in runs(~np.any(stands, axis=1)):
+        for sample in range(start, end):
+            stands[sample % n] = stands[sample % n - 1] & rests[sample % n]
+            if not stands[sample % n].any():
+                break
+    for start, end in runs(~np.any(stands, axis=1)):
+        if end - start < BLINK * fps:
+            stands[np.arange(start, end) % n] = stands[start - 1]
+    return stands
+
+
+def gait_remark(name: str, led: Led) -> tuple[str, ...]:
+    """Remark on a clip with flights: a body in the air falls with g, whatever the pace at which it is led."""
+    if led.flies and led.grounds:
+        return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
+    if led.grounds:
+        return (
+            f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
+            f"{led.pace * led.stride / led.duration:.1f} m/s",
+        )
+    if led.flies:
+        return (
+            f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any "
+            "pace, the physical figure may fall where it is slow",
+        )
+    return ()
+
+
+def _middle_of_longest(mask: Mask) -> int:
+    """Index of the middle of the longest run of True in a cyclic mask."""
+    n = len(mask)
+    if mask.all():
+        return 0
+    start = int(np.argmin(mask))
+    longest = max(spans(np.roll(mask, -start)), key=lambda span: span[1] - span[0])
+    return (sum(longest) // 2 + start) % n
