@@ -77,7 +77,8 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
 
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
     """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
-    return RiverChoice(bundle, given, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
+    pace = max(fastest(river.curve) for river in bundle.rivers)
+    return RiverChoice(bundle, given, pace, BESIDE * pace)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:

@@ -1,7 +1,6 @@
 """Crossing rivers as a run: the default three about a circle, or those of a lifted map."""
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -24,15 +23,17 @@ from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, Rive
 # In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
 # a hand that crosses at a right angle is not: the difference is √2. Without hysteresis rivers chatter after 4 ms.
 ADMISSION, HYSTERESIS = 1.2, 0.15
-BESIDE = 0.05  # hysteresis of rivers side by side, as those of a lifted map: position tells them apart, not direction
+# [m/s] least hysteresis of rivers that cross, that of the encoders' noise: with less of it a push out of a river at
+# 32 mm/s changes over 20 times in 0.3 s instead of once (docs/validation/crossing-rivers.md).
+LEAST_HYSTERESIS = 0.01
+BESIDE = 0.05  # the same of rivers side by side, as those of a lifted map: position tells them apart, not direction
 # In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
 # both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
-# [s] time constant of the velocity filter: encoders make 10 mm/s of noise, more than the smooth form's σ. The discrete
-# form, which has a hysteresis, needs it where that is more than a sixth of the rivers' speed: unfiltered, laps of 8 s
-# chatter between rivers and laps of 14 s throw a relaxed hand out (docs/validation/crossing-rivers.md).
+# [s] time constant of the low-pass of the velocity that selects a river. Encoders make 10 mm/s of noise, more than the
+# smooth form's σ; without it a push changes river up to eight times instead of twice, laps of 8 s chatter without a
+# push, and laps of 14 s throw a relaxed hand out (docs/validation/crossing-rivers.md).
 LOOK = 8e-3
-UNFILTERED = 0.06  # [m/s]
 GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
 WAVE = 0.6  # height of the wave as a share of the map's half width
 
@@ -76,15 +77,7 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
     bundle, _, pace, hysteresis = choice
     if mode.crossing == "sum":
         return bundle
-    return HigherOrder(
-        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis * pace, mode.crossing,
-        look_of(mode.crossing, pace),
-    )  # fmt: skip
-
-
-def look_of(crossing: Literal["discrete", "smooth"], pace: float) -> float:
-    """Time constant [s] of the low-pass of the velocity that selects a river of a speed [m/s]; 0 for none."""
-    return LOOK if crossing == "smooth" or pace < UNFILTERED else 0.0
+    return HigherOrder(bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis, mode.crossing, LOOK)
 
 
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
@@ -109,7 +102,8 @@ def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice
     bundle = river_bundle(curve, reach, river_time(mode), river_gains(mode)[1], mode.river_tube)
     led = tuple(replace(river, curve=paced(river.curve, river.drag, river.drag / river.tau)) for river in bundle.rivers)
     given = tuple(river.curve for river in bundle.rivers)
-    return RiverChoice(replace(bundle, rivers=led), given, curve.length / curve.duration, HYSTERESIS)
+    pace = curve.length / curve.duration
+    return RiverChoice(replace(bundle, rivers=led), given, pace, max(HYSTERESIS * pace, LEAST_HYSTERESIS))
 
 
 def drawn(bundle: RiverBundle) -> Static:

@@ -31,12 +31,14 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
 NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
-SLOWEST = 0.03  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
+SLOWEST = 0.0235  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
 _PACE = 0.0749  # [m/s] of the default rivers, at which these and `RIVER_PUSH` were measured
+_FASTEST = 0.2  # [m/s]: in faster rivers a push is as in these, for a harder one throws the hand out of all
+_WEAKER = 0.2  # power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind
 _AWAY = 1e-3  # [m] standard deviation of the start position
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
 
@@ -189,9 +191,10 @@ def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Pus
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     r"""Upward pushes from one default river into another, where the wave rises through the curve, once a lap.
 
-    At a share s of the default rivers' speed a push lasts 1/s times as long. Against a river's damping it then needs s
-    times the force, and against its stiffness the same force, since distances are the same: it gets √s times the force,
-    between the two. There is none in rivers slower than `SLOWEST`.
+    At s times the default rivers' speed a push lasts 1/s times as long. Against a river's damping it then needs s times
+    the force, and against its stiffness the same force, since distances are the same. In faster rivers, up to
+    `_FASTEST`, damping counts, and it gets s times the force; in slower ones it gets s^0.2 times, between the two.
+    There is none in rivers slower than `SLOWEST`.
 
     Parameters
     ----------
@@ -204,8 +207,8 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     pace = curve.length / lap
     if pace < SLOWEST:
         return ()
-    share = min(1.0, pace / _PACE)
+    share = min(pace, _FASTEST) / _PACE
     x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD / share))
-    over, force, up = _OVER / share, np.sqrt(share) * RIVER_PUSH, (0.0, 0.0, 1.0)
+    over, force = _OVER / share, share ** (1.0 if share > 1.0 else _WEAKER) * RIVER_PUSH
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
-    return tuple(Push(float(start), over, float(force), up, (x, y, z), NEAR) for start in starts)
+    return tuple(Push(float(start), over, force, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)

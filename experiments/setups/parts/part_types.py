@@ -72,7 +72,7 @@ class RiverChoice(NamedTuple):
     pace : float
         Reference speed [m/s] that scales the thresholds by which the law tells them apart (`rivers.law_of`).
     hysteresis : float
-        Margin in favour of the river that already has the hand, in units of `pace`.
+        Margin in favour of the river that already has the hand [m/s].
     """
 
     bundle: RiverBundle
