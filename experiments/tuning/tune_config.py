@@ -30,8 +30,8 @@ class Range:
         Whether it is sampled on a logarithmic scale.
     """
 
-    low: float
-    high: float
+    low: float = at_least(0.0)
+    high: float = at_least(0.0)
     log: bool = False
 
 
