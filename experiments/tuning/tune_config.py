@@ -10,7 +10,7 @@ from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import Users, Words, read_toml
+from experiments.trials.design.study_config import Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
 from sim.users.person.population import population
 
@@ -94,6 +94,19 @@ class TuneConfig:
     allow_unknown: bool = False
     seed: int = whole(0, default=1)
     storage: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse more trials than a study may have, also where another number of candidates is set.
+
+        Raises
+        ------
+        StudyError
+            If there are too many.
+        """
+        tasks = max(1, len(self.tasks))
+        for users, times, of in ((self.users, self.candidates, "candidates"), (self.held_back, 1, "result")):
+            made_of = f"{times} {of}, {users.number} users, {tasks} tasks, {self.repetitions} repetitions"
+            check_trials(f"tuning {self.name!r}", times * users.number * tasks * self.repetitions, made_of)
 
     @property
     def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:
