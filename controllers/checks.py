@@ -49,7 +49,7 @@ def _kinds(part: type) -> dict[str, object]:
 def of_kind(name: str, value: object, kind: object) -> None:
     """Refuse a value that is not of a kind: a class, a number, one of several words, a sequence of a kind, a union.
 
-    A truth value is no number, and arrays and functions are not looked at.
+    A truth value is no number and a class no object of it; what is an array or a function is not looked at.
 
     Raises
     ------
@@ -73,18 +73,27 @@ def numbers_of(name: str, values: npt.ArrayLike) -> Array:
 
 def _is(value: object, kind: Any) -> bool:
     origin, inner = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return True
     if origin in (Union, types.UnionType):
         return any(_is(value, one) for one in inner)
     if origin is Literal:
         return isinstance(value, str) and value in inner
     if origin in (tuple, Sequence):
-        several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
-        return several and all(_is(one, inner[0]) for one in cast(Sequence[object], value))
+        if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str | bytes):
+            return False
+        several = cast(Sequence[object], value)
+        return (_open(kind) or len(several) == len(inner)) and all(_is(one, inner[0]) for one in several)
     if kind in _NUMBERS:
         return isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool)
     if kind is bool:
         return isinstance(value, bool | np.bool_)
-    return not isinstance(kind, type) or isinstance(value, kind)
+    return not isinstance(kind, type) or (isinstance(value, kind) and not isinstance(value, type))
+
+
+def _open(kind: object) -> bool:
+    """Whether a sequence may have any length."""
+    return get_origin(kind) is not tuple or Ellipsis in get_args(kind)
 
 
 def _said(kind: Any) -> str:
@@ -94,5 +103,6 @@ def _said(kind: Any) -> str:
     if origin is Literal:
         return f"one of {', '.join(inner)}"
     if origin in (tuple, Sequence):
-        return f"a sequence, each {_said(inner[0])}"
+        several = "a sequence" if inner[0] is Any else f"a sequence, each {_said(inner[0])}"
+        return several if _open(kind) else f"{len(inner)} numbers"
     return _NUMBERS[kind][1] if kind in _NUMBERS else _WORDS.get(kind) or kind.__name__

@@ -3,7 +3,7 @@
 from importlib.metadata import version as installed
 from pathlib import Path
 
-from controllers.checks import checked
+from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
 from models.mocap.library import embedded, embedded_names, load_clip
 from models.mocap.motion.clip import Clip
@@ -28,6 +28,7 @@ def load(path: str | Path) -> Clip:
     ModelError
         If the file cannot be read, or its skeleton is not a human's.
     """
+    of_kind("path", path, str | Path)
     return load_clip(Path(path))
 
 

@@ -1,5 +1,6 @@
 """Arguments of another kind are refused where they are given, by name: curves, numbers, switches, weights, hands."""
 
+from collections.abc import Sequence
 from math import nan
 from typing import Any
 
@@ -53,7 +54,8 @@ def test_a_value_of_another_kind_is_refused_by_name(make: Any, name: str) -> Non
 def test_the_message_says_what_would_be_right() -> None:
     for kind, expected in (
         (Trajectory, "Trajectory"), (float, "a number"), (int, "a whole number"), (bool, "True or False"),
-        (Trajectory | None, "Trajectory or None"), (tuple[float, float], "a sequence, each a number"),
+        (Trajectory | None, "Trajectory or None"), (tuple[float, float], "2 numbers"),
+        (tuple[float, ...], "a sequence, each a number"), (Sequence[Trajectory], "a sequence, each Trajectory"),
     ):  # fmt: skip
         with pytest.raises(ParameterError, match=f"^curve is 'x'; expected {expected}$"):
             of_kind("curve", "x", kind)
@@ -67,6 +69,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
     for number in (np.float64(3.0), np.float32(3.0), np.int64(3), 3):
         check_kinds(Follow(CIRCLE, number, number, epsilon=number, parallel=np.bool_(True)))  # pyright: ignore
     of_kind("direction", np.zeros(3), tuple[float, float, float])
+    with pytest.raises(ParameterError, match=r"^direction is .*; expected 3 numbers$"):
+        of_kind("direction", (0.0, 1.0), tuple[float, float, float])
 
 
 @pytest.mark.parametrize("wrong", [None, "x", ["1", "2"], [[0.0], [1.0, 2.0]], {}, [True, False], [None, 1.0]])

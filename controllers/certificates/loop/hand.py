@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.checks import check_kinds
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -66,6 +67,9 @@ class HandRange:
     mass: tuple[float, float] = (0.0, 0.3)
     damping: tuple[float, float] = (0.0, 8.0)
     stiffness: tuple[float, float] = (0.0, 500.0)
+
+    def __post_init__(self) -> None:
+        check_kinds(self)
 
     def hands(self) -> list[HandImpedance]:
         """No hand, the corners and the middle.
