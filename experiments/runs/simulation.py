@@ -159,7 +159,11 @@ class User:
         ------
         ParameterError
             If an intent is given without a person, or turns with one.
+        SimError
+            If the Phantom does not reach what the hand traces.
         """
+        if self.traces is not None:
+            reached(self.traces)
         if self.intent is not None and self.person is None:
             raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
         if self.person is not None:

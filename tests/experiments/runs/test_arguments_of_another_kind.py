@@ -1,18 +1,23 @@
 """Arguments of `hvf` that are of another kind: refused where they are given, by name and with what would be right."""
 
+import re
+from dataclasses import replace
 from math import inf, nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hvf
+from experiments.cli import main
 
 CURVE = hvf.circle()
 DANCE, CHEER = hvf.clips("squat_dance", "cheer")
 MAP = hvf.Cylindrical([DANCE, CHEER], around=CURVE)
 SIM = hvf.Simulation(field=hvf.Follow(CURVE, 300.0, 8.0), haptic_map=MAP, figure=hvf.Figure(kind="none"))
 STUDY = hvf.Study.of(name="mine", factors={"stiffness": [100, 200]})
+HALF = hvf.Weight.constant(0.5)
 SPACE = {"field.k_r": (50.0, 200.0)}
 MADE: list[tuple[Any, dict[str, Any]]] = [
     (hvf.Cylindrical, {"clips": [DANCE], "around": CURVE, "reach": 0.02, "expressive": False}),
@@ -93,3 +98,21 @@ def test_a_panel_of_many_is_no_more_than_a_study() -> None:
     users = (hvf.User(),) * 3
     with pytest.raises(hvf.SimError, match="500000 candidates, 3 users are too many; expected at most 1000000 trials"):
         hvf.tune(SIM, SPACE, len, users, search=hvf.Search(candidates=500_000))  # pyright: ignore
+
+
+@pytest.mark.parametrize("radius", [0.09, 0.5])
+def test_a_curve_beyond_the_phantom_s_reach_is_refused_as_on_the_command_line(
+    radius: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "--radius", str(radius), "--figure", "none", "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err.removeprefix("hvf: ").strip()
+    assert "beyond the Phantom's stops" in said
+    far, rivers = hvf.circle(radius=radius), (hvf.River(CURVE), hvf.River(hvf.circle(radius=radius)))
+    bundle = hvf.RiverBundle(rivers, ("near", "far"))
+    higher = hvf.HigherOrder(bundle, admission=0.05, sigma=0.02)
+    tubes = hvf.StretchyTubes(far, k_f=100, k_s=100)
+    for field in (hvf.Follow(far, 300, 8), hvf.Bunny(far, 300, 8, 0.1), bundle, higher, tubes, rivers[1].gated(HALF)):
+        with pytest.raises(hvf.SimError, match=f"^{re.escape(said)}$"):
+            replace(SIM, field=field).session(1.0)
+    with pytest.raises(hvf.SimError, match=f"^{re.escape(said)}$"):
+        replace(SIM, user=hvf.User(traces=far)).session(1.0)
