@@ -5,7 +5,7 @@ A part is given by keyword. One that is wrong raises `ParameterError`: the optio
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any, TypeVar, cast, dataclass_transform, get_args
+from typing import Any, TypeVar, cast, dataclass_transform, get_args, get_origin
 
 import numpy as np
 from pydantic import ConfigDict, Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
@@ -157,7 +157,7 @@ def one_line(error: ValidationError, cls: type) -> str:
         return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
-    if kind == "value_error" and isinstance(context["error"], ParameterError):  # what parts say of each other
+    if kind == "value_error":  # what parts say of each other, and actions and persons of themselves
         return str(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
@@ -177,6 +177,9 @@ def _field(cls: type, place: Sequence[str | int]) -> Any:
 def _within(cls: type, place: Sequence[str | int]) -> type:
     """The part that is at a place of another."""
     for name in place:
+        if get_origin(cls) is dict:  # of parts by name
+            cls = get_args(cls)[1]
+            continue
         table = getattr(cls, "__pydantic_fields__", {})
         if name in table:
             cls = table[name].annotation

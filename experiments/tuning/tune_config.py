@@ -10,7 +10,7 @@ from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import Users, Words, check_trials, read_toml
+from experiments.trials.design.study_config import LONGEST, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
 from sim.users.person.population import population
 
@@ -86,7 +86,7 @@ class TuneConfig:
     held_back: Users = Users(number=12, seed=2)
     tasks: tuple[str, ...] = ()
     repetitions: int = whole(1, default=1)
-    seconds: float = above(0.0, default=6.0, unit="s")
+    seconds: float = above(0.0, default=6.0, unit="s", most=LONGEST)
     candidates: int = whole(1, default=40)
     sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
     prune: bool = True

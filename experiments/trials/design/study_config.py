@@ -13,6 +13,8 @@ from experiments.trials.design.errors import StudyError
 
 MOST_TRIALS = 1_000_000
 """Most trials of a study or a tuning: as many as the largest population has people."""
+LONGEST = 86_400.0
+"""Longest trial, a day [s]."""
 Words = dict[str, Any]
 """Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
 
@@ -81,7 +83,7 @@ class StudyConfig:
     measures: tuple[str, ...] = ()
     ease: str = "tracking_error"
     cost: str = "expressiveness"
-    seconds: float = above(0.0, default=8.0, unit="s")
+    seconds: float = above(0.0, default=8.0, unit="s", most=LONGEST)
     seed: int = whole(0, default=1)
     recordings: str = ""
 

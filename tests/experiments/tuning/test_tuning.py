@@ -11,8 +11,6 @@ from controllers.certificates.loop import governed
 from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from experiments.certify.kept_stability import Stability, kept_stability
-from experiments.cli import main
-from experiments.config.part import from_dict
 from experiments.config.run_config import load_config
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
@@ -186,22 +184,6 @@ def test_the_shipped_tunings_can_be_read(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_tuning_of_more_trials_than_a_study_may_have_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    many = 10**12
-    for values in ({"candidates": many}, {"repetitions": many}, {"users": {"number": many}},
-                   {"held_back": {"number": many, "seed": 3}}):  # fmt: skip
-        with pytest.raises(StudyError, match=f"{many}.* are too many; expected at most 1000000 trials"):
-            from_dict(TuneConfig, {"name": "mine", "space": {"stiffness": {"low": 1, "high": 2}}} | values, "mine.toml")
-    file, out = tmp_path / "mine.toml", tmp_path / "out"
-    file.write_text('name = "mine"\n[space]\nstiffness = { low = 50, high = 200 }\n', encoding="utf-8")
-    assert main(["tune", str(file), "--out", str(out), "--candidates", str(many)]) == 2
-    said = f"tuning 'mine': {many} candidates, 6 users, 1 tasks, 1 repetitions are too many"
-    assert capsys.readouterr().err == f"hvf: {said}; expected at most 1000000 trials\n"
-    assert not out.exists()
-
-
 def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
     assert kept_stability(run_config(mode="lead")).verdict == "unknown"
 
