@@ -1,5 +1,6 @@
 """Configuration of a tuning, read from a TOML file."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -173,6 +174,8 @@ def _check_space(config: TuneConfig, where: str) -> None:
             )
         if word in ("seed", "seconds"):
             raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
+    # A candidate lies anywhere between the bounds, where whole numbers are none.
+    config.config({word: span.low + (span.high - span.low) / math.pi for word, span in config.space.items()})
 
 
 def _check_objectives(config: TuneConfig, where: str) -> None:

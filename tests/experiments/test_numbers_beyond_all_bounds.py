@@ -69,6 +69,14 @@ def test_a_tuning_has_no_more_trials_than_a_study(tmp_path: Path, capsys: pytest
     assert not out.exists()
 
 
+def test_whole_numbers_are_no_space_of_a_tuning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = tmp_path / "mine.toml", tmp_path / "out"
+    file.write_text('name = "mine"\n[space]\nfigure_ticks = { low = 1, high = 3 }\n', encoding="utf-8")
+    assert main(["tune", str(file), "--out", str(out)]) == 2
+    assert "figure_ticks is 1.6" in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_one_of_many_people_is_drawn_alone() -> None:
     assert persona("7:2") == population(3, 7)[2]
     assert persona("7:999999").name == "7:999999"  # in no time, where a population of a million takes minutes
