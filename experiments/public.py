@@ -3,6 +3,7 @@
 from importlib.metadata import version as installed
 from pathlib import Path
 
+from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
 from models.mocap.library import embedded, embedded_names, load_clip
 from models.mocap.motion.clip import Clip
@@ -27,12 +28,19 @@ def load(path: str | Path) -> Clip:
     ModelError
         If the file cannot be read, or its skeleton is not a human's.
     """
+    of_kind("path", path, str | Path)
     return load_clip(Path(path))
 
 
 def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:
-    """A circle about the vertical axis of the hand frame H, with its radius [m] and the duration of a lap [s]."""
-    return Trajectory.circle(radius, lap)
+    """A circle about the vertical axis of the hand frame H, with its radius [m] and the duration of a lap [s].
+
+    Raises
+    ------
+    ControllerError
+        If one of them is no number, not positive, or not finite.
+    """
+    return Trajectory.circle(radius, checked("lap", lap, "s"))
 
 
 def version() -> str:

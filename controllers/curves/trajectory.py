@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import check_kinds, checked, numbers_of, of_kind
 from controllers.curves.bounds import capsule_tree
 from controllers.errors import CurveError
 from controllers.state import Array
@@ -107,7 +108,7 @@ def curve_acceleration(blob: Array, at: int, t: float) -> tuple[float, float, fl
 
 
 def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.array(values, dtype=np.float64)
+    array = numbers_of(f"{name} of a curve", values)
     if array.shape != shape:
         raise CurveError(f"{name} of a curve must have shape {shape}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -170,7 +171,8 @@ class Trajectory:
         return f"<{kind} curve of {len(points)} samples, {length:.3g} m in {self.duration:.3g} s>"
 
     def __post_init__(self) -> None:
-        n = np.asarray(self.times).size
+        check_kinds(self)
+        n = numbers_of("times of a curve", self.times).size
         least = 4 if self.periodic else 2
         if n < least:
             kind = "periodic" if self.periodic else "open"
@@ -223,12 +225,24 @@ class Trajectory:
             Samples a lap; 96 keep the spline within 1e-6 of the radius.
         wave : float
             a [m].
+
+        Raises
+        ------
+        ControllerError
+            If a number is none, negative or not finite, or the circle has no length.
         """
+        checked("radius", radius, "m")
+        checked("period", period, "s")
+        of_kind("samples", samples, int)
+        of_kind("wave", wave, float)
+        middle = numbers_of("centre", centre)
+        if middle.shape != (3,):
+            raise CurveError(f"the centre of a circle is {middle.tolist()}; expected three numbers")
         angle = np.linspace(0.0, 2.0 * np.pi, samples + 1)
         ring = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
         ring[:, 2] = wave * np.sin(3.0 * angle)
         ring[-1] = ring[0]
-        return Trajectory(period * angle / (2.0 * np.pi), np.asarray(centre, dtype=float) + ring, periodic=True)
+        return Trajectory(period * angle / (2.0 * np.pi), middle + ring, periodic=True)
 
     @cached_property
     def coefficients(self) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import numbers_of
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -31,7 +32,7 @@ def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tup
 
 def checked_speeds(name: str, values: npt.ArrayLike) -> Array:
     """Pairs of least and greatest speed [m/s] as an array of shape (m, 2); raises `ParameterError` if malformed."""
-    speeds = np.array(values, dtype=np.float64)
+    speeds = numbers_of(f"speeds of a {name}", values)
     if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
         raise ParameterError(
             f"speeds of a {name} must be finite and of shape (m, 2), m ≥ 2; their shape is {speeds.shape}"

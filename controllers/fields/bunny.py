@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked, one_of
+from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
 from controllers.fields.algebra.instructions import leave_trace
@@ -130,11 +130,10 @@ class Bunny(Law):
     pace: Literal["clock", "wait"] = "wait"
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("delta", self.delta, "m", least=1e-4, infinite=True)
-        one_of("attraction", self.attraction, ("point", "along", "convolution"))
-        one_of("pace", self.pace, ("clock", "wait"))
 
     @property
     def felt(self) -> FeltBunny:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import checked, one_of
+from controllers.checks import check_kinds, checked
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
@@ -173,10 +173,10 @@ class Edited(Law):
     pace: Literal["clock", "wait"] = "clock"
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         if len(self.weights) != len(self.performed) or not np.isfinite(self.weights).all():
             raise ParameterError(f"{len(self.performed)} performances need as many finite weights, got {self.weights}")
         checked("epsilon", self.epsilon, "m", least=1e-4)
-        one_of("pace", self.pace, ("clock", "wait"))
 
     @cached_property
     def _blobs(self) -> tuple[Array, ...]:

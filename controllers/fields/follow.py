@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked
+from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.fields.algebra.instructions import leave_trace
@@ -121,6 +121,7 @@ class Follow(Law):
     parallel: bool = False
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import checked
+from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
@@ -89,6 +89,7 @@ class Governor(Law):
     epsilon: float = 0.25
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("drag", self.drag, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
         object.__setattr__(self, "speeds", checked_speeds("governor", self.speeds))

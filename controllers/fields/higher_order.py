@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked, one_of
+from controllers.checks import check_kinds, checked
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
@@ -292,11 +292,11 @@ class HigherOrder(Law):
     look: float = 0.0
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("look", self.look, "s")
         checked("admission", self.admission, "m/s", least=1e-6)
         checked("sigma", self.sigma, "m/s", least=1e-6)
         checked("hysteresis", self.hysteresis, "m/s")
-        one_of("form", self.form, ("smooth", "discrete"))
 
     def _composed(self) -> Program:
         blocks: list[Array] = []

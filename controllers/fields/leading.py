@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked
+from controllers.checks import check_kinds, checked
 from controllers.fields.algebra.instructions import TRACE_SIZE, leave_place
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.walker_feed import WalkerFeed
@@ -114,6 +114,7 @@ class Leading(Law):
     b: float = 3.0
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         for name, unit in (("k_l", "N/m"), ("k_z", "N/m"), ("b", "N s/m")):
             checked(name, getattr(self, name), unit)
 

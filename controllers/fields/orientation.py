@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked
+from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
@@ -80,6 +80,7 @@ class Orientation(Law):
     epsilon: float = 0.25
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("k_o", self.k_o, "N m/rad")
         checked("b_o", self.b_o, "N m s/rad")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)

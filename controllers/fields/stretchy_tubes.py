@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked, one_of
+from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.deformation import (
     ANCHOR,
@@ -258,13 +258,13 @@ class StretchyTubes(Law):
     hold: Literal["curve", "stylus"] = "curve"
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         checked("k_f", self.k_f, "N/m")
         checked("k_s", self.k_s, "N/m")
         checked("b", self.b, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4)
         checked("until", self.until, "s", infinite=True)
         checked("ease", self.ease, "s")
-        one_of("hold", self.hold, ("curve", "stylus"))
         if np.isfinite(self.until) and self.then is None:
             raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
 

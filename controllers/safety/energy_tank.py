@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from controllers.checks import check_kinds
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -103,6 +104,7 @@ class EnergyTank:
     initial: float | None = None
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         for name in ("period", "power", "capacity", "drain_time", "initial"):
             value = getattr(self, name)
             if name == "initial" and value is None:

@@ -13,6 +13,7 @@ from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict, hash_of
+from controllers.checks import checked, of_kind
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Law
@@ -74,8 +75,12 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     Raises
     ------
     ParameterError
-        If its hand is a replayed one, which feels no force.
+        If an argument is of another kind, the delay is negative or not finite, or its hand is a replayed one, which
+        feels no force.
     """
+    of_kind("sim", sim, Simulation)
+    of_kind("hands", hands, HandRange | None)
+    checked("delay", delay, "s")
     phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))

@@ -1,8 +1,6 @@
 """Cached stability verdicts of runs: files named by a hash of all inputs, for callers that ask many times."""
 
 import json
-import os
-import tempfile
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ from controllers.certificates.report import Outcome, hash_of, leaving_out
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
+from experiments.files.whole_file import whole_file
 from experiments.setups.certified_law import governor_drag, left_out
 from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import kept_folder
@@ -80,7 +79,5 @@ def _found(config: RunConfig, hands: HandRange) -> Stability:
 
 def _write(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(name, path)
+    with whole_file(path) as file:
+        file.write(text.encode())

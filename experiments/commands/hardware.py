@@ -40,8 +40,8 @@ class Doctor:
 
     device: str | None = None
     """Also open this device, and measure how it answers with its motors off; a name of `hvf hardware list`."""
-    seconds: Annotated[float, above(0.0, unit="s")] = 1.0
-    """How long to measure [s]."""
+    seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
+    """How long to measure, an hour at most [s]."""
     json: bool = False
     """Print the findings as JSON."""
 

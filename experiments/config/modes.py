@@ -222,7 +222,7 @@ class Lead:
     kind: Literal["lead"] = "lead"
     leash: float = at_least(0.0, default=120.0, unit="N/m", most=MOST_STIFFNESS)
     damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
-    floor_scale: float | None = at_least(1e-3, default=None)
+    floor_scale: float | None = at_least(1e-3, default=None, most=1e4)
 
 
 Mode = Annotated[Follow | Bunny | Rivers | Stretch | StretchThenFollow | Lead, Field(discriminator="kind")]

@@ -5,10 +5,12 @@ A part is given by keyword. One that is wrong raises `ParameterError`: the optio
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any, TypeVar, cast, dataclass_transform, get_args
+from typing import Any, TypeVar, cast, dataclass_transform, get_args, get_origin
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+import numpy as np
+from pydantic import ConfigDict, Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from controllers.errors import ParameterError
 
@@ -40,6 +42,7 @@ def above(least: float, *, default: Any = ..., unit: str = "", most: float = MOS
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
 def part(cls: type[_Part]) -> type[_Part]:
     """Make a class a part of a configuration."""
+    cast(Any, cls).__get_pydantic_core_schema__ = classmethod(_schema)
     made = cast(Any, checked_dataclass(config=_CONFIG, frozen=True, kw_only=True)(cls))  # pyright: ignore
     init = made.__init__
 
@@ -51,6 +54,44 @@ def part(cls: type[_Part]) -> type[_Part]:
 
     made.__init__ = __init__
     return cast(type[_Part], made)
+
+
+def _schema(cls: type, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+    """Pydantic's schema of a part, in which neither text nor a truth value stands for a number, nor these for a bool.
+
+    Pydantic's own strict mode is not used: it also refuses lists for tuples, and NumPy's whole numbers.
+    """
+    return _uncoerced(handler.resolve_ref_schema(handler(source)), handler)
+
+
+def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
+    if isinstance(schema, list):
+        return [_uncoerced(inner, handler) for inner in cast(list[Any], schema)]
+    if not isinstance(schema, dict):
+        return schema
+    inner = cast(dict[str, Any], schema)
+    kind = inner.get("type")
+    if kind == "definition-ref":
+        inner = {**handler.resolve_ref_schema(cast(CoreSchema, inner))}
+        if hasattr(inner["cls"], "__get_pydantic_core_schema__"):
+            return schema
+        del inner["ref"]  # a dataclass that is no part, such as a push
+    check = _number if kind in ("float", "int") else _truth if kind == "bool" else None
+    if check is not None:
+        return core_schema.no_info_before_validator_function(check, cast(CoreSchema, inner))
+    return {key: _uncoerced(value, handler) for key, value in inner.items()}
+
+
+def _number(value: object) -> object:
+    if isinstance(value, str | bytes | bool | np.bool_):
+        raise PydanticCustomError("number", "expected a number")
+    return value
+
+
+def _truth(value: object) -> object:
+    if not isinstance(value, bool | np.bool_):
+        raise PydanticCustomError("truth", "expected true or false")
+    return value
 
 
 def to_json(value: object) -> str:
@@ -116,7 +157,7 @@ def one_line(error: ValidationError, cls: type) -> str:
         return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
-    if kind == "value_error" and isinstance(context["error"], ParameterError):  # what parts say of each other
+    if kind == "value_error":  # what parts say of each other, and actions and persons of themselves
         return str(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
@@ -136,6 +177,9 @@ def _field(cls: type, place: Sequence[str | int]) -> Any:
 def _within(cls: type, place: Sequence[str | int]) -> type:
     """The part that is at a place of another."""
     for name in place:
+        if get_origin(cls) is dict:  # of parts by name
+            cls = get_args(cls)[1]
+            continue
         table = getattr(cls, "__pydantic_fields__", {})
         if name in table:
             cls = table[name].annotation

@@ -300,7 +300,7 @@ class ArmConfig:
     stiffness: Annotated[float, at_least(0.0, unit="N/m", most=MOST_STIFFNESS)] = 300.0
     damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPING)] = 8.0
     tube: Annotated[float, at_least(1e-4, unit="m", infinite=True)] = 0.25
-    lap: Annotated[float, above(0.0, unit="s")] = 4.0
+    lap: Annotated[float, at_least(0.1, unit="s")] = 4.0
     radius: Annotated[float, above(0.0, unit="m")] = 0.05
     cutoff: Annotated[float, above(0.0, unit="Hz")] = 150.0
     smoothing: Annotated[float, above(0.0, unit="Hz")] = 6.0

@@ -127,6 +127,7 @@ def run_config(
         interval.
     """
     given = dict(words)
+    _check_kinds(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
     mode_cls = _named("mode", mode, MODES)
     if mode == "lead":
         wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
@@ -158,6 +159,22 @@ def run_config(
     )  # fmt: skip
     taken.check_empty()
     return config
+
+
+def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
+    """Refuse names that are no text, switches that are neither on nor off, and what only stands inside a part."""
+    for name, value in chosen.items():
+        if not isinstance(value, str):
+            raise ParameterError(f"--{name} is {value!r}; expected a name")
+    for name in ADDED:
+        if not isinstance(words.get(name, False), bool):
+            raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
+    for name in sorted({"around", "does", "file", "run"} & words.keys()):
+        raise _unknown(f"--{name}")
+
+
+def _unknown(option: str) -> ParameterError:
+    return ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
 
 
 def _with_person(words: dict[str, Any]) -> dict[str, Any]:
@@ -214,7 +231,7 @@ class _Words:
             owners = [_kind(cls) for cls in MODES if name in _names(cls)]
         option = "--" + name.replace("_", "-")
         if not owners:
-            raise ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
+            raise _unknown(option)
         raise ParameterError(f"{option} has no meaning with {self._chosen}; it belongs to {', '.join(owners)}")
 
 

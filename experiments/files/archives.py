@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers.state import Array
+from experiments.files.whole_file import whole_file
 from sim.errors import SimError
 
 VERSION = 1
@@ -15,7 +16,7 @@ _MAKERS = {"map": "hvf lift", "field": "save_field"}
 
 
 def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
-    """Write arrays; an existing file is replaced.
+    """Write arrays; an existing file is replaced, once all are written.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
     arrays : mapping of str to Array
         Arrays by key.
     """
-    with path.open("wb") as file:
+    with whole_file(path) as file:
         # Arrays are stored under numbers, as a key need not be a valid file name.
         numbered = {str(i): value for i, value in enumerate(arrays.values())}
         np.savez(

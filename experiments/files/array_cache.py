@@ -1,8 +1,6 @@
 """Disk cache of arrays that take long to compute, under a hash of everything on which they depend."""
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
+from experiments.files.whole_file import whole_file
 
 
 def kept_array(
@@ -82,11 +81,5 @@ def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
 def _write(path: Path, content: bytes) -> None:
     """Write a file atomically, also when two processes write it at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(name, path)
-    except OSError:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with whole_file(path) as file:
+        file.write(content)

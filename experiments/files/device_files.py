@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
+from experiments.files.whole_file import whole_file
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified
@@ -93,8 +94,9 @@ def calibrated_json(
 
 
 def save_device(content: Mapping[str, object], path: Path) -> None:
-    """Write a device file."""
-    path.write_text(json_text(content) + "\n", encoding="utf-8")
+    """Write a device file; an existing one is replaced, once all is written."""
+    with whole_file(path) as file:
+        file.write(f"{json_text(content)}\n".encode())
 
 
 def read_device_file(path: Path) -> dict[str, Any]:
@@ -113,7 +115,7 @@ def read_device_file(path: Path) -> dict[str, Any]:
         calibration_from(content)
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected a device file") from None
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise SimError(
             f"{path}: no device file ({error}); expected what hvf hardware identify or calibrate writes"
         ) from None

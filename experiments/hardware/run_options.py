@@ -62,8 +62,8 @@ class CalibrateHardware:
     """A device as `hvf hardware list` names it, or "emulated"."""
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """The joint angles θ1, θ2, θ3 at which the stylus is held, in a fixture or at its reset pose [rad]."""
-    seconds: Annotated[float, above(0.0, unit="s")] = 1.0
-    """How long it is read [s]."""
+    seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
+    """How long it is read, an hour at most [s]."""
     out: Path = Path("device.json")
     """Device file to write; what an existing one says of friction, inertia and delay is kept."""
     overwrite: bool = False

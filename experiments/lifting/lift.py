@@ -296,7 +296,7 @@ def lift_into(
     overwrite: bool,
     raw: bool = False,
 ) -> LiftReport:
-    """Lift clips, write the map to a file, and measure it; arguments as in `lift_clips`.
+    """Lift clips, measure the map, and write it to a file at the very end; arguments as in `lift_clips`.
 
     Raises
     ------
@@ -309,7 +309,7 @@ def lift_into(
         raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
     if out.exists() and not overwrite:
         raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
-    lifted = lift_clips(names, room, cyclic, seed, raw)
+    report = report_lift(lift_clips(names, room, cyclic, seed, raw), seed)
     out.parent.mkdir(parents=True, exist_ok=True)
-    save_map(lifted.haptic_map, out)
-    return report_lift(lifted, seed)
+    save_map(report.lifted.haptic_map, out)
+    return report

@@ -12,6 +12,7 @@ from typing import Any
 
 from rich.console import Console
 
+from controllers.checks import of_kind
 from controllers.state import Array
 from experiments.files.json_text import json_text
 from experiments.results.folder import (
@@ -117,6 +118,7 @@ class Run:
         ModelError
             If the file exists and is not to be overwritten.
         """
+        of_kind("path", path, str | Path)
         target = Path(path)
         if target.exists() and not overwrite:
             raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")

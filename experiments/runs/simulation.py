@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from rich.console import Console
 
+from controllers.checks import check_kinds, of_kind
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
@@ -74,6 +75,9 @@ class Cylindrical:
     reach: float = 0.025
     expressive: bool = False
 
+    def __post_init__(self) -> None:
+        _check_map(self)
+
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         return cylindrical_parts(tuple(self.clips), _place(self), world.figure)
@@ -96,9 +100,18 @@ class Composite:
     reach: float = 0.025
     expressive: bool = False
 
+    def __post_init__(self) -> None:
+        _check_map(self)
+
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         return composite_parts(tuple(self.clips), _place(self), world.figure)
+
+
+def _check_map(part: Cylindrical | Composite) -> None:
+    check_kinds(part)
+    if not 0.0 < part.reach < np.inf:
+        raise ParameterError(f"reach is {part.reach:g}; expected more than 0 m, and finite")
 
 
 def _place(part: Cylindrical | Composite) -> Place:
@@ -130,6 +143,9 @@ class User:
     person: Person | None = None
     intent: PersonIntent | None = None
 
+    def __post_init__(self) -> None:
+        check_kinds(self)
+
     @property
     def acts(self) -> bool:
         """Whether the hand does anything of itself, or is a person's."""
@@ -143,7 +159,11 @@ class User:
         ------
         ParameterError
             If an intent is given without a person, or turns with one.
+        SimError
+            If the Phantom does not reach what the hand traces.
         """
+        if self.traces is not None:
+            reached(self.traces)
         if self.intent is not None and self.person is None:
             raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
         if self.person is not None:
@@ -242,6 +262,9 @@ class Simulation:
         ModelError, ControllerError, SimError
             If its parts do not fit together.
         """
+        of_kind("seconds", seconds, float | None)
+        if seconds is not None and not 0.0 < seconds < np.inf:
+            raise ParameterError(f"seconds is {seconds:g}; expected more than 0 s, and finite")
         world, console = World(self.scene, self.figure.kind), Console(stderr=True)
         device, span = device_of(self, world, seconds), seconds or _MINUTE
         given = self.haptic_map
@@ -288,6 +311,8 @@ class Simulation:
         ModelError, ControllerError, SimError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
+        of_kind("seconds", seconds, float)
+        of_kind("record", record, str | Path | None)
         if record is not None and not str(record):
             raise ParameterError("record is empty; expected a folder, or None for a temporary one")
         least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
@@ -337,11 +362,10 @@ _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
 def _check_kinds(sim: Simulation) -> None:
     """Refuse parts of another kind by name, with what would be right."""
     for name, (kinds, expected) in _KINDS.items():
-        if not isinstance(getattr(sim, name), kinds):
+        if not isinstance(getattr(sim, name), kinds) or isinstance(getattr(sim, name), bool):
             raise ParameterError(f"{name} is {getattr(sim, name)!r}; expected {expected}")
-    if not (isinstance(sim.haptic_map, HapticMap) or hasattr(sim.haptic_map, "parts")):
-        raise ParameterError(
-            f"haptic_map is {sim.haptic_map!r}; expected a map, such as hvf.Cylindrical(clips, around=curve)"
-        )
+    given = sim.haptic_map
+    if isinstance(given, type) or not (isinstance(given, HapticMap) or hasattr(given, "parts")):
+        raise ParameterError(f"haptic_map is {given!r}; expected a map, such as hvf.Cylindrical(clips, around=curve)")
     if not 0 <= sim.seed < 2**63:
         raise ParameterError(f"seed is {sim.seed!r}; expected {_KINDS['seed'][1]}")

@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass
 from dataclasses import replace as replaced
 from typing import Any, NamedTuple, cast
 
+from controllers.checks import of_kind
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
@@ -50,10 +51,20 @@ def sweep(
     Raises
     ------
     ParameterError
-        If there is no such parameter, or several laws have it; or if there is no thread.
+        If there is no such parameter, or several laws have it; there is no thread; or an argument is of another kind.
     """
+    of_kind("sim", sim, Simulation)
+    of_kind("values", values, Mapping)
+    for path, several in values.items():
+        of_kind(path, several, Sequence[Any])
+    of_kind("seconds", seconds, float)
+    of_kind("threads", threads, int)
     if threads < 1:
         raise ParameterError(f"threads is {threads}; expected 1 or more")
+    return _swept(sim, values, seconds, threads)
+
+
+def _swept(sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float, threads: int) -> Iterator[Swept]:
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
     simulations = [with_values(sim, chosen) for chosen in combinations]
 

@@ -15,6 +15,7 @@ from controllers.state import STYLUS_POSE, Array
 from experiments.config.run_config import ArmConfig
 from experiments.setups.parts.budget import fastest, tank_for
 from experiments.setups.parts.hands import lap_pushes
+from experiments.setups.parts.pace import reached
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
 from models.world.scene import PHANTOM
 from sim.body.robot import robot_state
@@ -73,7 +74,7 @@ def wire_arm(
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     world = RobotWorld(config.scene)
-    curve = tilted_circle(config.radius, config.lap)
+    curve = reached(tilted_circle(config.radius, config.lap))
     program = Follow(curve, config.stiffness, config.damping, config.tube).program()
     period = config.scene.servo_period
     limiter = ForceLimiter(period)

@@ -1,13 +1,15 @@
 """Wiring: from a configuration to a linked servo with stylus and figure in their start state (`wire`)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from controllers.curves.stylus import UPRIGHT
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.higher_order import HigherOrder
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, Array, HandState
@@ -18,6 +20,7 @@ from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.devices import DeviceOf, device_of
 from experiments.setups.parts.eyes import POSES, with_eyes
 from experiments.setups.parts.hands import Beginning, beginning
+from experiments.setups.parts.pace import reached
 from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
@@ -126,6 +129,8 @@ def assemble(
         As `wire`.
     """
     draft = parts_of(maps)
+    for curve in _curves(draft):
+        reached(curve)
     ready(_units(draft, _servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
     refined = maps.refine() if world.has_figure else maps
@@ -136,6 +141,15 @@ def assemble(
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks)
+
+
+def _curves(parts: Parts) -> Iterator[Trajectory]:
+    """Curves of the laws of a field."""
+    for law in parts.program.laws:
+        if isinstance(law, HigherOrder):
+            yield from (river.curve for river in law.bundle.rivers)
+        elif isinstance(curve := getattr(law, "curve", None), Trajectory):
+            yield curve
 
 
 def check_rates(settings: Settings) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from controllers.checks import check_kinds, of_kind
 from experiments.certify.kept_stability import kept_stability
 from experiments.config.part import to_json
 from experiments.files.json_text import json_text
@@ -79,6 +80,9 @@ class Study:
     config: StudyConfig
     text: str = ""
 
+    def __post_init__(self) -> None:
+        check_kinds(self)
+
     @staticmethod
     def load(path: str | Path) -> "Study":
         """The study in a TOML file.
@@ -88,6 +92,7 @@ class Study:
         SimError, ControllerError
             If it cannot be read, or contains an unknown entry.
         """
+        of_kind("path", path, str | Path)
         file = Path(path)
         config = study_from(read_toml(file, "a study"), str(file))
         return Study(config, file.read_text(encoding="utf-8"))
@@ -136,6 +141,7 @@ class Study:
         ModelError, ControllerError, SimError, OSError
             If the study contradicts itself, or cannot go on; completed trials are kept.
         """
+        of_kind("out", out, str | Path)
         console, folder, where = (
             console or Console(stderr=True),
             Path(out),

@@ -10,11 +10,13 @@ from typing import Any, Literal
 import numpy as np
 
 from controllers.certificates.report import hash_of
+from controllers.checks import check_kinds, of_kind
 from controllers.errors import ParameterError
 from experiments.certify.certify_simulation import certify
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
+from experiments.trials.design.study_config import MOST_TRIALS, check_trials
 
 Cost = Callable[[Run], float | Sequence[float]]
 
@@ -39,6 +41,11 @@ class Search:
         Storage from which the search can be continued: a file, or a database such as ``sqlite:///``.
     seed : int
         Seed of the search.
+
+    Raises
+    ------
+    ParameterError
+        If a value is of another kind, or a number out of its interval.
     """
 
     candidates: int = 30
@@ -48,6 +55,14 @@ class Search:
     allow_unknown: bool = False
     journal: str | Path | None = None
     seed: int = 1
+
+    def __post_init__(self) -> None:
+        check_kinds(self)
+        for name in ("candidates", "costs", "threads"):
+            if not 1 <= getattr(self, name) <= MOST_TRIALS:
+                raise ParameterError(f"{name} is {getattr(self, name)}; expected 1 to {MOST_TRIALS}")
+        if not 0 <= self.seed < 2**63:
+            raise ParameterError(f"seed is {self.seed}; expected 0 or more and less than {2**63}")
 
 
 @dataclass(frozen=True)
@@ -107,7 +122,13 @@ def tune(
 
     from experiments.tuning.samplers import REFUSED_MOST
 
+    of_kind("sim", sim, Simulation)
+    of_kind("panel", panel, Sequence[User])
+    of_kind("search", search, Search | None)
+    if not callable(cost):
+        raise ParameterError(f"cost is {cost!r}; expected a function of a run")
     search, users = search or Search(), tuple(panel) or (sim.user,)
+    check_trials("tuning", search.candidates * len(users), f"{search.candidates} candidates, {len(users)} users")
     _check_space(space)
     # A session in the middle of the space: reports unknown parameters and compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
@@ -136,9 +157,11 @@ def tune(
 
 def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
     """Refuse a space without parameters, and a range that is none."""
+    of_kind("space", space, Mapping)
     if not space:
         raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
     for path, bounds in space.items():
+        of_kind(path, bounds, Sequence[float])
         if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
 

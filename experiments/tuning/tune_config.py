@@ -1,5 +1,6 @@
 """Configuration of a tuning, read from a TOML file."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -10,7 +11,7 @@ from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import Users, Words, read_toml
+from experiments.trials.design.study_config import LONGEST, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
 from sim.users.person.population import population
 
@@ -30,8 +31,8 @@ class Range:
         Whether it is sampled on a logarithmic scale.
     """
 
-    low: float
-    high: float
+    low: float = at_least(0.0)
+    high: float = at_least(0.0)
     log: bool = False
 
 
@@ -86,7 +87,7 @@ class TuneConfig:
     held_back: Users = Users(number=12, seed=2)
     tasks: tuple[str, ...] = ()
     repetitions: int = whole(1, default=1)
-    seconds: float = above(0.0, default=6.0, unit="s")
+    seconds: float = above(0.0, default=6.0, unit="s", most=LONGEST)
     candidates: int = whole(1, default=40)
     sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
     prune: bool = True
@@ -94,6 +95,19 @@ class TuneConfig:
     allow_unknown: bool = False
     seed: int = whole(0, default=1)
     storage: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse more trials than a study may have, also where another number of candidates is set.
+
+        Raises
+        ------
+        StudyError
+            If there are too many.
+        """
+        tasks = max(1, len(self.tasks))
+        for users, times, of in ((self.users, self.candidates, "candidates"), (self.held_back, 1, "result")):
+            made_of = f"{times} {of}, {users.number} users, {tasks} tasks, {self.repetitions} repetitions"
+            check_trials(f"tuning {self.name!r}", times * users.number * tasks * self.repetitions, made_of)
 
     @property
     def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:
@@ -160,6 +174,8 @@ def _check_space(config: TuneConfig, where: str) -> None:
             )
         if word in ("seed", "seconds"):
             raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
+    # A candidate lies anywhere between the bounds, where whole numbers are none.
+    config.config({word: span.low + (span.high - span.low) / math.pi for word, span in config.space.items()})
 
 
 def _check_objectives(config: TuneConfig, where: str) -> None:

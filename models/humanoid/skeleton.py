@@ -8,6 +8,7 @@ every segment's frame is parallel to the world: a segment's global orientation *
 
 from dataclasses import dataclass
 from importlib.resources import files
+from numbers import Real
 from typing import Literal, NamedTuple
 
 import mujoco
@@ -143,7 +144,9 @@ def torque_limit(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -
 
 
 def rest_pose(stature: float = DEFAULT_STATURE) -> Pose:
-    """The T-pose with the soles on the floor, shape (75,)."""
+    """The T-pose with the soles on the floor, shape (75,); raises `ModelError` for a stature that is none."""
+    if not (isinstance(stature, Real) and 0.0 < stature < np.inf):
+        raise ModelError(f"stature is {stature!r}; expected more than 0 m, and finite")
     pose = np.zeros(N_POSE)
     pose[3::4] = 1.0
     pose[2] = 0.9286 * stature / DEFAULT_STATURE

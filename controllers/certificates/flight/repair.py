@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from controllers.certificates.interrupts import heeding_interrupts
 from controllers.errors import ControllerError, ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
@@ -175,7 +176,8 @@ def repair(task: RepairTask) -> RepairPlan:
     opti.minimize(cost / n)
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 500, "tol": 1e-6})
     try:
-        solution = opti.solve()
+        with heeding_interrupts():
+            solution = opti.solve()
     except RuntimeError:
         raise RepairError(
             f"no feasible neighbour of {len(task.flights)} flights in {n} frames was found "

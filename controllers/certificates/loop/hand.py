@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
+from controllers.checks import check_kinds
 from controllers.errors import ParameterError
 from controllers.state import Array
+
+_MOST_MASS = 1e3  # [kg] beyond any hand, and within what the eigenvalues of the loop bear
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class HandImpedance:
     Raises
     ------
     ParameterError
-        If one is negative or not finite.
+        If one is negative, not finite, or beyond any hand's.
     """
 
     mass: float = 0.0
@@ -30,10 +34,12 @@ class HandImpedance:
     stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("mass", "damping", "stiffness"):
+        for name, most in (("mass", _MOST_MASS), ("damping", MOST_DAMPING), ("stiffness", MOST_STIFFNESS)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
+            if value > most:
+                raise ParameterError(f"{name} of a hand must be at most {most:g}, got {value:g}")
 
     def __str__(self) -> str:
         """Description with units."""
@@ -66,6 +72,9 @@ class HandRange:
     mass: tuple[float, float] = (0.0, 0.3)
     damping: tuple[float, float] = (0.0, 8.0)
     stiffness: tuple[float, float] = (0.0, 500.0)
+
+    def __post_init__(self) -> None:
+        check_kinds(self)
 
     def hands(self) -> list[HandImpedance]:
         """No hand, the corners and the middle.

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from controllers.errors import ParameterError
 
+MOST_PERIODS = 128  # of a delay: the loop has three states for each, and the time for its eigenvalues grows cubically
+
 
 @dataclass(frozen=True)
 class Sampling:
@@ -22,7 +24,8 @@ class Sampling:
     Raises
     ------
     ParameterError
-        If the period or the cutoff is not positive, the delay negative, or one of them not finite.
+        If the period or the cutoff is not positive, the delay negative or longer than 128 periods, or one of them not
+        finite.
     """
 
     period: float
@@ -35,6 +38,9 @@ class Sampling:
             raise ParameterError(f"period and cutoff of a loop must be positive and finite, got {self}")
         if self.delay < 0.0:
             raise ParameterError(f"the delay of a loop must be at least 0 s, got {self.delay}")
+        if self.delay > MOST_PERIODS * self.period:
+            most = f"{MOST_PERIODS} periods of {self.period:g} s"
+            raise ParameterError(f"the delay of a loop must be at most {most}, got {self.delay} s")
 
     @property
     def keep(self) -> float:

@@ -13,7 +13,7 @@ from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFF
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.linear_loop import LinearLoop, linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.sampling import MOST_PERIODS, Sampling
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, Mask
@@ -114,7 +114,7 @@ def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
         later = SampledLoop(loop.linear, replace(loop.sampling, delay=delay + extra))
         return bool(later.radius(k_r, b_d).max() < 1.0)
 
-    steps = 0.25 * period * np.arange(4 * LATEST)
+    steps = 0.25 * period * np.arange(int(4.0 * min(LATEST, MOST_PERIODS - delay / period)))
     first = next((extra for extra in steps if not stable(float(extra))), np.inf)
     if first == 0.0 or np.isinf(first):
         return float(first)

@@ -34,6 +34,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from controllers.certificates.interrupts import heeding_interrupts
 from controllers.state import Array
 
 SERIES = 12  # terms of the exponential of a period: the remainder is below 1e-9 while b_h T/μ < 1
@@ -254,17 +255,21 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
         "ipopt.max_iter": 200,
         "show_eval_warnings": False,
     }
-    first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
+    with heeding_interrupts():
+        first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(
         [_first_guess(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
     )
-    found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
+    with heeding_interrupts():
+        found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
     if found[-1] > -1e-3:
         return None
     held_up = sum(form.gains) / (2.0 * rate)
     goal = ca.substitute(size + PUSH_WEIGHT * held_up + 0.3 * barrier, s, ca.SX(0.0))
-    second = ca.nlpsol("second", "ipopt", {"x": x, "f": goal}, options)
-    values = np.array(second(x0=found[:-1])["x"]).ravel()
+    with heeding_interrupts():
+        second = ca.nlpsol("second", "ipopt", {"x": x, "f": goal}, options)
+    with heeding_interrupts():
+        values = np.array(second(x0=found[:-1])["x"]).ravel()
     found = form_of(values.tolist())
     return found._replace(
         alpha=np.array(found.alpha), beta=np.array(found.beta), hand=np.array(found.hand), gains=tuple(found.gains)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.checks import checked
+from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.description import parts_of
@@ -28,7 +28,7 @@ from controllers.fields.algebra.walker_feed import WalkerFeed, Walkers, feed_wal
 from controllers.fields.algebra.weights import WEIGHT_SIZE, Weight
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
-from controllers.state import HAND_POSITION, Array, HandState, IntArray, Wrench
+from controllers.state import HAND_POSITION, HAND_SIZE, Array, HandState, IntArray, Wrench
 from controllers.walking.walking import follow_hand
 
 
@@ -54,6 +54,9 @@ class Law(ABC):
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
+        of_kind("hand", hand, HandState)
+        if (size := len(hand.vector())) != HAND_SIZE:
+            raise ParameterError(f"the hand has {size} numbers; expected {HAND_SIZE}, of t, p, q, v, w and switch")
         program, wrench = self.program(), np.empty(6)
         memory = program.fresh_memory()
         program.feed(memory, hand)
@@ -66,6 +69,7 @@ class Law(ABC):
 
     def __add__(self, other: "Law") -> "Program":
         """Sum of two fields."""
+        of_kind("the other field", other, Law)
         return self.program().joined(other.program(), Join.ADD)
 
     def __rmul__(self, factor: float) -> "Program":
@@ -74,10 +78,13 @@ class Law(ABC):
 
     def gated(self, weight: Weight) -> "Program":
         """Field times a weight: s F."""
+        of_kind("weight", weight, Weight)
         return self.program().followed(Join.GATE, weight.row)
 
     def blended(self, other: "Law", weight: Weight) -> "Program":
         """Blend of two fields: (1 − s) F + s F'."""
+        of_kind("other", other, Law)
+        of_kind("weight", weight, Weight)
         return self.program().joined(other.program(), Join.BLEND, weight.row)
 
     def limited(self, force: float, torque: float = np.inf) -> "Program":

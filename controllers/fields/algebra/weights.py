@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import numbers_of, of_kind
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
@@ -78,19 +79,25 @@ class Weight:
     @staticmethod
     def constant(s: float) -> "Weight":
         """Constant weight: any finite number, so that it can also scale a field or reverse its sign."""
+        of_kind("s", s, float)
         return _weight(_CONSTANT, s)
 
     @staticmethod
     def ball(centre: npt.ArrayLike, radius: float) -> "Weight":
         """Window w(|p − c|/r) about a centre c in H [m]: 1 at the centre, 0 from the radius r [m] on."""
-        x, y, z = np.asarray(centre, dtype=float)
+        place = numbers_of("centre", centre)
+        of_kind("radius", radius, float)
+        if place.shape != (3,):
+            raise ParameterError(f"the centre of a ball is {place.tolist()}; expected three numbers")
         if not radius > 0.0:
             raise ParameterError(f"the radius of a ball must be positive, got {radius} m")
-        return _weight(_BALL, float(x), float(y), float(z), radius**-2)
+        return _weight(_BALL, *place.tolist(), radius**-2)
 
     @staticmethod
     def speed(low: float, high: float) -> "Weight":
         """0 up to the hand speed `low`, 1 from `high` on [m/s], with a smooth step between."""
+        of_kind("low", low, float)
+        of_kind("high", high, float)
         if not 0.0 <= low < high:
             raise ParameterError(f"speeds of a weight must be 0 ≤ low < high, got {low} and {high} m/s")
         return _weight(_SPEED, low, 1.0 / (high - low))

@@ -6,6 +6,7 @@ from typing import Any, overload
 
 import numpy.typing as npt
 
+from controllers.checks import of_kind
 from controllers.errors import ParameterError
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import place_of
@@ -43,6 +44,9 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
     ParameterError
         If the first argument is not ``hand``, another one has no number as its default, or it cannot be compiled.
     """
+    of_kind("compiled", compiled, bool)
+    if function is not None and not callable(function):
+        raise ParameterError(f"a law is made from a function law(hand, …); got {function!r}")
     make = CompiledLaw if compiled else PythonLaw
 
     def made(function: _Function) -> PythonLaw | CompiledLaw:

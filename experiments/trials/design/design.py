@@ -6,10 +6,9 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import StudyConfig, Words
+from experiments.trials.design.study_config import StudyConfig, Words, check_trials
 from experiments.trials.trial.measures import MEASURES
 
-_MOST = 1_000_000  # trials of a study: as many as the largest population has people
 _TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
 
 
@@ -129,11 +128,8 @@ def _check(study: StudyConfig) -> None:
     groups = math.prod(len(study.factors[name]) for name in study.between)
     count = math.prod(map(len, study.factors.values()))
     trials = max(count, study.users.number * study.repetitions * count // groups)
-    if trials > _MOST:
-        raise StudyError(
-            f"{where}: {study.users.number} users, {count} conditions, {study.repetitions} repetitions are too many; "
-            f"expected at most {_MOST} trials"
-        )
+    made_of = f"{study.users.number} users, {count} conditions, {study.repetitions} repetitions"
+    check_trials(where, trials, made_of)
     for (one, its), (other, others) in itertools.combinations(study.factors.items(), 2):
         shared = _words(its.values()) & _words(others.values())
         if shared:

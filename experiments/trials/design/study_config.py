@@ -11,6 +11,10 @@ from pydantic import Field
 from experiments.config.part import above, from_dict, part, whole
 from experiments.trials.design.errors import StudyError
 
+MOST_TRIALS = 1_000_000
+"""Most trials of a study or a tuning: as many as the largest population has people."""
+LONGEST = 86_400.0
+"""Longest trial, a day [s]."""
 Words = dict[str, Any]
 """Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
 
@@ -79,7 +83,7 @@ class StudyConfig:
     measures: tuple[str, ...] = ()
     ease: str = "tracking_error"
     cost: str = "expressiveness"
-    seconds: float = above(0.0, default=8.0, unit="s")
+    seconds: float = above(0.0, default=8.0, unit="s", most=LONGEST)
     seed: int = whole(0, default=1)
     recordings: str = ""
 
@@ -118,6 +122,18 @@ def _levels(name: str, levels: object) -> object:
         twice = next(one for one in names if names.count(one) > 1)
         raise StudyError(f"factor {name!r} has level {twice} twice; expected each value once")
     return {level: {name: value} for level, value in zip(names, values, strict=True)}
+
+
+def check_trials(where: str, trials: int, made_of: str) -> None:
+    """Refuse more trials than `MOST_TRIALS`, with what they are made of.
+
+    Raises
+    ------
+    StudyError
+        If there are more.
+    """
+    if trials > MOST_TRIALS:
+        raise StudyError(f"{where}: {made_of} are too many; expected at most {MOST_TRIALS} trials")
 
 
 def read_toml(path: Path, what: str) -> dict[str, object]:

@@ -1,8 +1,11 @@
 """A clip: the figure's poses at equal steps of time."""
 
 from dataclasses import dataclass
+from numbers import Real
+from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 
 from models.arrays import Array
 from models.errors import ModelError
@@ -13,6 +16,16 @@ CLOSES = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
 
 _TURNS_OVER = -0.5  # vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
+
+
+def _numbers(name: str, poses: npt.ArrayLike) -> Array:
+    try:
+        array = np.asarray(poses)
+    except ValueError:  # rows of different lengths
+        array = np.array(None)
+    if array.dtype.kind not in "iuf":
+        raise ModelError(f"clip {name!r}: poses are no array of numbers; expected (frames ≥ 1, {N_POSE})")
+    return array.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -69,13 +82,15 @@ class Clip:
     name: str
 
     def __post_init__(self) -> None:
-        poses = np.array(self.poses, dtype=np.float64)
+        if not isinstance(cast(object, self.name), str):
+            raise ModelError(f"the name of a clip is {self.name!r}; expected text")
+        poses = _numbers(self.name, self.poses)
         if poses.ndim != 2 or poses.shape[1] != N_POSE or len(poses) < 1:
             raise ModelError(f"clip {self.name!r}: poses have shape {poses.shape}; expected (frames ≥ 1, {N_POSE})")
         if not np.isfinite(poses).all():
             frame = int(np.argmin(np.isfinite(poses).all(axis=1)))
             raise ModelError(f"clip {self.name!r}: frame {frame} is not finite; expected finite numbers")
-        if not (np.isfinite(self.fps) and self.fps > 0.0):
+        if isinstance(self.fps, bool) or not isinstance(self.fps, Real) or not 0.0 < self.fps < np.inf:
             raise ModelError(f"clip {self.name!r}: {self.fps} frames per second; expected a positive number")
         rotations = poses[:, 3:].reshape(len(poses), -1, 4)
         norms = np.linalg.norm(rotations, axis=-1, keepdims=True)

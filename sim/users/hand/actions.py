@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.checks import check_kinds
 from controllers.state import Array
 from sim.errors import SimError
 
@@ -19,12 +20,8 @@ TURN_COLUMNS = 5
 """A turn as a row: start, duration, rotation vector at its peak (3)."""
 
 
-def _check_vectors(what: str, action: object, names: Sequence[str]) -> None:
-    """Refuse a vector of an action that has not three components."""
-    for name in names:
-        vector = getattr(action, name)
-        if vector is not None and np.shape(vector) != (3,):
-            raise SimError(f"the {name} of a {what} is {vector!r}; expected three numbers")
+def _given(vector: Sequence[float] | None) -> Sequence[float]:
+    return () if vector is None else vector
 
 
 @dataclass(frozen=True)
@@ -53,6 +50,8 @@ class Push:
     ------
     SimError
         If a number is out of its interval or the direction has no length.
+    ParameterError
+        If a value is of another kind.
     """
 
     at: float
@@ -63,10 +62,10 @@ class Push:
     radius: float = 0.01
 
     def __post_init__(self) -> None:
-        numbers = [self.at, self.seconds, self.force, self.radius, *(self.direction or ()), *(self.place or ())]
+        check_kinds(self)
+        numbers = [self.at, self.seconds, self.force, self.radius, *_given(self.direction), *_given(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a push has a number that is not finite: {self}")
-        _check_vectors("push", self, ("direction", "place"))
         if self.seconds <= 0.0 or self.at < 0.0 or self.radius <= 0.0:
             raise SimError(f"a push needs at ≥ 0 s, seconds > 0 and radius > 0 m, got {self}")
         if self.direction is not None and np.linalg.norm(self.direction) < 1e-12:
@@ -116,6 +115,8 @@ class Grab:
     ------
     SimError
         If a number is out of its interval.
+    ParameterError
+        If a value is of another kind.
     """
 
     at: float
@@ -127,17 +128,17 @@ class Grab:
     steady: bool = False
 
     def __post_init__(self) -> None:
-        numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *(self.place or ())]
+        check_kinds(self)
+        numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *_given(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a grab has a number that is not finite: {self}")
-        _check_vectors("grab", self, ("carry", "place"))
         if self.seconds <= 0.0 or self.reach <= 0.0 or self.at < 0.0 or self.hold < 0.0:
             raise SimError(f"a grab needs seconds and reach > 0, at and hold ≥ 0 s, got {self}")
 
     @property
     def end(self) -> float:
         """When the switch is released [s]."""
-        return self.at + (self.reach if self.place else 0.0) + self.seconds + self.hold
+        return self.at + (0.0 if self.place is None else self.reach) + self.seconds + self.hold
 
     def row(self) -> Array:
         """The grab as numbers for the compiled hand, shape (11,)."""
@@ -181,6 +182,8 @@ class Turn:
     ------
     SimError
         If a number is out of its interval or the axis has no length.
+    ParameterError
+        If a value is of another kind.
     """
 
     at: float
@@ -189,9 +192,9 @@ class Turn:
     axis: tuple[float, float, float]
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         if not np.all(np.isfinite([self.at, self.seconds, self.angle, *self.axis])):
             raise SimError(f"a turn has a number that is not finite: {self}")
-        _check_vectors("turn", self, ("axis",))
         if self.seconds <= 0.0 or self.at < 0.0 or abs(self.angle) > np.pi:
             raise SimError(f"a turn needs at ≥ 0 s, seconds > 0 and an angle within ±π, got {self}")
         if np.linalg.norm(self.axis) < 1e-12:

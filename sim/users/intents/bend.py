@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.checks import check_kinds
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, grab_table
@@ -30,6 +31,7 @@ class Bend:
     grabs: Sequence[Grab]
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         grab_table(self.grabs)
         if any(grab.place is None for grab in self.grabs):
             raise SimError("a person's grab has no place; expected where she takes hold, in H [m]")

@@ -21,7 +21,8 @@ class CutCorner:
     end: float = 0.55
 
     def __post_init__(self) -> None:
-        check(self, start=(self.start, 0.0, 1.0), end=(self.end, self.start + 1e-3, 1.0))
+        check(self, start=(self.start, 0.0, 1.0))
+        check(self, end=(self.end, self.start + 1e-3, 1.0))
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""

@@ -1,9 +1,10 @@
 """The interface of an intent, conversion to wishes, and helpers shared by the intents."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from controllers.checks import check_kinds
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import smooth_steps
 from controllers.state import Array
@@ -13,6 +14,7 @@ from sim.users.person.wishes import Wishes
 PERIOD = 0.02  # [s] sampling period of wishes: shorter than any submovement
 
 
+@runtime_checkable
 class PersonIntent(Protocol):
     """What a person means to do."""
 
@@ -44,13 +46,16 @@ def centre(curve: Trajectory) -> Array:
 
 
 def check(intent: object, **numbers: tuple[float, float, float]) -> None:
-    """Check numbers of an intent, given by name as (value, least, most).
+    """Check the kinds of all values of an intent, and its numbers, given by name as (value, least, most).
 
     Raises
     ------
+    ParameterError
+        If a value is of another kind.
     SimError
         If one is outside of its interval.
     """
+    check_kinds(intent)
     for name, (value, least, most) in numbers.items():
         if not least <= value <= most:
             raise SimError(f"{name} of {type(intent).__name__} is {value}; expected {least:g} to {most:g}")

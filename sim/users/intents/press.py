@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.checks import check_kinds
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Push
@@ -30,6 +31,7 @@ class Press:
     pushes: Sequence[Push]
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         if any(push.place is not None for push in self.pushes):
             raise SimError("a person's push has a place; expected a time and a direction")
 

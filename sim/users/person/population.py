@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from controllers.checks import of_kind
 from sim.errors import SimError
 from sim.users.person.person import INTERVALS, Person
 
@@ -48,11 +49,12 @@ def persona(name: str) -> Person:
     SimError
         If there is no such person.
     """
+    of_kind("name", name, str)
     if name in PERSONAS:
         return PERSONAS[name]
     seed, _, place = name.partition(":")
     if seed.isdecimal() and (place or "0").isdecimal() and int(place or "0") < _MOST:
-        return population(int(place or "0") + 1, int(seed))[-1]
+        return _drawn(int(seed), int(place or "0"))
     known = ", ".join(PERSONAS)
     raise SimError(f"no person {name!r}; there are {known}, or SEED:PLACE of a population, such as 7:3")
 
@@ -79,15 +81,17 @@ def population(number: int, seed: int) -> tuple[Person, ...]:
     SimError
         If a number is out of its interval.
     """
+    of_kind("number", number, int)
+    of_kind("seed", seed, int)
     if not 1 <= number <= _MOST:
         raise SimError(f"a population of {number}; expected 1 to {_MOST} people")
     if seed < 0:
         raise SimError(f"the seed of a population is {seed}; expected 0 or more")
-    return tuple(_draw(np.random.default_rng([seed, place]), f"{seed}:{place}") for place in range(number))
+    return tuple(_drawn(seed, place) for place in range(number))
 
 
-def _draw(rng: np.random.Generator, name: str) -> Person:
-    median = Person()
+def _drawn(seed: int, place: int) -> Person:
+    rng, name, median = np.random.default_rng([seed, place]), f"{seed}:{place}", Person()
     age, skill, left = rng.uniform(20.0, 75.0), rng.beta(*_SKILL), rng.random() < _LEFT
     values = {key: getattr(median, key) * np.exp(spread * rng.normal()) for key, spread in _SPREAD.items()}
     slower, clumsier = 1.0 + _AGING * max(0.0, age - 30.0), 1.0 + 0.8 * (_MEAN_SKILL - skill)

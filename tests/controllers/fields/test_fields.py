@@ -210,7 +210,10 @@ def test_memory_changes_the_cost_and_not_the_value():
         (lambda: Follow(CIRCLE, 1.0, 1.0, epsilon=0.0), "epsilon must be at least 0.0001 m, got 0.0"),
         (lambda: Bunny(CIRCLE, 1.0, np.nan, 0.1), "b_d"),
         (lambda: Bunny(CIRCLE, 1.0, 1.0, 0.0), "delta"),
-        (lambda: Bunny(CIRCLE, 1.0, 1.0, 0.1, "sideways"), "one of point, along, convolution, got 'sideways'"),
+        (
+            lambda: Bunny(CIRCLE, 1.0, 1.0, 0.1, "sideways"),
+            "attraction is 'sideways'; expected one of point, along, convolution",
+        ),
         (lambda: Program(np.zeros((0, 4), np.int64), np.zeros(0), np.zeros(8)), "one wrench"),
     ],
 )

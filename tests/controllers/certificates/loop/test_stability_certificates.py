@@ -62,6 +62,12 @@ def _difference(function, x, step=1e-6):
     return np.stack(columns, axis=1)
 
 
+def test_a_delay_of_thousands_of_periods_is_refused_before_it_fills_the_memory() -> None:
+    assert Sampling(1e-3, 0.128).whole_delay == 128
+    with pytest.raises(ParameterError, match=r"at most 128 periods of 0\.001 s, got 3\.0 s"):
+        Sampling(1e-3, 3.0)
+
+
 @pytest.mark.parametrize("kind", ["follow", "parallel", "bunny"])
 def test_the_law_is_differentiated_as_the_kernels_run_it(kind):
     if kind == "follow":

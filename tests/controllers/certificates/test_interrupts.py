@@ -1,0 +1,64 @@
+"""Ctrl-C ends a solution of IPOPT, and is not taken for a problem without one."""
+
+import contextlib
+import os
+import signal
+import threading
+import time
+
+import casadi as ca
+import pytest
+
+from controllers.certificates.interrupts import heeding_interrupts
+
+
+def _interrupt() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_ctrl_c_ends_ipopt() -> None:
+    x = ca.MX.sym("x", 3000)
+    cost = ca.sum1(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2) + 0.01 * ca.sum1(ca.cos(7 * x))
+    options = {"print_time": 0, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 100_000}
+    solve, timer = ca.nlpsol("solve", "ipopt", {"x": x, "f": cost}, options), threading.Timer(0.2, _interrupt)
+    timer.start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), heeding_interrupts():
+        solve(x0=0.3)  # nine seconds, if it is let
+    assert time.monotonic() - begun < 5.0
+    timer.join()
+
+
+def _lose_an_interrupt() -> None:
+    with contextlib.suppress(KeyboardInterrupt):
+        _interrupt()
+        time.sleep(1.0)
+
+
+def test_an_interrupt_that_is_lost_within_a_block_is_raised_at_its_end() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), heeding_interrupts():
+        _lose_an_interrupt()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_block_without_an_interrupt_is_as_without_the_guard() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with heeding_interrupts():
+        pass
+    with pytest.raises(ZeroDivisionError), heeding_interrupts():
+        _ = 1 / 0
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_other_threads_leave_the_handler_as_it_is() -> None:
+    before, seen = signal.getsignal(signal.SIGINT), list[object]()
+
+    def work() -> None:
+        with heeding_interrupts():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [before]

@@ -1,0 +1,82 @@
+"""A file that is being written is not seen, and what interrupts it leaves what was there."""
+
+import errno
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifting.room import Room
+from experiments.cli import main
+from experiments.files import whole_file as whole
+from experiments.files.archives import write_archive
+from experiments.files.device_files import save_device
+from experiments.files.whole_file import whole_file
+from experiments.lifting import lift
+
+
+def test_a_file_is_there_once_it_is_closed(tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    path.write_bytes(b"old")
+    with whole_file(path) as file:
+        file.write(b"new")
+        assert path.read_bytes() == b"old"
+    assert path.read_bytes() == b"new"
+    assert path.stat().st_mode == (_plain(tmp_path / "plain")).stat().st_mode
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def _plain(path: Path) -> Path:
+    path.write_bytes(b"")
+    return path
+
+
+def test_a_link_to_a_file_stays_one(tmp_path: Path) -> None:
+    path, link = _plain(tmp_path / "device.json"), tmp_path / "link.json"
+    link.symlink_to(path)
+    save_device({"format": 1}, link)
+    assert link.is_symlink()
+    assert path.read_text(encoding="utf-8").startswith("{")
+
+
+def _interrupted(path: Path, what: Any) -> None:
+    with whole_file(path) as file:
+        file.write(b"half")
+        raise what
+
+
+@pytest.mark.parametrize("what", [KeyboardInterrupt, MemoryError, OSError(errno.ENOSPC, "No space left on device")])
+@pytest.mark.parametrize("before", [None, b"old"])
+def test_what_interrupts_a_file_leaves_what_was_there(tmp_path: Path, before: bytes | None, what: Any) -> None:
+    path = tmp_path / "map.npz"
+    if before is not None:
+        path.write_bytes(before)
+    with pytest.raises(what if isinstance(what, type) else OSError):
+        _interrupted(path, what)
+    assert [entry.read_bytes() for entry in tmp_path.iterdir()] == ([] if before is None else [before])
+
+
+def test_an_archive_that_is_interrupted_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(whole.os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_archive(tmp_path / "map.npz", "Lifted", {"a": np.zeros(3)})
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_lift_that_is_interrupted_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(lift, "lift_clips", lambda *_: None)
+    monkeypatch.setattr(lift, "report_lift", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        lift.lift_into(["walk"], tmp_path / "maps" / "map.npz", Room(), (), 1, False)
+    assert main(["lift", "walk", "--out", str(tmp_path / "map.npz")]) == 130
+    assert capsys.readouterr().err.strip() == "hvf: stopped; nothing is left half done"
+    assert not list(tmp_path.iterdir())
