@@ -44,6 +44,8 @@ class FixedField(NamedTuple):
         ε, radius of the tube in which the orientation moment acts [m].
     pushes : tuple of Push, optional
         Default pushes of a hand that pushes.
+    other : Trajectory, optional
+        Curve to which a person changes over; by default an enlarged one (`ChangeOver`).
     """
 
     law: Law
@@ -54,6 +56,7 @@ class FixedField(NamedTuple):
     urged: float = 0.0
     tube: float = TUBE
     pushes: tuple[Push, ...] | None = None
+    other: Trajectory | None = None
 
 
 def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: ClipMapParts, field: FixedField) -> Parts:
@@ -71,7 +74,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
     program = with_moment(field.law.program(), mode.orientation, field.course, field.tube)
     return Parts(
         config=replace(config, user=user), maps=maps, field=field.law, program=with_walls(program, mode.walls, maps),
-        course=field.course, user=user_hand(user, maps.curve, config.seconds, config.seed),
+        course=field.course, user=user_hand(user, maps.curve, config.seconds, config.seed, field.other),
         tank=tank_for(power, field.springs, maps.reach, limiter),
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),

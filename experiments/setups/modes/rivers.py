@@ -51,7 +51,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
     notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
-    field = FixedField(law, course, power, springs, notes, urged, pushes=pushes)
+    field = FixedField(law, course, power, springs, notes, urged, pushes=pushes, other=beside(choice.given, maps.curve))
     parts = fixed_curve_parts(config, mode, maps, field)
     return replace(parts, remarks=parts.remarks + slow_remark(choice.pace))
 
@@ -64,6 +64,14 @@ def slow_remark(pace: float) -> tuple[str, ...]:
         f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slow, a push that takes it out of one takes it out of "
         f"all, and --user push does not; above {1e3 * SLOWEST:.0f} mm/s it does (a shorter --lap, a larger --radius)",
     )
+
+
+def beside(curves: tuple[Trajectory, ...], own: Trajectory) -> Trajectory | None:
+    """The river nearest to one's own, by the mean distance at equal shares of the lap; None if there is no other."""
+    share = np.linspace(0.0, 1.0, 33)
+    here = own.point(own.start + share * own.duration)
+    away = [np.linalg.norm(c.point(c.start + share * c.duration) - here, axis=1).mean() for c in curves]
+    return curves[np.argsort(away)[1]] if len(curves) > 1 else None
 
 
 def river_time(mode: Rivers) -> float:

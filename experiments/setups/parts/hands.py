@@ -115,8 +115,10 @@ def resolved_user(
     return User(does=user.does, pushes=done, turns=turns, grabs=grabs, person=user.person)
 
 
-def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
-    """The hand of a resolved user, for a run of given duration [s] and seed.
+def user_hand(
+    user: User, curve: Trajectory, seconds: float, seed: int, other: Trajectory | None = None
+) -> Arm | Participant:
+    """The hand of a resolved user, for a run of given duration [s] and seed; a person changes over to an `other` curve.
 
     Raises
     ------
@@ -124,7 +126,9 @@ def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm |
         If a push or a grab is one that a person cannot do.
     """
     if user.person is not None:
-        return participant(user.person, intent_of(user), curve, seconds, seed)
+        intent = intent_of(user)
+        intent = ChangeOver(other) if isinstance(intent, ChangeOver) else intent
+        return participant(user.person, intent, curve, seconds, seed)
     if user.does == "trace":
         times = np.arange(0.0, seconds, 0.01)
         return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)

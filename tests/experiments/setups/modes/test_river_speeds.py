@@ -15,9 +15,9 @@ from sim.loop.loop import Loop
 RADIUS = 0.0477
 
 
-def rivers_of_a_hand(lap: float, user: str, seconds: float) -> np.ndarray:
+def rivers_of_a_hand(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
     """River that has the hand of the simulated Phantom, at each tick; -1 for none."""
-    words = {"map": "rivers", "figure": "none", "clips": ("walk",), "lap": lap, "seed": 3}
+    words = {"map": "rivers", "figure": "none", "clips": ("walk",), "lap": lap, "seed": 3, **more}
     session = wire(run_config(mode="rivers", user=user, seconds=seconds, **words))
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(seconds)
@@ -33,6 +33,13 @@ def test_a_default_push_takes_a_hand_into_other_rivers_without_chatter_whatever_
     rivers = rivers_of_a_hand(lap, "push", lap)
     changes = rivers[1:][np.diff(rivers) != 0.0].tolist()
     assert changes in ([1.0], [1.0, 2.0])
+
+
+def test_a_person_who_changes_over_goes_to_the_nearest_other_river() -> None:
+    rivers = rivers_of_a_hand(4.0, "change", 8.0, person="median")
+    assert rivers[0] == 0.0
+    assert rivers[-1] == 1.0
+    assert np.mean(rivers < 0.0) < 0.02
 
 
 def test_pushes_across_are_as_measured_at_the_default_lap_and_none_below_what_was_found() -> None:
