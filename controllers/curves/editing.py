@@ -12,6 +12,7 @@ from controllers.state import Array
 
 _GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grasped phase
 _LONGEST = 10_000  # most half widths in a curve: 160 000 steps, a hundred megabytes
+MOST_EDITS = 10_000  # that can be undone: of each, five numbers are kept
 _SAME = 1e-9  # of a step of the grid: breaks nearer than this coincide
 
 
@@ -65,7 +66,7 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     Raises
     ------
     CurveError
-        If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is below 1.
+        If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is not from 1 to `MOST_EDITS`.
     """
     if not 0.0 < width <= 0.5 * curve.duration:
         raise CurveError(
@@ -76,8 +77,8 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
             f"a curve of {curve.duration:g} s cannot be bent by bumps of a half width of {width:g} s; expected "
             f"{curve.duration / _LONGEST:g} s or more"
         )
-    if depth < 1:
-        raise CurveError(f"at least 1 edit must be undoable, got {depth}")
+    if not 1 <= depth <= MOST_EDITS:
+        raise CurveError(f"from 1 to {MOST_EDITS} edits can be undone, got {depth}")
     steps = np.diff(np.asarray(curve.times, dtype=float))
     # For a curve of equal steps the grid is a refinement of its breaks, so that steps stay equal.
     multiple = len(steps) if np.ptp(steps) <= _SAME * steps[0] else 1

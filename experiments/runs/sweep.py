@@ -51,12 +51,15 @@ def sweep(
     Raises
     ------
     ParameterError
-        If there is no such parameter, or several laws have it; there is no thread; or an argument is of another kind.
+        If there is no such parameter, or several laws have it; a parameter has no values; there is no thread; or an
+        argument is of another kind.
     """
     of_kind("sim", sim, Simulation)
     of_kind("values", values, Mapping)
     for path, several in values.items():
         of_kind(path, several, Sequence[Any])
+        if len(several) == 0:
+            raise ParameterError(f"{path} has no values; expected one or more")
     of_kind("seconds", seconds, float)
     of_kind("threads", threads, int)
     if threads < 1:

@@ -77,6 +77,7 @@ def test_a_value_of_another_kind_is_refused_by_name(make: Any, name: str) -> Non
         (lambda: SIM.session(-1.0), "seconds is -1; expected more than 0 s, and finite"),
         (lambda: SIM.session(inf), "seconds is inf; expected more than 0 s, and finite"),
         (lambda: hvf.sweep(SIM, {"field.k_r": 300}), "field.k_r is 300; expected a sequence"),  # pyright: ignore
+        (lambda: hvf.sweep(SIM, {"field.k_r": []}), "field.k_r has no values; expected one or more"),
         (lambda: hvf.tune(3, SPACE, len), "sim is 3; expected Simulation"),  # pyright: ignore
         (lambda: hvf.tune(SIM, SPACE, 3), "cost is 3; expected a function of a run"),  # pyright: ignore
         (lambda: hvf.tune(SIM, {"field.k_r": ("a", "b")}, len), "expected a sequence, each a number"),  # pyright: ignore
