@@ -66,7 +66,8 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     Raises
     ------
     CurveError
-        If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is not from 1 to `MOST_EDITS`.
+        If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is not from 1 to
+        `MOST_EDITS`.
     """
     if not 0.0 < width <= 0.5 * curve.duration:
         raise CurveError(
