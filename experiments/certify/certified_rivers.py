@@ -119,7 +119,7 @@ def certify_rivers(
     field = law_of(mode, choice)
     if isinstance(field, HigherOrder):
         found = _search(field, rivers, places, push)
-        sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+        sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
         others = [tuple(other for other in rivers if other is not river) for river in rivers]
         keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
         return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}

@@ -80,7 +80,7 @@ def draw_crossing(rng: np.random.Generator) -> Crossing:
     field = straight_pair(degrees, "discrete", float(rng.uniform(0.0, 3.0)), float(rng.uniform(4.0, 20.0)))
     sampling = Sampling(float(rng.choice([5e-4, 1e-3])), 0.0, float(rng.uniform(25.0, 100.0)))
     first, second = certified_bundle(field.bundle, phantom_device(), sampling)
-    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
     allowed = Keeping(first, (second,), sharing).allowed(2.0)
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)

@@ -7,11 +7,13 @@ measured velocity at most E,
           U = U_{max} + U_0 + U_q + (k D + b E)(1 - w(D/\varepsilon))
 
 with G the peak gains of the sampled loop; U_max the hand's force, U_0 that of inertia and friction (`own_force`), U_q
-and ν the effects of encoder quantisation on the law's force and on the measured velocity. So the mismatch of
-`HigherOrder` obeys s_i² ≤ S² = E² + g_i(D) with g = −2σ² ln w, as long as the river is active. The discount of a rival
-river's mismatch (see `mismatch`) removes at most the part of e across its tangent, so with u_j its unit tangent
+and ν the effects of encoder quantisation on the law's force and on the measured velocity. The velocity that selects a
+river is low-passed with the time constant τ_s, which lags behind that of the current by at most τ_s |φ̈| and increases
+no bound: its error is at most E_s = E + τ_s |φ̈|. So the mismatch of `HigherOrder` obeys s_i² ≤ S² = E_s² + g_i(D) with
+g = −2σ² ln w, as long as the river is active. The discount of a rival river's mismatch (see `mismatch`) removes at most
+the part of e across its tangent, so with u_j its unit tangent
 
-.. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E)^2 + g_j(d_j - D)
+.. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E_s)^2 + g_j(d_j - D)
 
 The discrete field keeps the hand if S < r + h and S < h + s_j: the river never changes; the dwell time is infinite.
 
@@ -52,12 +54,15 @@ class Sharing:
         r, σ, h [m/s].
     form : {"smooth", "discrete"}
         See `HigherOrder`.
+    look : float
+        τ_s, time constant of the low-pass of the selecting velocity [s]; 0 for none.
     """
 
     admission: float
     sigma: float
     hysteresis: float
     form: Literal["smooth", "discrete"]
+    look: float
 
     def cost(self, distance: float, width: float) -> float:
         """Penalty of a distance from the curve, g(d) = −2σ² ln w(d/ε) [m²/s²]; infinite outside the tube."""
@@ -134,6 +139,12 @@ class Keeping:
         return tuple(rival(self.held, other) for other in self.others)
 
     @cached_property
+    def lag(self) -> float:
+        """Largest lag of the selecting velocity behind the current's, τ_s |φ̈| [m/s]."""
+        turning = np.linalg.norm(self.held.curve.acceleration(self.held.phases()), axis=1)
+        return self.sharing.look * float(turning.max())
+
+    @cached_property
     def _still(self) -> LinearLoop:
         return self.held.still()
 
@@ -175,17 +186,18 @@ class Keeping:
             distance, speed = after
         else:
             return lost
-        score = math.sqrt(speed**2 + sharing.cost(distance, river.width))
-        return Bounds(distance, speed, score, self._room(distance, speed, score))
+        seen = speed + self.lag
+        score = math.sqrt(seen**2 + sharing.cost(distance, river.width))
+        return Bounds(distance, speed, score, self._room(distance, seen, score))
 
-    def _room(self, distance: float, speed: float, score: float) -> float:
-        """Distance of S from the values at which the river would lose the hand [m/s]."""
+    def _room(self, distance: float, seen: float, score: float) -> float:
+        """Distance of S from the values at which the river would lose the hand [m/s], for an error of at most E_s."""
         least = self.sharing.admission + self.sharing.hysteresis - score
         for other in self.rivals:
             inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
             near = inside > 0.0
             place = -6.0 * self.sharing.sigma**2 * np.log(inside[near])
-            theirs = np.sqrt(np.maximum(0.0, other.least[near] - speed) ** 2 + place)
+            theirs = np.sqrt(np.maximum(0.0, other.least[near] - seen) ** 2 + place)
             least = min(least, float(np.min(self.sharing.hysteresis + theirs - score, initial=math.inf)))
         return least
 

@@ -5,11 +5,20 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Generator
 
 import casadi as ca
 import pytest
 
 from controllers.certificates.interrupts import heeding_interrupts
+
+
+@pytest.fixture(autouse=True)
+def handled_by_python() -> Generator[None]:
+    """A background job of a shell, as CI may be, begins with SIGINT ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def _interrupt() -> None:
@@ -22,11 +31,10 @@ def test_ctrl_c_ends_ipopt() -> None:
     options = {"print_time": 0, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 100_000}
     solve, timer = ca.nlpsol("solve", "ipopt", {"x": x, "f": cost}, options), threading.Timer(0.2, _interrupt)
     timer.start()
-    begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt), heeding_interrupts():
         solve(x0=0.3)  # nine seconds, if it is let
-    assert time.monotonic() - begun < 5.0
     timer.join()
+    assert not solve.stats()["success"]
 
 
 def _lose_an_interrupt() -> None:

@@ -1,16 +1,21 @@
 """Switching of rivers: Lyapunov functions judged independently, bounds that hold in MuJoCo, hands lost there."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
 from controllers.certificates.switching.switching import Keeping, Sharing, hysteresis_dwell, switching
 from controllers.certificates.switching.switching_search import SECONDS, Course, Push, counterexample, failure
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.river import River
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_field import given_curves
 from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
@@ -29,7 +34,7 @@ def _rivers(field, clock=CLOCK):
 
 
 def _keepings(field, clock=CLOCK):
-    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
     first, second = _rivers(field, clock)
     return [Keeping(first, (second,), sharing), Keeping(second, (first,), sharing)]
 
@@ -161,6 +166,21 @@ def test_the_dwell_time_falls_with_the_push_and_is_a_period_without_hysteresis()
     assert hysteresis_dwell(narrow, 0.2) > hysteresis_dwell(narrow, 5.0) > slow.period
     # At the clock of a run a hand can be accelerated through the hysteresis within a tick.
     assert hysteresis_dwell(_keepings(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
+
+
+def test_the_selecting_velocity_lags_by_no_more_than_the_bounds_allow_for():
+    lap, look, radius = 4.0, 8e-3, 0.0477
+    sharing = Sharing(0.09, 0.01, 0.01, "discrete", look)
+    bundle = RiverBundle((River(Trajectory.circle(radius, lap), 0.02, 0.02, 8.0),), ("circle",))
+    keeping = Keeping(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
+    turn = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
+    velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(turn), np.cos(turn)), axis=1)
+    seen = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
+    lag = np.linalg.norm(seen - velocity, axis=1)[1000:].max()
+    assert 0.9 * keeping.lag < lag < keeping.lag
+    without = replace(keeping, sharing=replace(sharing, look=0.0))
+    assert keeping.bounds(0.05).score > without.bounds(0.05).score
+    assert keeping.bounds(0.05).speed == without.bounds(0.05).speed
 
 
 def test_failures_are_told_apart():
