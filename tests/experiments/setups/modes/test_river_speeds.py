@@ -1,4 +1,4 @@
-"""Rivers of any speed hold a hand in spite of noisy encoders; pushes that fit change over, without chatter."""
+"""Fast and slow rivers hold a hand in spite of noisy encoders; pushes that fit change over, without chatter."""
 
 import numpy as np
 import pytest
