@@ -89,7 +89,7 @@ def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArra
 
     def find() -> Array:
         shown = show()
-        motion = motion_of(shown.poses, shown.fps, dynamics=False)
+        motion = motion_of(shown.poses, shown.fps)
         return np.array([[motion.lowest, motion.skate, beyond_ranges(shown.poses).max()]])
 
     lowest, skate, beyond = kept_array(kept_folder(module), "sound", made_of, (1, 3), find)[0]

@@ -39,7 +39,7 @@ class Motion(NamedTuple):
     lowest : float
         Height of the lowest point of the soles [m].
     skate, furthest : float
-        Distance by which a point of a sole moves in a stance: 95th percentile and largest [m].
+        Foot skate (`models.mocap.preparation.skate`), hands included: 95th percentile of the stances and largest [m].
     """
 
     residual: float
@@ -53,20 +53,19 @@ def upper_joints(legs: Sequence[Limb]) -> list[int]:
     return sorted(set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs)))
 
 
-def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
-    """Measure a motion (n, 75); its residual is 0 without `dynamics`."""
+def motion_of(poses: Array, fps: float) -> Motion:
+    """Measure a motion (n, 75)."""
     # Imported here: they load signal processing, which a run with cached results does not need.
-    from models.mocap.preparation.feasible import contact_residual
+    from models.mocap.preparation.feasible import borne
     from models.mocap.preparation.poses import smoothed, sole_points
+    from models.mocap.preparation.skate import skates
     from models.mocap.preparation.stances import stances
-    from models.mocap.preparation.well_formed import ON_FLOOR, stance_slides
 
-    clip, points = Clip(poses, fps, "blend"), sole_points(poses)
+    clip = Clip(poses, fps, "blend")
     schedule = stances(clip, smoothed(clip))
-    heights = points[:, :, 2] - CONTACT_RADIUS
-    slides = stance_slides(points, schedule.feet & (heights < ON_FLOOR))
-    residual = contact_residual(clip, schedule) if dynamics else 0.0
-    return Motion(residual, float(heights.min()), float(np.quantile(slides, 0.95)), float(slides.max()))
+    given = borne(clip, schedule)
+    slides, lowest = skates(clip, schedule, given.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
+    return Motion(given.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:

@@ -142,7 +142,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
 
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
     """Lowest sole [cm], foot skate in a stance (95 %, largest) [cm], and joints beyond limits [°] of the animation."""
-    motion = motion_of(poses, fps, dynamics=False)
+    motion = motion_of(poses, fps)
     excess = float(beyond_ranges(poses).max()) - LIMIT
     return {
         "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,

@@ -11,7 +11,6 @@ from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.contacts import contacts
-from models.mocap.dynamics.floor_forces import WITH_HANDS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
@@ -32,16 +31,13 @@ from models.mocap.preparation.bounds import (
     beyond,
 )
 from models.mocap.preparation.feasible import Borne, borne
-from models.mocap.preparation.poses import around, contact_points, resampled, smoothed
+from models.mocap.preparation.poses import around, resampled, smoothed
+from models.mocap.preparation.skate import AT_REST, moving_points, skates
 from models.mocap.preparation.stances import stances
 
-# Half or twice of either of the next two finds no other frame in the nine embedded clips and 17 captures; of the third,
-# names other faults in 6 and 3 of these 26; of the last two, in none.
+# Half or twice of either finds no other frame in the nine embedded clips and 17 captures.
 _STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
 _JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
-_AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
-_UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
-ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
 
 
 @dataclass(frozen=True)
@@ -145,16 +141,13 @@ def well_formed(clip: Clip) -> WellFormed:
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
     closed = clip.closes(CLOSES)
     schedule = stances(clip, smoothed(clip))
-    points = contact_points(clip.poses, WITH_HANDS[: schedule.standing.shape[1]])
+    points, speeds = moving_points(clip, schedule)
     heights = points[:, :, 2] - CONTACT_RADIUS
-    speeds = np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps if clip.n_frames > 1 else 0.0 * heights
-    standing = schedule.standing & (speeds < _AT_REST)
+    standing = schedule.standing & (speeds < AT_REST)
     soles = standing[:, : len(FOOT_CONTACTS)]
     low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
     given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
-    # A sphere that bears nothing and moves is in swing, however low.
-    swings = (given.loads < _UNLOADED) & (speeds > _AT_REST)
-    slides = stance_slides(points, schedule.standing & (heights < ON_FLOOR) & ~swings)
+    slides = skates(clip, schedule, given.loads)
     flights, falling = _flights(clip)
     return WellFormed(
         clip.duration, float(low), float(high), _tilt(clip, soles), float(np.quantile(slides, 0.95)),
@@ -186,16 +179,6 @@ def _tilt(clip: Clip, resting: Mask) -> float:
         angles.append(np.arccos(np.clip(up[:, 2], -1.0, 1.0)))
     every = np.concatenate(angles)
     return float(np.quantile(every, 0.95)) if len(every) else 0.0
-
-
-def stance_slides(points: Array, standing: Mask) -> Array:
-    """Largest distance of contact points (n, k, 3) from their median place in each stance [m]; 0 without one."""
-    slides = [0.0]
-    for sphere, mask in enumerate(standing.T):
-        for start, end in spans(mask):
-            stand = points[start:end, sphere, :2]
-            slides.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
-    return np.array(slides if len(slides) == 1 else slides[1:])
 
 
 def _seam(clip: Clip, closed: bool) -> float:

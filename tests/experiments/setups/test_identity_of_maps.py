@@ -67,10 +67,10 @@ def test_a_lap_at_a_corner_of_a_map_lacks_what_its_clip_lacks() -> None:
 
 
 def test_feet_of_the_authored_walk_neither_sink_nor_skate() -> None:
-    motion = motion_of(embedded("walk").poses, embedded("walk").fps, dynamics=False)
+    motion = motion_of(embedded("walk").poses, embedded("walk").fps)
     assert motion.lowest > -0.005
     assert motion.skate < 0.01
     # A walk that is carried sideways skates as far as it is carried in a stance.
     carried = embedded("walk").poses.copy()
     carried[:, 1] += 0.1 * np.arange(len(carried)) / embedded("walk").fps
-    assert 0.03 < motion_of(carried, embedded("walk").fps, dynamics=False).skate < 0.12
+    assert 0.03 < motion_of(carried, embedded("walk").fps).skate < 0.12

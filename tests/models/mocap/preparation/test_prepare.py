@@ -14,8 +14,9 @@ from models.mocap.preparation.fidelity import OTHERWISE
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import plus, resampled, sole_points
 from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation.skate import stance_slides
 from models.mocap.preparation.stances import rested, stances
-from models.mocap.preparation.well_formed import outliers, stance_slides, well_formed
+from models.mocap.preparation.well_formed import outliers, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
