@@ -24,14 +24,19 @@ from controllers.fields.own.own_law import law
 from controllers.fields.river import River
 from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.lifting.room import Room
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import HandState, Wrench
 from experiments.certify.certify_simulation import certify
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
+from experiments.lifting.lift_file import lift_into as lift
+from experiments.preparation.command import prepare_file as prepare
 from experiments.public import circle, clips, load, version
 from experiments.runs.run_result import Run
-from experiments.runs.simulation import Composite, Cylindrical, Simulation, Tick, User
+from experiments.runs.run_words import run
+from experiments.runs.simulation import Composite, Cylindrical, Lifted, Simulation, Tick, User
 from experiments.runs.sweep import Swept, sweep
+from experiments.setups.parts.pace import paced
 from experiments.trials.study import Study
 from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
@@ -59,6 +64,7 @@ __all__ = [
     "HapticMap",
     "HigherOrder",
     "Law",
+    "Lifted",
     "ModelError",
     "ParameterError",
     "Person",
@@ -67,6 +73,7 @@ __all__ = [
     "Replay",
     "River",
     "RiverBundle",
+    "Room",
     "Run",
     "Search",
     "SimError",
@@ -85,10 +92,14 @@ __all__ = [
     "clips",
     "intents",
     "law",
+    "lift",
     "load",
+    "paced",
     "persona",
     "population",
+    "prepare",
     "rest_pose",
+    "run",
     "sweep",
     "tune",
 ]

@@ -1,11 +1,13 @@
 """Small factory functions of the public interface: clips by name or from files, the default curve, the version."""
 
+import warnings
 from importlib.metadata import version as installed
 from pathlib import Path
 
 from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
-from models.mocap.library import embedded, embedded_names, load_clip
+from experiments.preparation.prepared_clip import prepared_clips
+from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 
 
@@ -20,8 +22,17 @@ def clips(*names: str) -> tuple[Clip, ...]:
     return tuple(embedded(name) for name in names or embedded_names())
 
 
-def load(path: str | Path) -> Clip:
-    """The motion in a BVH, AMC or DeepMimic file, retargeted to the figure.
+def load(path: str | Path, raw: bool = False) -> Clip:
+    """The motion in a BVH, AMC or DeepMimic file on the figure, prepared once as by ``hvf prepare``.
+
+    A file on the figure's own skeleton is taken as it is. Warns if no motion near the capture is feasible on contact.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    raw : bool
+        Take the capture as it is, not prepared.
 
     Raises
     ------
@@ -29,7 +40,11 @@ def load(path: str | Path) -> Clip:
         If the file cannot be read, or its skeleton is not a human's.
     """
     of_kind("path", path, str | Path)
-    return load_clip(Path(path))
+    of_kind("raw", raw, bool)
+    found = prepared_clips([Path(path)], raw)[0]
+    if not found.feasible:
+        warnings.warn(found.remarks[-1], stacklevel=2)
+    return found.clip
 
 
 def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:

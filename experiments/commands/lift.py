@@ -34,9 +34,12 @@ class Command:
 
     def __call__(self) -> int:
         """Lift, and say what came of it."""
-        from experiments.lifting.lift import lift_into
+        from experiments.lifting.lift_file import lift_into
 
         with working("lifting", len(self.clips)):
-            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite, self.raw)
+            report = lift_into(
+                self.clips, self.out, room=self.room, cyclic=self.cyclic, seed=self.seed, overwrite=self.overwrite,
+                raw=self.raw,
+            )  # fmt: skip
         say(report.to_json(), self.json, report.lines())
         return 0

@@ -38,7 +38,8 @@ class Command:
 
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
-        from experiments.preparation.command import prepare_file, summary
+        from experiments.preparation.command import prepare_file
+        from experiments.preparation.prepared_file import summary
         from models.mocap.retargeting.hints import Hints
 
         with working("preparing"):

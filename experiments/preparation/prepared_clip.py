@@ -26,10 +26,13 @@ class PreparedClip(NamedTuple):
         The prepared clip; unchanged if the file is on the figure's own skeleton.
     remarks : tuple of str
         How the file was interpreted and what was done with it, a line each.
+    feasible : bool
+        False if the capture was prepared, but no motion near it is feasible on contact.
     """
 
     clip: Clip
     remarks: tuple[str, ...]
+    feasible: bool = True
 
 
 def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedClip]:
@@ -84,7 +87,7 @@ class _Capture(NamedTuple):
             else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
         )
         remarks = (*report.lines(), f"{self.path.name}: {done}; --raw takes the capture as it is")
-        return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks)
+        return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks, bool(rows[0, 1]))
 
     def _found(self) -> Array:
         from models.mocap.preparation.prepare import prepared  # imported late: loads signal processing

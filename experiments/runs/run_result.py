@@ -14,8 +14,11 @@ from rich.console import Console
 
 from controllers.checks import of_kind
 from controllers.state import Array
+from experiments.config.part import to_json
+from experiments.config.run_config import RunConfig
 from experiments.files.json_text import json_text
 from experiments.results.folder import (
+    CONFIG,
     EDITED,
     RECORDING,
     REPORT,
@@ -65,6 +68,9 @@ class Run:
         the run or its channels.
     summary : RunSummary
         Measures as numbers; `str` of a run gives them in words.
+    remarks : tuple of str
+        What was said before the run: what its clips and its map are not fit for, what was chosen instead. `str` has
+        them first.
     """
 
     folder: Path
@@ -94,11 +100,18 @@ class Run:
             clear_folder(folder)
             summary = record_session(session, folder, config, seconds, started, console)
             write_animations(folder, session)
+            if isinstance(session.config, RunConfig):
+                (folder / CONFIG).write_text(to_json(session.config), encoding="utf-8")
             said = asdict(summary) | {"lines": summary.lines()}
             (folder / SUMMARY).write_text(json_text(said) + "\n", encoding="utf-8")
             run = Run(folder, summary, session)
             run.report()
         return run
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was said before the run."""
+        return self._session.remarks
 
     @property
     def ticks(self) -> Channels:
@@ -146,7 +159,7 @@ class Run:
         return pandas.DataFrame(columns).set_index("t")
 
     def __str__(self) -> str:
-        return "\n".join(self.summary.lines())
+        return "\n".join([*self.remarks, *self.summary.lines()])
 
     def __repr__(self) -> str:
         alone = self.summary.path.deviation_rms_mm

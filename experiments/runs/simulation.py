@@ -4,6 +4,7 @@ import itertools
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -16,16 +17,27 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.lifted import Lifted as LiftedMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
+from experiments.config.maps import MapFile
 from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
+from experiments.files.map_files import load_figure_map
 from experiments.runs.run_result import Run
-from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
+from experiments.setups.figure_maps import (
+    Place,
+    composite_parts,
+    cylindrical_parts,
+    lifted_parts,
+    own_parts,
+    reached,
+)
+from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import intent_of, participant
@@ -35,6 +47,7 @@ from experiments.setups.wiring import assemble, check_rates
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.devices.device import ticks_of
+from sim.errors import SimError
 from sim.loop.loop import Loop
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.hand.arm import Arm
@@ -106,6 +119,63 @@ class Composite:
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         return composite_parts(tuple(self.clips), _place(self), world.figure)
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Map that `hvf.lift` wrote: each clip lies along a curve of its own, and near several they are blended.
+
+    Parameters
+    ----------
+    file : path
+        The file (.npz).
+    curve : str
+        Name or number of the clip on whose curve the run begins; by default the first.
+    expressive : bool
+        As in `Cylindrical`.
+
+    Raises
+    ------
+    SimError
+        If the file holds no lifted map.
+    ParameterError
+        If the map has no such curve.
+    """
+
+    file: str | Path
+    curve: str = ""
+    expressive: bool = False
+
+    def __post_init__(self) -> None:
+        check_kinds(self)
+        _ = self.around
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the clips, and so of the curves."""
+        return self._made[0].names
+
+    @property
+    def around(self) -> Trajectory:
+        """The curve on which the run begins, timed by its clip: φ of a field that plays it."""
+        made, _ = self._made
+        return made.curve(curve_number(made, self.curve))
+
+    @property
+    def clips(self) -> tuple[Clip, ...]:
+        """The clips of the map."""
+        return self._made[1]
+
+    @cached_property
+    def _made(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
+        made, clips = load_figure_map(Path(self.file))
+        if not isinstance(made, LiftedMap):
+            raise SimError(f"{self.file}: its map is {type(made).__name__}; expected one that hvf.lift wrote")
+        return made, clips
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return lifted_parts(*self._made, MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive))
 
 
 def _check_map(part: Cylindrical | Composite) -> None:

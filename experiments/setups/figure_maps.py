@@ -122,6 +122,31 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     return replace(_about_circle(place, made, clips), refined=refined)
 
 
+def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:
+    """Map parts of a lifted map, beginning on one of its curves.
+
+    Raises
+    ------
+    ParameterError
+        If the map has no curve of that name.
+    SimError
+        If the Phantom does not reach it.
+    """
+    curve = lifted_curve(made, part.curve)
+    ends = (
+        f"the clip is open: the hand, and with it the figure, is held at its curve's end after {curve.duration:.1f} s"
+    )
+    between = not_blendable(clips)
+    return ClipMapParts(
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=curve.duration, reach=part.reach,
+        rivers=lambda mode: lifted_choice(made, mode),
+        river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
+        course=cache(partial(course_of, curve)),
+        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
+        remarks=between if curve.periodic else (ends, *between),
+    )  # fmt: skip
+
+
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
     """Map parts of a user-defined map about a curve, without clips.
 
@@ -181,7 +206,7 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
     if isinstance(made, Lifted):
         if part.around != Circle():
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
-        parts = _on_lifted(part, made, clips)
+        parts = lifted_parts(made, clips, part)
         if config.user.does == "push" and config.figure.kind == "physical" and not isinstance(config.mode, Rivers):
             keeps_pace = isinstance(config.mode, Follow) and config.mode.flow == "parallel"
             number = curve_number(made, part.curve)
@@ -213,22 +238,6 @@ def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> 
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
         held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off_pace(played, made.loops, curve.duration)),
-    )  # fmt: skip
-
-
-def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapParts:
-    curve = lifted_curve(made, part.curve)
-    ends = (
-        f"the clip is open: the hand, and with it the figure, is held at its curve's end after {curve.duration:.1f} s"
-    )
-    between = not_blendable(clips)
-    return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, lap_seconds=curve.duration, reach=part.reach,
-        rivers=lambda mode: lifted_choice(made, mode),
-        river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
-        course=cache(partial(course_of, curve)),
-        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
-        remarks=between if curve.periodic else (ends, *between),
     )  # fmt: skip
 
 

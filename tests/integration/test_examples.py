@@ -17,6 +17,7 @@ PRINTS = {
     "edited_motion": "edited.bvh: 3.0 s",
     "own_hand": "she felt",
     "replayed_hand": "the same hand would feel",
+    "lifted_map": "walk → run",
     "own_map": "a push bows the trunk",
 }
 

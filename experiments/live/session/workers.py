@@ -135,7 +135,8 @@ class Uploaded(NamedTuple):
 
 def preparation(asked: Any, told: Any) -> None:
     """Worker for preparing clips: answers an `Uploaded` to a pair (source, target) of files."""
-    from experiments.preparation.command import prepare_file, summary
+    from experiments.preparation.command import prepare_file
+    from experiments.preparation.prepared_file import summary
     from models.mocap.library import load
     from models.mocap.readers.own_bvh import write_bvh
 

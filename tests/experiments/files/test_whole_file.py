@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.haptic_map.lifting.room import Room
 from experiments.cli import main
 from experiments.files import whole_file as whole
 from experiments.files.archives import write_archive
 from experiments.files.device_files import save_device
 from experiments.files.whole_file import whole_file
-from experiments.lifting import lift
+from experiments.lifting import lift_file
 
 
 def test_a_file_is_there_once_it_is_closed(tmp_path: Path) -> None:
@@ -73,10 +72,13 @@ def test_a_lift_that_is_interrupted_leaves_nothing(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(lift, "lift_clips", lambda *_: None)
-    monkeypatch.setattr(lift, "report_lift", interrupted)
+    def nothing(*_: object) -> None:
+        return None
+
+    monkeypatch.setattr(lift_file, "lift_clips", nothing)
+    monkeypatch.setattr(lift_file, "report_lift", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        lift.lift_into(["walk"], tmp_path / "maps" / "map.npz", Room(), (), 1, False)
+        lift_file.lift_into(["walk"], tmp_path / "maps" / "map.npz")
     assert main(["lift", "walk", "--out", str(tmp_path / "map.npz")]) == 130
     assert capsys.readouterr().err.strip() == "hvf: stopped; nothing is left half done"
     assert not list(tmp_path.iterdir())

@@ -3,7 +3,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.preparation import prepared_clip
-from experiments.preparation.command import prepare_file, summary
+from experiments.preparation.command import prepare_file
+from experiments.preparation.prepared_file import summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load

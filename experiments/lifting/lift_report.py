@@ -1,0 +1,132 @@
+"""The report of a lifted map: its curves, transitions and in-betweens, in words and as data."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
+from experiments.fitting.blendable import not_blendable
+from experiments.lifting.lift import LiftedClips
+from experiments.lifting.map_quality import MapQuality, measure_map
+from experiments.lifting.motion_measure import MotionMeasure
+
+
+class LiftReport(NamedTuple):
+    """Report of `hvf lift`."""
+
+    lifted: LiftedClips
+    quality: MapQuality
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def lines(self) -> list[str]:
+        """The report in words, a line each."""
+        lifting, names = self.lifted.lifting, self.lifted.names
+        after, before = lifting.after, lifting.before
+        lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
+        if len(names) > 1:
+            lines = [
+                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_apart(after)} (before the arrangement "
+                f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
+                f"(before {100 * before.stress:.0f} %)."
+            ]
+        for name, clip, curve, turned, rounds, closed in zip(
+            names, self.lifted.clips, after.curves, self.lifted.turned, self.lifted.rounds,
+            self.lifted.haptic_map.closed, strict=True,
+        ):  # fmt: skip
+            kind = "there and back" if turned else "closed" if closed else "open, the hand is held at its end"
+            kind = kind if rounds == 1 else f"{rounds} times round"
+            lines.append(
+                f"  {name}: {kind}, {clip.duration:.2f} s, radius of curvature from "
+                f"{1e3 * curve.radius:.0f} mm, up to {curve.speed:.2f} m/s and {curve.acceleration:.2f} m/s²"
+            )
+        for meeting in after.meetings:
+            at = meeting.transition
+            lines.append(
+                f"  transition {names[at.first]} – {names[at.second]} at {np.degrees(at.angle):.0f}°: poses "
+                f"{at.pose:.2f}, velocities {at.velocity:.2f}, standing feet {at.support:.2f} apart (relative), the "
+                f"figures at {at.speeds[0]:.1f} and {at.speeds[1]:.1f} m/s; the curves pass "
+                f"{1e3 * meeting.distance:.1f} mm apart at {np.degrees(meeting.slant):.0f}°, "
+                f"{meeting.speeds[0]:.2f} and {meeting.speeds[1]:.2f} m/s"
+            )
+        if not after.meetings and len(names) > 1:
+            lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
+        lines += [
+            f"  {', '.join(names[i] for i in group)} are the same motion: one of them would do"
+            for group in _groups(lifting.same)
+        ]
+        lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
+        lines += [f"  {remark}" for remark in not_blendable(self.lifted.clips)]
+        quality = self.quality
+        if len(names) > 1:
+            on, between = quality.conditioning, quality.conditioning_between
+            # Within the core of a curve only its clip plays, so the map may be singular there.
+            along = f"{on[0]:.1f} in the median, 9 of 10 below {on[1]:.0f}" if np.isfinite(on[1]) else "singular"
+            lines += [
+                f"Condition number of h_* along the curves: {along}; half way between: {between[0]:.1f} in the median, "
+                f"9 of 10 below {between[1]:.0f}.",
+                f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
+                f"{100 * quality.roughness[1]:.0f} %.",
+            ]
+        lines += [
+            *(f"  in-between {pair}: {_wrong(measure)}" for pair, measure in quality.between.items()),
+            f"  the clips themselves: {_wrong(quality.clips)}",
+        ]
+        return lines
+
+    def to_json(self) -> dict[str, object]:
+        """The report as data for JSON."""
+        lifting = self.lifted.lifting
+        return {
+            "clips": list(self.lifted.names),
+            "closed": list(self.lifted.haptic_map.closed),
+            "seconds": self.lifted.seconds,
+            "before": _arrangement(lifting.before),
+            "after": _arrangement(lifting.after),
+            "same": [list(pair) for pair in lifting.same],
+            "still": list(lifting.still),
+            "quality": self.quality._asdict()
+            | {
+                "between": {pair: measure._asdict() for pair, measure in self.quality.between.items()},
+                "clips": self.quality.clips._asdict(),
+            },
+        }
+
+
+def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Groups of clips that are the same motion."""
+    groups: dict[int, list[int]] = {}
+    for first, second in sorted(pairs):
+        if not any(first in others for others in groups.values()):
+            groups.setdefault(first, [first]).append(second)
+    return list(groups.values())
+
+
+def _apart(measure: ArrangementMeasure) -> str:
+    return f"{1e3 * measure.separation:.1f} mm or more apart at one angle, {1e3 * measure.nearest:.1f} mm in space"
+
+
+def _wrong(measure: MotionMeasure) -> str:
+    return (
+        f"joints {np.degrees(measure.limits):.1f}° beyond their limits, soles slide {100 * measure.slide:.1f} cm, "
+        f"{100 * measure.penetration:.1f} cm below the floor, flights {100 * measure.ballistic:.1f} cm from free fall"
+    )
+
+
+def _arrangement(measure: ArrangementMeasure) -> dict[str, object]:
+    return {
+        "separation": measure.separation,
+        "nearest": measure.nearest,
+        "stress": measure.stress,
+        "curves": [curve._asdict() for curve in measure.curves],
+        "transitions": [
+            meeting._asdict() | {"transition": meeting.transition._asdict()} for meeting in measure.meetings
+        ],
+    }
+
+
+def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:
+    """Measure a lifted map."""
+    return LiftReport(lifted, measure_map(lifted.layout(), lifted.clips, np.random.default_rng(seed)))

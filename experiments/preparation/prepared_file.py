@@ -1,0 +1,105 @@
+"""A prepared capture with its measures, and what was changed, in words."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.preparation.followed import Followed
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation.prepare import Prepared
+from models.mocap.preparation.well_formed import WellFormed
+
+_CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
+
+
+class PreparedFile(NamedTuple):
+    """A prepared clip with its measures.
+
+    Attributes
+    ----------
+    made : Prepared
+        The clip and the steps of its preparation.
+    measures : WellFormed
+        Measures of the clip.
+    followed : Followed
+        How the physical figure follows it.
+    flights : tuple of str
+        Flights that the certificate refutes, and why, a line each.
+    """
+
+    made: Prepared
+    measures: WellFormed
+    followed: Followed
+    flights: tuple[str, ...]
+
+    @property
+    def clip(self) -> Clip:
+        """The prepared clip."""
+        return self.made.clip
+
+    def __str__(self) -> str:
+        return summary(self)
+
+    def faults(self) -> tuple[str, ...]:
+        """Measures that exceed their bounds, a line each."""
+        return (
+            *self.measures.faults(),
+            *self.made.fidelity.faults(),
+            *self.flights,
+            *self.followed.faults(self.measures.flights > 0),
+        )
+
+
+def summary(outcome: PreparedFile) -> str:
+    """One line for the terminal."""
+    made, faults = outcome.made, outcome.faults()
+    return (
+        f"{made.clip.name}: {'; '.join(changes(made))}; "
+        f"contact lacks {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
+        f"{made.seconds:.0f} s of processor time; "
+        + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
+        + "".join(f"; {line}" for line in advice(made))
+    )
+
+
+def changes(made: Prepared) -> tuple[str, ...]:
+    """Changes made to the capture, a line each."""
+    part, pace, change = made.looped, made.paced, made.feasible
+    words = {
+        "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s, whose ends were {np.rad2deg(part.gap):.1f}° apart",
+        "half stride": f"half a stride, {part.start:.2f} to {part.end:.2f} s, and its mirror image",
+        "way back": "the whole, and a way back",
+        "open": "the whole, at rest at both ends",
+    }
+    lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
+    if pace.pace != 1.0:
+        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+    if made.carried > _CARRIED:
+        lines.append(
+            f"carried over the floor by up to {100 * made.carried:.0f} cm, since a foot that bears the load slides"
+        )
+    if not made.near:
+        return (*lines, "dynamics and feet as captured")
+    if made.hands.seconds > 0.0:
+        lines.append(
+            f"hands bear load for {made.hands.seconds:.2f} s, on places up to {100 * made.hands.moved:.0f} cm from "
+            "where their palms were captured"
+        )
+    lines.append(
+        f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.raised:.1f} cm in height and "
+        f"{100 * change.moved:.1f} cm over the floor RMS; " + made.fidelity.line()
+    )
+    return tuple(lines)
+
+
+def advice(made: Prepared) -> tuple[str, ...]:
+    """Advice, if no feasible motion is near the capture: how far the nearest one found is, and what may help."""
+    change = made.feasible
+    if made.near:
+        return ()
+    return (
+        f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
+        f"lowers the root by {100 * change.raised:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
+        "try --loop START:END for a part without what is not feasible, --loop open if it "
+        "does not repeat, or a capture whose support is feet and hands alone",
+    )

@@ -1,0 +1,60 @@
+"""A run in words from Python: everything that ``hvf run`` can do, with the result in memory."""
+
+import tempfile
+from pathlib import Path
+from typing import Any, cast
+
+from rich.console import Console
+
+from controllers.checks import of_kind
+from controllers.errors import ParameterError
+from experiments.config.part import to_dict
+from experiments.config.run_config import RunConfig, load_config
+from experiments.config.words import changed, run_config
+from experiments.console.compiling import compile_once
+from experiments.console.estimates import check_length
+from experiments.runs.run_result import Run
+from experiments.setups.wiring import wire
+
+
+def run(
+    config: str | Path | None = None, *, record: str | Path | None = None, overwrite: bool = False, **words: Any
+) -> Run:
+    """Run what words say, as ``hvf run`` does: any mode, map, hand and figure, from clips by name or motion files.
+
+    ``hvf.run(mode="lead", clips=["walk"], seconds=5.0)`` is ``hvf run --mode lead --clips walk --seconds 5``. User-
+    defined laws, maps and hands need a `hvf.Simulation`.
+
+    Parameters
+    ----------
+    config : path, optional
+        A configuration in a JSON file, such as that of a recorded run; the words change it.
+    record : path, optional
+        Folder to write recording, configuration, summary, animations, figures and page into; by default a temporary
+        one.
+    overwrite : bool
+        Replace a run that the folder holds.
+    **words
+        ``mode``, ``map``, ``user``, ``figure``, ``replay``, ``seconds``, ``seed`` and the options of their parts, named
+        as on the command line with underscores; ``pushes``, ``turns`` and ``grabs`` as sequences of `hvf.Push`,
+        `hvf.Turn` and `hvf.Grab`.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If there is no such word, it does not belong to what is chosen, a number is out of its interval, a file cannot
+        be read, or the folder cannot be written or holds a run.
+    """
+    of_kind("config", config, str | Path | None)
+    of_kind("record", record, str | Path | None)
+    if record is not None and not str(record):
+        raise ParameterError("record is empty; expected a folder, or None for a temporary one")
+    given: dict[str, Any] = {
+        name: tuple(cast(list[object], value)) if isinstance(value, list) else value for name, value in words.items()
+    }
+    whole = run_config(**given) if config is None else changed(load_config(Path(config)), given)
+    check_length(Path(record or tempfile.gettempdir()), whole.seconds, whole.clock.servo_period)
+    console = Console(stderr=True)
+    session = wire(whole, ready=lambda units: compile_once(console, units))
+    resolved = cast(RunConfig, session.config)
+    return Run.of(session, to_dict(resolved), resolved.seconds, record, overwrite)
