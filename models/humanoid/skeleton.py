@@ -230,6 +230,12 @@ def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
         joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.array([0.0, angle])
 
 
+def soles() -> npt.NDArray[np.float64]:
+    """Centres of `FOOT_CONTACTS` in the frames of their feet, of the default figure, shape (8, 3) [m]."""
+    model = figure_model()
+    return np.array([model.geom(name).pos for name in FOOT_CONTACTS])
+
+
 def figure_model(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> mujoco.MjModel:
     """The figure alone, compiled: for kinematics, centre of mass and inverse dynamics away from the world."""
     return figure_spec(stature, mass).compile()

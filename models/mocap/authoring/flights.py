@@ -12,10 +12,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from models.arrays import Array
-from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
+from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.authoring.authoring import Arm
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
 from models.mocap.motion.clip import Clip
 

@@ -15,9 +15,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
-from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
+from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task
 from models.mocap.motion.clip import Clip
 

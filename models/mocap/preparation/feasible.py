@@ -94,9 +94,6 @@ class FeasibleWeights:
         return np.repeat([self.place, self.root, *joints], 3)
 
 
-_WEIGHTS = FeasibleWeights()
-
-
 class Feasible(NamedTuple):
     """A motion made feasible.
 
@@ -147,9 +144,8 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS,
-    passage: bool = False,
-) -> Feasible:  # fmt: skip
+    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, passage: bool = False
+) -> Feasible:
     """The motion nearest to a clip that is feasible with a given contact schedule, as far as it can be found.
 
     Parameters
@@ -162,13 +158,11 @@ def feasible(
         Largest number of Gauss–Newton iterations.
     fps : float
         Frame rate of the result [1/s].
-    weights : FeasibleWeights
-        Weights of the errors.
     passage : bool
         Whether the clip is a part of a longer motion that is unchanged beyond its ends.
     """
     change = Change(clip, _KNOT, _STEP, passage)
-    problem = _Problem(change, schedule, weights)
+    problem = _Problem(change, schedule)
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
     sizes = change.size(points)
@@ -191,10 +185,10 @@ def _rms(values: Array) -> float:
 class _Problem:
     """The least-squares problem of one clip."""
 
-    def __init__(self, change: Change, schedule: Stances, weights: FeasibleWeights) -> None:
-        self.change, self.w = change, weights
+    def __init__(self, change: Change, schedule: Stances) -> None:
+        self.change, self.w = change, FeasibleWeights()
         self.contacts = WITH_HANDS[: schedule.standing.shape[1]]
-        self.floor = Floor(weights.moment / weights.force, self.contacts)
+        self.floor = Floor(self.w.moment / self.w.force, self.contacts)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
         self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
         self.grounded = (schedule.standing | schedule.sliding)[frames]
@@ -203,8 +197,8 @@ class _Problem:
         self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
         self.low, self.high = joint_range()[..., 0] + MARGIN, joint_range()[..., 1] - MARGIN
         self.fixed = Normal(change)
-        tracking = weights.tracking() ** 2
-        calm = np.where(np.arange(N_TANGENT) < 3, weights.sway, weights.jerk) ** 2
+        tracking = self.w.tracking() ** 2
+        calm = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
         for interval in range(change.intervals):
             here = np.flatnonzero(change.first == interval)
             blocks = [np.einsum("ma,mb->ab", basis[here], basis[here]) for basis in (change.basis[0], change.basis[3])]
@@ -352,7 +346,7 @@ class Borne(NamedTuple):
 def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
     change = Change(clip, _KNOT, _STEP, passage)
-    problem = _Problem(change, schedule, _WEIGHTS)
+    problem = _Problem(change, schedule)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
     weight = problem.floor.body_weight
     pushes = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight
