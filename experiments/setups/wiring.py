@@ -10,9 +10,9 @@ from controllers.curves.stylus import UPRIGHT
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.higher_order import HigherOrder
-from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.base import CompiledMap
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE, Array, HandState
+from controllers.state import STYLUS_POSE, HandState
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
@@ -237,7 +237,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
             lower_start(packed_legs(world.figure), poses[0])
-        figure = _velocity(whole_map, argument[0], begin) if moves else None
+        figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:
             begin_in_motion(reference, np.array(begin))
@@ -254,7 +254,3 @@ def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), parts.begins_in_motion)
     # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
     return begin, UPRIGHT if parts.maps.expressive or parts.user.turns else None
-
-
-def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:
-    return map_derivative(haptic_map, argument)[:, :3] @ begin.velocity
