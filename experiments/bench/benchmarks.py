@@ -46,7 +46,7 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.loop.servo import run_block
 
-ROUNDS = 7
+ROUNDS = 7  # of which the fastest counts
 _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
 

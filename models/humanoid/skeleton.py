@@ -20,6 +20,7 @@ from models.errors import ModelError
 Pose = npt.NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
+# Near de Leva's mean male subject, of 1.741 m and 73.0 kg.
 DEFAULT_STATURE = 1.75  # [m]
 DEFAULT_MASS = 75.0  # [kg]
 

@@ -15,7 +15,7 @@ from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
 from sim.viewer.views import VIEWS, look_from, open_with
 
-_FPS = 30.0
+_FPS = 30.0  # pictures sent a second, at most
 
 
 class LivePage:

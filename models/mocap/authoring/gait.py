@@ -20,7 +20,7 @@ from models.mocap.dynamics.coordinates import coordinate, poses, reflection
 from models.mocap.dynamics.spacetime import Motion, Stance, Task
 from models.mocap.motion.clip import Clip
 
-FPS = 120.0
+FPS = 120.0  # [1/s]
 _ACTIVE = (
     ("position", "xyz"), ("root", "xyz"), ("abdomen", "xyz"), ("chest", "xyz"), ("head", "xyz"),
     *((f"{side}_{joint}", axes) for side in ("left", "right")

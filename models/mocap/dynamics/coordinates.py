@@ -13,7 +13,9 @@ from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import pose_difference
 
-_DELTA = 1e-3  # [s] step of the finite differences for angular velocity and acceleration
+# Step of the finite differences for angular velocity and acceleration [s]. Half or twice moves the backflip's
+# velocities, of up to 10 rad/s, by 5e-5 or 2e-4, and its accelerations, of up to 116 rad/s², by 5e-4 or 2e-3.
+_DELTA = 1e-3
 
 
 def coordinate(joint: str, axis: str) -> int:

@@ -20,7 +20,10 @@ from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.poses import around, plus
 
 DEGREE = 5
-_STEP = 1e-3  # step of the finite differences for velocities and accelerations [s]
+# Step of the finite differences for velocities and accelerations [s]. Half or twice moves accelerations of up to 250
+# rad/s², of a kick with rough changes, by 1.7 or 4.2. SNU's run is prepared alike to 0.03° RMS, its walk with half
+# otherwise by 0.6° (it lacks 2.8 % of weight instead of 2.6), with twice by 0.02°.
+_STEP = 1e-3
 _HELD = DEGREE - 1  # outer control points at either end of an open motion that equal the first or last free one
 _MARGIN = 12  # frames beyond a closed clip's ends: their influence on its cubic spline decays by 0.27 a frame, to 1e-7
 
