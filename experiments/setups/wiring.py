@@ -1,5 +1,6 @@
 """Wiring: from a configuration to a linked servo with stylus and figure in their start state (`wire`)."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -88,9 +89,7 @@ def wire(
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
-    if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
-        least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
-        raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
+    check_seconds(config, config.seconds)
     check_rates(config)
     world = World(config.scene, config.figure.kind)
     if device is None and config.leads and not world.has_figure:
@@ -162,7 +161,25 @@ def check_rates(settings: Settings) -> None:
     """
     settings.scene.substeps()
     figure = settings.figure
-    check_reference(settings.clock.servo_period * settings.figure.figure_ticks, figure.smoothing, figure.blend)
+    check_reference(figure_period(settings), figure.smoothing, figure.blend)
+
+
+def figure_period(settings: Settings) -> float:
+    """Time between two updates of the figure [s]."""
+    return settings.clock.servo_period * settings.figure.figure_ticks
+
+
+def check_seconds(settings: Settings, seconds: float) -> None:
+    """Check that a run of `seconds` has two updates of the figure or more, and an end.
+
+    Raises
+    ------
+    ParameterError
+        If not.
+    """
+    least = 2.0 * figure_period(settings)
+    if not least <= seconds < math.inf:
+        raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
@@ -197,18 +214,17 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
 
 
 def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
-    figure, period = parts.config.figure, parts.config.clock.servo_period * parts.config.figure.figure_ticks
-    legs = packed_legs(world.figure)
+    figure = parts.config.figure
     return make_reference(
-        world.figure, compiled, period, figure.smoothing, figure.blend, legs, parts.held_seconds
+        world.figure, compiled, figure_period(parts.config), figure.smoothing, figure.blend, packed_legs(world.figure),
+        parts.held_seconds,
     )  # fmt: skip
 
 
 def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    period = parts.config.clock.servo_period * parts.config.figure.figure_ticks
     bounds = parts.config.figure
     gains = parts.gains._replace(force_bound=bounds.residual_force, moment_bound=bounds.residual_moment)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, period)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, figure_period(parts.config))
     return figure.state, _reference(parts, world, compiled)
 
 

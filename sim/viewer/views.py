@@ -70,6 +70,16 @@ def screen_axes(forward: Array) -> tuple[Array, Array]:
     return right, np.cross(right, forward)
 
 
+def add_view_buttons(gui: viser.GuiApi) -> None:
+    """Add buttons that show one of `VIEWS` in the browser in which they are pressed."""
+    views = gui.add_button_group("Look at", tuple(VIEWS))
+
+    @views.on_click
+    def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.client is not None:
+            look_from(event.client, VIEWS[views.value])
+
+
 def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, size: tuple[float, float]) -> None:
     """Place a camera such that it shows a view in a window of a given size (width, height) [px]."""
     place = camera_of(view, *size)
