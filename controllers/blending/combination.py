@@ -70,6 +70,31 @@ def _mean_position(value: Array, slope: Array, column: int, weights: Array, chan
 
 
 @njit
+def _mean_drift(drifts: Array, weights: Array, changes: Array, mean: Array) -> None:
+    """Mean drift of a lap (4, 3), rows: value, derivatives by θ and the two other parameters."""
+    mean[:] = 0.0
+    for i in range(drifts.shape[0]):
+        for k in range(3):
+            mean[0, k] += weights[i] * drifts[i, k]
+            for way in range(_WAYS):
+                mean[1 + way, k] += changes[way, i] * drifts[i, k]
+
+
+@njit
+def _mean_rotations(
+    figure: Array, value: Array, slope: Array, weights: Array, changes: Array, q: Array, rates: Array, tangents: int
+) -> None:
+    """Mean rotation of the root and each joint with the weights of its group, and its local angular velocities."""
+    unit, spin = work_array((value.shape[0], 4)), work_array((value.shape[0], 3))
+    for joint in range(q.shape[0]):
+        group = int(figure[_GROUPS + joint])
+        _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
+        mean_rotation(unit, weights[group], q[joint])
+        if tangents:
+            mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
+
+
+@njit
 def _turn_position(angle: float, turn: Array, x: float, y: float, shift: Array, p: Array) -> None:
     """Move a position and its derivatives by a displacement of the plane: turn by an angle, then shift by (x, y).
 
@@ -92,6 +117,22 @@ def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
         rate[1, k] += turn[k] * up_y
         rate[2, k] += turn[k] * up_z
     q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
+
+
+@njit
+def _chain_rule(root: Array, rates: Array, chain: Array, jacobian: Array) -> None:
+    """Derivatives of the pose by the stylus, from those by the three parameters and theirs by the stylus."""
+    for j in range(jacobian.shape[1]):
+        if chain[0, j] == 0.0 and chain[1, j] == 0.0 and chain[2, j] == 0.0:
+            jacobian[:, j] = 0.0
+            continue
+        for i in range(3):
+            jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
+        for joint in range(rates.shape[0]):
+            for i in range(3):
+                rate = rates[joint, i]
+                total = rate[0] * chain[0, j] + rate[1] * chain[1, j] + rate[2] * chain[2, j]
+                jacobian[3 + 3 * joint + i, j] = total
 
 
 @njit
@@ -144,18 +185,13 @@ def _combine(
     correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
     floor: float, pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
-    clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
+    rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
     tangents = _WAYS if jacobian.shape[0] > 0 else 0
 
     drift, shift, turn = work_array((1 + _WAYS, 3)), work_array((2, 3)), work_array(3)
-    drift[:] = 0.0
-    for i in range(clips):
-        for k in range(3):
-            drift[0, k] += weights[0, i] * drifts[i, k]
-            for way in range(_WAYS):
-                drift[1 + way, k] += changes[0, way, i] * drifts[i, k]
+    _mean_drift(drifts, weights[0], changes[0], drift)
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
@@ -167,14 +203,8 @@ def _combine(
         frame[2] = s * drift[0, 2] + lap
         ahead, mixture = go_on(footing, angle), mixed(weights[0])
 
-    unit, spin = work_array((clips, 4)), work_array((clips, 3))
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
-    for joint in range(rotations):
-        group = int(figure[_GROUPS + joint])
-        _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
-        mean_rotation(unit, weights[group], q[joint])
-        if tangents:
-            mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
+    _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
     root, end = work_array((4, 3)), work_array((4, 3))
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
@@ -212,17 +242,7 @@ def _combine(
         for j in range(4):
             pose[3 + 4 * joint + j] = q[joint, j]
     if tangents:
-        for j in range(jacobian.shape[1]):
-            if chain[0, j] == 0.0 and chain[1, j] == 0.0 and chain[2, j] == 0.0:
-                jacobian[:, j] = 0.0
-                continue
-            for i in range(3):
-                jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
-            for joint in range(rotations):
-                for i in range(3):
-                    rate = rates[joint, i]
-                    total = rate[0] * chain[0, j] + rate[1] * chain[1, j] + rate[2] * chain[2, j]
-                    jacobian[3 + 3 * joint + i, j] = total
+        _chain_rule(root, rates, chain, jacobian)
 
 
 def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:

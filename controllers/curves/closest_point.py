@@ -24,6 +24,7 @@ from controllers.curves.trajectory import (
     START,
     TREE,
     find_piece,
+    piece_acceleration,
     piece_point,
     piece_velocity,
     wrap_phase,
@@ -40,9 +41,7 @@ def _slope(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> 
     x, y, z = piece_point(blob, row, u)
     vx, vy, vz = piece_velocity(blob, row, u)
     x, y, z = x - px, y - py, z - pz
-    ax = 2.0 * blob[row + 14] + 6.0 * u * blob[row + 21]
-    ay = 2.0 * blob[row + 15] + 6.0 * u * blob[row + 22]
-    az = 2.0 * blob[row + 16] + 6.0 * u * blob[row + 23]
+    ax, ay, az = piece_acceleration(blob, row, u)
     return x * vx + y * vy + z * vz, vx * vx + vy * vy + vz * vz + x * ax + y * ay + z * az
 
 

@@ -22,6 +22,29 @@ def basis_slope(u: float) -> tuple[float, float, float, float]:
     return d0, d1, -d0 - d1 - d3, d3
 
 
+@njit
+def interpolate(rows: Array, stride: int, u: float, rate: float, value: Array, slope: Array) -> None:
+    """Channels between the second and the third of four rows of control points, at u in [0, 1], and their derivatives.
+
+    Parameters
+    ----------
+    rows : Array
+        The rows, one after the other; channel k of row j is at ``rows[j * stride + k]``.
+    stride : int
+        Distance between two rows.
+    u, rate : float
+        Place in the interval, and du/dx for derivatives by x.
+    value, slope : Array, shape (channels,)
+        Written.
+    """
+    b0, b1, b2, b3 = basis(u)
+    d0, d1, d2, d3 = basis_slope(u)
+    for k in range(value.shape[0]):
+        p0, p1, p2, p3 = rows[k], rows[stride + k], rows[2 * stride + k], rows[3 * stride + k]
+        value[k] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+        slope[k] = rate * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+
+
 def round_lap(samples: Array, angles: Array) -> Array:
     """Values at angles (...) [rad] of the periodic C² splines through samples (n, ...) at equal steps of the lap."""
     from scipy.interpolate import CubicSpline  # here: a field is evaluated, and a certificate verified, without it

@@ -81,30 +81,32 @@ def piece_acceleration(blob: Array, row: int, u: float) -> tuple[float, float, f
 
 
 @njit
-def curve_point(blob: Array, at: int, t: float) -> tuple[float, float, float]:
-    """φ(t) [m] of the curve packed at ``blob[at:]``."""
+def _place(blob: Array, at: int, t: float) -> tuple[int, float]:
+    """Offset of the coefficients of the piece at t, and the time since its break [s]."""
     t = wrap_phase(blob, at, t)
     piece = find_piece(blob, at, t)
-    u = t - blob[at + int(blob[at + BREAKS]) + piece]
-    return piece_point(blob, at + int(blob[at + COEFFICIENTS]) + piece * PIECE, u)
+    return at + int(blob[at + COEFFICIENTS]) + piece * PIECE, t - blob[at + int(blob[at + BREAKS]) + piece]
+
+
+@njit
+def curve_point(blob: Array, at: int, t: float) -> tuple[float, float, float]:
+    """φ(t) [m] of the curve packed at ``blob[at:]``."""
+    row, u = _place(blob, at, t)
+    return piece_point(blob, row, u)
 
 
 @njit
 def curve_velocity(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ̇(t) [m/s] of the curve packed at ``blob[at:]``."""
-    t = wrap_phase(blob, at, t)
-    piece = find_piece(blob, at, t)
-    u = t - blob[at + int(blob[at + BREAKS]) + piece]
-    return piece_velocity(blob, at + int(blob[at + COEFFICIENTS]) + piece * PIECE, u)
+    row, u = _place(blob, at, t)
+    return piece_velocity(blob, row, u)
 
 
 @njit
 def curve_acceleration(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ̈(t) [m/s²] of the curve packed at ``blob[at:]``."""
-    t = wrap_phase(blob, at, t)
-    piece = find_piece(blob, at, t)
-    u = t - blob[at + int(blob[at + BREAKS]) + piece]
-    return piece_acceleration(blob, at + int(blob[at + COEFFICIENTS]) + piece * PIECE, u)
+    row, u = _place(blob, at, t)
+    return piece_acceleration(blob, row, u)
 
 
 def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:

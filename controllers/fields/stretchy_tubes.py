@@ -127,6 +127,22 @@ def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
 
 
 @njit
+def _perform(gains: StretchyGains, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """FOLLOW of the bent curve, eased in from the search spring."""
+    follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
+    share = eased_share(hand[HAND_TIME] - gains.until, gains.ease)
+    target = curve_point(memory, curve, memory[slot + _PHASE])
+    for i in range(3):
+        seek = stretch_force(hand[HAND_POSITION + i], hand[HAND_VELOCITY + i], target[i], gains.seek, gains.damping)
+        wrench[i] = share * wrench[i] + (1.0 - share) * seek
+
+
+@njit
+def _distance(p: Array, x: float, y: float, z: float) -> float:
+    return np.sqrt((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2)
+
+
+@njit
 def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
     """Kernel of `StretchyTubes`: parameters `StretchyGains`, memory see above `_PHASE`; it contains the curve."""
     gains = StretchyGains(
@@ -146,12 +162,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     if not pressed and memory[slot + _MODE] != SEEKING:
         _release(memory, slot, hand[HAND_TIME])
     if performing:
-        follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
-        share = eased_share(hand[HAND_TIME] - gains.until, gains.ease)
-        target = curve_point(memory, curve, memory[slot + _PHASE])
-        for i in range(3):
-            seek = stretch_force(p[i], v[i], target[i], gains.seek, gains.damping)
-            wrench[i] = share * wrench[i] + (1.0 - share) * seek
+        _perform(gains, curve, memory, slot, hand, wrench)
         return
     phase, distance = closest_phase(memory, curve, p[0], p[1], p[2], memory[slot + _PHASE])
     memory[slot + _PHASE] = phase
@@ -159,10 +170,9 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         _press(gains.radius, memory, slot, hand, distance)
     elif memory[slot + _MODE] == PROBING:
         _touch(gains.radius, memory, slot, p, distance)
-    carried = 0.0
-    for i in range(3):
-        carried += (p[i] - memory[slot + _PRESSED + i]) ** 2
-    memory[slot + _CARRIED] = max(memory[slot + _CARRIED], np.sqrt(carried))
+    press = slot + _PRESSED
+    carried = _distance(p, memory[press], memory[press + 1], memory[press + 2])
+    memory[slot + _CARRIED] = max(memory[slot + _CARRIED], carried)
     mode, stiffness = memory[slot + _MODE], 0.0
     target = (p[0], p[1], p[2])
     if mode == HOLDING:
@@ -183,7 +193,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         wrench[i] = stretch_force(p[i], v[i], target[i], stiffness, gains.damping)
     if mode in (HOLDING, PUSHING):
         x, y, z = curve_point(memory, curve, phase)
-        distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
+        distance = _distance(p, x, y, z)
     if mode == HOLDING:
         memory[slot + _OFF] = max(memory[slot + _OFF], distance)
     leave_trace(memory, curve, memory, phase, distance, phase)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from controllers.borrowed import borrowed
-from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.curves.splines import control_points, interpolate
 from controllers.rotations import angular_velocity, exponential, multiply, rotate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
@@ -125,14 +125,8 @@ def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacob
     size, last = 6 + 3 * ((pose.shape[0] - 7) // 4), int(entry[_COUNT]) - 1
     u = min(max((s + MARGIN) * FPS, 0.0), float(last))
     row = min(int(u), last - 1)
-    b0, b1, b2, b3 = basis(u - row)
-    d0, d1, d2, d3 = basis_slope(u - row)
-    rows = borrowed(changes[int(entry[_ROWS]) + row * size :])
     offset, rate = work_array(size), work_array(size)
-    for i in range(size):
-        p0, p1, p2, p3 = rows[i], rows[size + i], rows[2 * size + i], rows[3 * size + i]
-        offset[i] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
-        rate[i] = FPS * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+    interpolate(borrowed(changes[int(entry[_ROWS]) + row * size :]), size, u - row, FPS, offset, rate)
     w, a, b, c = pose[3], pose[4], pose[5], pose[6]
     x, y, z = rotate(w, a, b, c, offset[0], offset[1], offset[2])
     pose[0], pose[1], pose[2] = pose[0] + x, pose[1] + y, pose[2] + z

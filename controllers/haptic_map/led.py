@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.curves.splines import control_points, interpolate
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, KernelMap
 from controllers.legs.cyclic_runs import runs
@@ -60,14 +60,8 @@ def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array)
     """Channels at a phase of the lap, and their derivatives by it, from uniform cubic B-splines."""
     place = (lap - np.floor(lap)) * samples
     row = min(int(place), samples - 1)
-    b0, b1, b2, b3 = basis(place - row)
-    d0, d1, d2, d3 = basis_slope(place - row)
     n = value.shape[0]
-    for k in range(n):
-        at = row * n + k
-        p0, p1, p2, p3 = rows[at], rows[at + n], rows[at + 2 * n], rows[at + 3 * n]
-        value[k] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
-        slope[k] = samples * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+    interpolate(rows[row * n :], n, place - row, float(samples), value, slope)
 
 
 @njit

@@ -23,7 +23,19 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.joint_limits import hold_joint
-from controllers.motion.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
+from controllers.motion.vectors import (
+    Vector,
+    cross,
+    dot,
+    minus,
+    plus,
+    product,
+    quaternion_at,
+    scaled,
+    turned,
+    turned_back,
+    vector_at,
+)
 from controllers.state import Array, Vec3
 
 # A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
@@ -127,6 +139,13 @@ def flexion(c: float) -> tuple[float, float]:
 
 
 @njit
+def _angular_velocity(scalar: float, vector: Vector, norm: float, d_scalar: float, d_vector: Vector) -> Vector:
+    """2 Im(Q⁻¹ ⊗ Q̇) of a quaternion Q = (scalar, vector) whose norm need not be one."""
+    across, share = cross(vector, d_vector), 2.0 / (norm * norm)
+    return scaled(share, minus(minus(scaled(scalar, d_vector), scaled(d_scalar, vector)), across))
+
+
+@njit
 def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
     """Correct the joints of a limb so that its end has the given pose.
 
@@ -146,10 +165,8 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
     """
     first, second, last = int(limb[FIRST]), int(limb[MIDDLE]), int(limb[LAST])
     a, b, axis, point = vector_at(limb, THIGH), vector_at(limb, SHANK), vector_at(limb, AXIS), vector_at(limb, CENTRE)
-    q_root = rotations[0, 0], rotations[0, 1], rotations[0, 2], rotations[0, 3]
-    q_first = rotations[first, 0], rotations[first, 1], rotations[first, 2], rotations[first, 3]
-    q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
-    q_end = rotations[last, 0], rotations[last, 1], rotations[last, 2], rotations[last, 3]
+    q_root, q_end = quaternion_at(rotations, 0), quaternion_at(rotations, last)
+    q_first, q_second = quaternion_at(rotations, first), quaternion_at(rotations, second)
 
     # The last joint's position in the frame of the root, from the root's origin and from the first joint.
     from_root = turned_back(q_root, minus(minus(vector_at(end[0], 0), turned(q_end, point)), vector_at(root[0], 0)))
@@ -190,18 +207,12 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
         d_size = (k_cos * d_cos + k_sin * d_sin) / size
         d_c = (2.0 * dot(line, d_line) - 2.0 * d_axis * b_axis - c * d_size) / size
         turn = wanted_slope * d_c - blended_slope * (d_cos - k_cos / size * d_size) / size
-        w_second = plus(turned_back(bend, w_second), (turn * axis[0], turn * axis[1], turn * axis[2]))
+        w_second = plus(turned_back(bend, w_second), scaled(turn, axis))
         d_u = turned(q_first, plus(cross(w_first, to_last), turned(n_second, cross(w_second, b))))
         d_scalar = dot(u, d_u) * distance / length + dot(line, d_line) * length / distance
         d_scalar += dot(d_u, line) + dot(u, d_line)
         d_vector = plus(cross(d_u, line), cross(u, d_line))
-        # 2 Im(Q⁻¹ ⊗ Q̇), whatever the length of Q.
-        across, share = cross(vector, d_vector), 2.0 / (norm * norm)
-        w_swing = (
-            share * (scalar * d_vector[0] - d_scalar * vector[0] - across[0]),
-            share * (scalar * d_vector[1] - d_scalar * vector[1] - across[1]),
-            share * (scalar * d_vector[2] - d_scalar * vector[2] - across[2]),
-        )
+        w_swing = _angular_velocity(scalar, vector, norm, d_scalar, d_vector)
         w_first = plus(turned_back(q_first, w_swing), w_first)
         w_shank = plus(turned_back(n_second, plus(turned_back(n_first, w_root), w_first)), w_second)
         w_last = minus(w_end, turned_back(n_last, w_shank))

@@ -21,7 +21,7 @@ import numpy as np
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 
-_SAMPLES = 128
+_SAMPLES = 128  # of a lap: half or twice counts the same strides in the nine embedded clips
 _MOST = 12  # largest number of repeats searched in a clip
 _SAME = 1e-3  # [m], or components of rotations: largest difference between repeats
 _FASTER = 3.0  # cost of playing faster relative to slower

@@ -52,6 +52,18 @@ def product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 @njit
+def scaled(k: float, v: Vector) -> Vector:
+    """Multiple k v."""
+    return k * v[0], k * v[1], k * v[2]
+
+
+@njit
 def vector_at(array: Array, at: int) -> Vector:
     """Three numbers of an array (n,)."""
     return array[at], array[at + 1], array[at + 2]
+
+
+@njit
+def quaternion_at(array: Array, row: int) -> Quaternion:
+    """A row of an array (n, 4)."""
+    return array[row, 0], array[row, 1], array[row, 2], array[row, 3]

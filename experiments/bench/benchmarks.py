@@ -17,6 +17,7 @@ from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.map_feed import feed_maps, feed_rows
 from controllers.fields.algebra.program import Compiled, evaluate
+from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, HandState, IntArray
@@ -45,7 +46,7 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.loop.servo import run_block
 
-ROUNDS = 7
+ROUNDS = 7  # of which the fastest counts
 _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
 
@@ -214,12 +215,7 @@ def _map_many(
 
 def map_microseconds(session: Session) -> float:
     """Mean time of h with h_* along the default curve [µs]."""
-    kind, params, memory = session.haptic_map.compiled()
-    pose, jacobian = np.empty(session.haptic_map.nq), np.empty((session.haptic_map.nv, 6))
-    points = stylus_path(session.curve.point(np.linspace(0.0, session.curve.duration, 2000)))
-    units = map_units([(kind, params)])
-    _map_many(units, kind, params, points[:2], memory, pose, jacobian)
-    return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))
+    return _map_microseconds(session.haptic_map, session.curve.point(np.linspace(0.0, session.curve.duration, 2000)))
 
 
 def lifted_microseconds(m: int) -> float:
@@ -231,10 +227,14 @@ def lifted_microseconds(m: int) -> float:
     r, z = 0.03 + step * (k % side) + 0.1 * step * np.sin(lap + k), -0.02 + step * (k // side) + 0.0 * lap
     angles = [np.linspace(0.0, 2.0 * np.pi, len(poses)) for poses, _ in motions]
     lifted = Lifted(motions, [True] * m, angles, np.stack([r, z], axis=-1), figure_legs(figure_model()))
-    kind, params, memory = lifted.compiled()
-    pose, jacobian = np.empty(lifted.nq), np.empty((lifted.nv, 6))
     theta, radius, height = np.random.default_rng(0).uniform([0.0, 0.03, -0.02], [6.28, 0.07, 0.02], (2000, 3)).T
-    points = stylus_path(np.column_stack([radius * np.cos(theta), radius * np.sin(theta), height]))
+    return _map_microseconds(lifted, np.column_stack([radius * np.cos(theta), radius * np.sin(theta), height]))
+
+
+def _map_microseconds(haptic_map: HapticMap, places: Array) -> float:
+    """Mean time of h with h_* at places (n, 3) of an upright stylus [µs]."""
+    kind, params, memory = haptic_map.compiled()
+    pose, jacobian, points = np.empty(haptic_map.nq), np.empty((haptic_map.nv, 6)), stylus_path(places)
     units = map_units([(kind, params)])
     _map_many(units, kind, params, points[:2], memory, pose, jacobian)
     return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))

@@ -12,7 +12,7 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import run_block
 from sim.world.world import FigureKind
 
-_TICKS, _BLOCKS = 1000, 6
+_TICKS, _BLOCKS = 1000, 6  # ticks of a block, and blocks that are timed
 
 
 class FigureCost(NamedTuple):

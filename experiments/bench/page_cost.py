@@ -14,7 +14,7 @@ from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Shown
 
-PICTURES, WARM = 200, 20
+PICTURES, WARM = 200, 20  # that are timed, and drawn before
 
 
 def picture_microseconds(session: Session) -> float:

@@ -12,7 +12,7 @@ from experiments.setups.wiring import wire
 from sim.loop.loop import Loop, groups, record_into
 from sim.recording.recorder import Recorder
 
-_SECONDS, _LONG = 2.0, 20.0
+_SECONDS, _LONG = 2.0, 20.0  # [s] of a short and of a long run
 
 
 class RecorderCost(NamedTuple):

@@ -18,7 +18,7 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import FrameLog, TickLog, run_block
 
 STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
-SECONDS, ROUNDS = 1.0, 5
+SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
 SLICE = 50  # ticks between a run and its replay, so that both meet the same machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {

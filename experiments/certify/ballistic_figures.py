@@ -1,6 +1,6 @@
 """Trials of flights: the physical figure flies the longest flight of clips at many playback rates.
 
-``python -m experiments.certify.ballistic_figures docs/pictures ../shared/mocap`` flies the embedded jump and backflip
+``python -m experiments.certify.ballistic_figures docs/pictures CAPTURES`` flies the embedded jump and backflip
 and two captured jumps, draws the picture of the docs and prints its table.
 """
 

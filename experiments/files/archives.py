@@ -2,17 +2,20 @@
 
 import zipfile
 import zlib
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+from controllers.errors import ControllerError
 from controllers.state import Array
 from experiments.files.whole_file import whole_file
 from sim.errors import SimError
 
 VERSION = 1
 _MAKERS = {"map": "hvf lift", "field": "save_field"}
+Content = TypeVar("Content")
 
 
 def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
@@ -36,22 +39,22 @@ def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
         )  # fmt: skip
 
 
-def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, dict[str, Array]]:
-    """Kind and arrays of a file that `write_archive` wrote.
+def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]], Content]], what: str) -> Content:
+    """What a file holds that `write_archive` wrote, made again from its arrays.
 
     Parameters
     ----------
     path : Path
         The file.
-    kinds : collection of str
-        Kinds of content that are accepted.
+    kinds : mapping of str to callable
+        Kinds of content that are accepted, and what makes them from arrays.
     what : str
         Their common name in messages.
 
     Raises
     ------
     SimError
-        If the file cannot be read, is damaged, or of another kind or version.
+        If the file cannot be read, is damaged, of another kind or version, or its content is not what it should be.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
@@ -65,4 +68,7 @@ def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, di
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
     if kind not in kinds:
         raise SimError(f"{path}: holds a {kind}; expected a {what}: one of {', '.join(kinds)}")
-    return kind, arrays
+    try:
+        return kinds[kind](arrays)
+    except ControllerError as error:
+        raise SimError(f"{path}: {error}") from None

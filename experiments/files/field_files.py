@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-from controllers.errors import ControllerError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.edited import Edited
-from experiments.files.archives import read_archive, write_archive
-from sim.errors import SimError
+from experiments.files.archives import load_archive, write_archive
 
-_KINDS = {"RiverBundle": RiverBundle, "Edited": Edited}
+_KINDS = {"RiverBundle": RiverBundle.from_arrays, "Edited": Edited.from_arrays}
 
 
 def save_field(field: RiverBundle | Edited, path: Path) -> None:
@@ -32,8 +30,4 @@ def load_field(path: Path) -> RiverBundle | Edited:
     SimError
         If the file cannot be read, is of another kind, or its content does not define a field.
     """
-    kind, arrays = read_archive(path, _KINDS, "field")
-    try:
-        return _KINDS[kind].from_arrays(arrays)
-    except ControllerError as error:
-        raise SimError(f"{path}: {error}") from None
+    return load_archive(path, _KINDS, "field")

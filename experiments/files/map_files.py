@@ -3,16 +3,19 @@
 import hashlib
 from pathlib import Path
 
-from controllers.errors import ControllerError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.files.archives import read_archive, write_archive
+from experiments.files.archives import load_archive, write_archive
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
-_KINDS = {"Cylindrical": Cylindrical, "Composite": Composite, "Lifted": Lifted}
+_KINDS = {
+    "Cylindrical": Cylindrical.from_arrays,
+    "Composite": Composite.from_arrays,
+    "Lifted": Lifted.from_arrays,
+}
 
 
 def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
@@ -36,11 +39,7 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
     SimError
         If the file cannot be read, is of another kind, or its content does not define a map.
     """
-    kind, arrays = read_archive(path, _KINDS, "map")
-    try:
-        return _KINDS[kind].from_arrays(arrays)
-    except ControllerError as error:
-        raise SimError(f"{path}: {error}") from None
+    return load_archive(path, _KINDS, "map")
 
 
 def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple[Clip, ...]]:

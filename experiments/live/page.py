@@ -36,7 +36,7 @@ from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
-from sim.viewer.views import VIEWS, View, is_phone, look_from, open_with
+from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] least time between two pictures
@@ -136,16 +136,11 @@ class Page:
 
     def _seen(self, shadows: bool) -> None:
         gui = self.server.gui
-        views = gui.add_button_group("Look at", tuple(VIEWS))
+        add_view_buttons(gui)
         drive = gui.add_button("Drive", icon=viser.Icon.STEERING_WHEEL, hint="Several may watch, one drives.")
         self._field = gui.add_checkbox("Field arrows", True, hint="On the horizontal plane through the stylus.")
         self._shadows = gui.add_checkbox("Shadows", shadows, hint="Without a graphics card the page is faster without.")
         self.desk.look(True)
-
-        @views.on_click
-        def _(event: Any) -> None:
-            if event.client is not None:
-                look_from(event.client, VIEWS[views.value])
 
         @drive.on_click
         def _(event: Any) -> None:

@@ -13,7 +13,7 @@ from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, USER
 
-POINTS = 3000
+POINTS = 3000  # drawn points of a path, at most
 
 
 def crossing_rivers(runs: Path) -> Figure:

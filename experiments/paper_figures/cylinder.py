@@ -26,7 +26,7 @@ from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 
-FRAMES = 9
+FRAMES = 9  # poses of the lap, evenly
 APART = 1.15  # between two frames [m]
 RED, BLUE, GREY = "#b8433a", "#2f6db3", "#c9ced6"
 LEGS = ("pelvis", "thigh", "shank", "foot")

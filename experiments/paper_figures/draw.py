@@ -21,7 +21,7 @@ from experiments.runs.run import run
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
-DPI = 170
+DPI = 170  # pixels per inch
 PAGE = "index.html"
 
 

@@ -13,7 +13,7 @@ from experiments.runs.demo import demo_config
 from sim.recording.recording import Recording
 
 CYLINDER, COMPOSITE, STRETCH, RIVERS = "cylinder", "composite", "stretch", "rivers"
-MILLIMETRES = 1e3
+MILLIMETRES = 1e3  # in a metre
 
 
 def configs() -> dict[str, RunConfig]:

@@ -15,7 +15,7 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import followed
 from sim.viewer.shapes import body_shapes
 
-_FPS = 30.0
+_FPS = 30.0  # [1/s]
 _SECONDS = 12.0  # longest replay; cyclic clips are repeated for as long
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"

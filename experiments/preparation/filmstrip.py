@@ -10,7 +10,7 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGM
 from models.mocap.motion.clip import Clip
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
-_PICTURES = 14
+_PICTURES = 14  # of each figure, evenly over the clip
 _APART = 1.0  # distance between two pictures [m]
 
 

@@ -72,4 +72,4 @@ def followed(
     away = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
     told = report(motion)
     fallen = [*motion.reference.times[away > FALLEN][:1].tolist(), *told.falls[:1]]
-    return Followed(told.residual_force, min(fallen, default=None), seconds, cost)
+    return Followed(told.stance.force_rms, min(fallen, default=None), seconds, cost)

@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 from importlib import import_module
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import mujoco
@@ -171,7 +170,5 @@ class Canvas:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

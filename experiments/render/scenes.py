@@ -33,7 +33,7 @@ MARGIN = 1.1  # size of the picture relative to what must be in it
 ARM_REACH = 0.45  # least visible distance to either side of a root [m]
 LEGEND = 0.1  # room for the legend at the bottom [m]
 ARROW = 0.06  # drawn length of a large force [m]
-TRAIL_SECONDS = 0.6
+TRAIL_SECONDS = 0.6  # [s] of the stylus's path that are drawn behind it
 HIDDEN = 0.004  # shortest arrow that is drawn [m]
 
 _ARROW, _ROD = mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE

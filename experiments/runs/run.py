@@ -50,7 +50,7 @@ from sim.viewer.courses import courses
 from sim.viewer.page import NullPage, Page
 from sim.viewer.shown import Shown
 
-BVH_FPS = 50.0
+BVH_FPS = 50.0  # [1/s]
 VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
 
 

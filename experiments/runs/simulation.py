@@ -43,7 +43,7 @@ from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import intent_of, participant
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
-from experiments.setups.wiring import assemble, check_rates
+from experiments.setups.wiring import assemble, check_rates, check_seconds
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.devices.device import ticks_of
@@ -385,9 +385,7 @@ class Simulation:
         of_kind("record", record, str | Path | None)
         if record is not None and not str(record):
             raise ParameterError("record is empty; expected a folder, or None for a temporary one")
-        least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
-        if not least <= seconds < np.inf:
-            raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
+        check_seconds(self, seconds)
         check_length(Path(record or tempfile.gettempdir()), seconds, self.clock.servo_period)
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 

@@ -32,10 +32,10 @@ from sim.world.robot_world import RobotWorld
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
 TILT = np.radians(75.0)  # tilt of the tool from the vertical
 ORIENTATION = np.array([np.cos(0.5 * TILT), 0.0, np.sin(0.5 * TILT), 0.0])
-SCALE = 1.5
-REACH = (0.07, 0.1)  # [m]
-TURN = (np.radians(15.0), np.radians(25.0))
-ARM_ANGLE = np.radians(30.0)
+SCALE = 1.5  # ratio of the tool's motion to the stylus's: it stays in a ball of 1.5 times the second reach, 15 cm
+REACH = (0.07, 0.1)  # [m] stylus distance up to which the tool follows exactly, and its bound in saturation
+TURN = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
+ARM_ANGLE = np.radians(30.0)  # ψ of `RobotArm` [rad]
 RATE = 60.0  # feedback rate of the arm's computed-torque control [1/s]
 
 

@@ -1,5 +1,6 @@
 """Wiring: from a configuration to a linked servo with stylus and figure in their start state (`wire`)."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -10,9 +11,9 @@ from controllers.curves.stylus import UPRIGHT
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.higher_order import HigherOrder
-from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.base import CompiledMap
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE, Array, HandState
+from controllers.state import STYLUS_POSE, HandState
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
@@ -88,9 +89,7 @@ def wire(
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
-    if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
-        least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
-        raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
+    check_seconds(config, config.seconds)
     check_rates(config)
     world = World(config.scene, config.figure.kind)
     if device is None and config.leads and not world.has_figure:
@@ -162,7 +161,25 @@ def check_rates(settings: Settings) -> None:
     """
     settings.scene.substeps()
     figure = settings.figure
-    check_reference(settings.clock.servo_period * settings.figure.figure_ticks, figure.smoothing, figure.blend)
+    check_reference(figure_period(settings), figure.smoothing, figure.blend)
+
+
+def figure_period(settings: Settings) -> float:
+    """Time between two updates of the figure [s]."""
+    return settings.clock.servo_period * settings.figure.figure_ticks
+
+
+def check_seconds(settings: Settings, seconds: float) -> None:
+    """Check that a run of `seconds` has two updates of the figure or more, and an end.
+
+    Raises
+    ------
+    ParameterError
+        If not.
+    """
+    least = 2.0 * figure_period(settings)
+    if not least <= seconds < math.inf:
+        raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
@@ -197,18 +214,17 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
 
 
 def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
-    figure, period = parts.config.figure, parts.config.clock.servo_period * parts.config.figure.figure_ticks
-    legs = packed_legs(world.figure)
+    figure = parts.config.figure
     return make_reference(
-        world.figure, compiled, period, figure.smoothing, figure.blend, legs, parts.held_seconds
+        world.figure, compiled, figure_period(parts.config), figure.smoothing, figure.blend, packed_legs(world.figure),
+        parts.held_seconds,
     )  # fmt: skip
 
 
 def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    period = parts.config.clock.servo_period * parts.config.figure.figure_ticks
     bounds = parts.config.figure
     gains = parts.gains._replace(force_bound=bounds.residual_force, moment_bound=bounds.residual_moment)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, period)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, figure_period(parts.config))
     return figure.state, _reference(parts, world, compiled)
 
 
@@ -237,7 +253,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
             lower_start(packed_legs(world.figure), poses[0])
-        figure = _velocity(whole_map, argument[0], begin) if moves else None
+        figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:
             begin_in_motion(reference, np.array(begin))
@@ -254,7 +270,3 @@ def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), parts.begins_in_motion)
     # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
     return begin, UPRIGHT if parts.maps.expressive or parts.user.turns else None
-
-
-def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:
-    return map_derivative(haptic_map, argument)[:, :3] @ begin.velocity

@@ -28,12 +28,12 @@ from models.world.scene import SceneConfig
 from sim.reference.reference import make_reference, reference_along
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
-_TUBE = 0.015  # [m]
+_TUBE = 0.015  # [m] radius
 _GLIDE, _AFTER = 0.3, 0.8  # [s] duration of the hand's change, and time measured from its beginning on
 _THROWN = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
 _FIRST, _SPREAD = 1.2, 3.0  # [s] earliest moment, and range of the moments
-_COUNT, _SEED = 200, 11
-_SLID = 0.03  # [m]
+_COUNT, _SEED = 200, 11  # of random moments
+_SLID = 0.03  # [m] largest foot skate that is no slide
 
 
 class Change(NamedTuple):

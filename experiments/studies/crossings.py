@@ -36,10 +36,10 @@ from sim.world.world import place_stylus
 
 Form = Literal["discrete", "smooth"]
 
-ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)
-PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)
-PUSH_SECONDS = 0.2
-SECONDS = 1.25  # from 45 mm before the crossing to 45 mm behind it
+ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)  # between two rivers [degrees]
+PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)  # [N]
+PUSH_SECONDS = 0.2  # [s]
+SECONDS = 1.25  # [s] from 45 mm before the crossing to 45 mm behind it
 CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
 
 GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]

@@ -25,7 +25,7 @@ from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]
-DRAG = 4.0
+DRAG = 4.0  # [N s/m]
 STEP = 15  # between the angles of the table [degrees]
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,

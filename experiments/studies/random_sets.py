@@ -51,7 +51,7 @@ JUDGING = (
 )  # fmt: skip
 """The two halves of the captures of `docs/validation/prepared-captures.md`, without one that is a copy."""
 
-SECONDS = 20.0
+SECONDS = 20.0  # [s] of a run
 MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
 _EVERY = 5  # every fifth frame of the animation is measured: 100 a second
 

@@ -25,7 +25,7 @@ from experiments.certify.trial_simulation import EVERYTHING, Trial, hand_path
 from experiments.config.run_config import RunConfig
 
 HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
-TICKS = 400
+TICKS = 400  # of a simulation
 
 
 class Outcome(NamedTuple):

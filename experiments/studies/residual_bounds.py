@@ -48,7 +48,7 @@ def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> s
     """Number of falls out of all runs, and median residual of the runs that stand [% of body weight]."""
     config = TrackingConfig(gains=FigureGains(force_bound=force, moment_bound=moment))
     reports = [track(Clip(clip.poses, clip.fps * (1.0 + nudge), clip.name), seconds, config) for nudge in NUDGES]
-    fell, residual = sum(bool(one.falls) for one in reports), np.median([one.residual_force for one in reports])
+    fell, residual = sum(bool(one.falls) for one in reports), np.median([one.stance.force_rms for one in reports])
     return f"{fell} of {len(NUDGES)}, {100 * residual:.1f} %" if fell else f"{100 * residual:.1f} %"
 
 

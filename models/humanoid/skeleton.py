@@ -20,6 +20,7 @@ from models.errors import ModelError
 Pose = npt.NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
+# Near de Leva's mean male subject, of 1.741 m and 73.0 kg.
 DEFAULT_STATURE = 1.75  # [m]
 DEFAULT_MASS = 75.0  # [kg]
 
@@ -228,6 +229,12 @@ def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
     angle = float(np.linalg.norm(np.abs(segment.limit).max(axis=1)))
     if angle < _NEARLY_HALF_TURN:
         joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.array([0.0, angle])
+
+
+def soles() -> npt.NDArray[np.float64]:
+    """Centres of `FOOT_CONTACTS` in the frames of their feet, of the default figure, shape (8, 3) [m]."""
+    model = figure_model()
+    return np.array([model.geom(name).pos for name in FOOT_CONTACTS])
 
 
 def figure_model(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> mujoco.MjModel:

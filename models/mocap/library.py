@@ -80,17 +80,21 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     path : Path
         BVH, AMC or DeepMimic.
     hints : Hints or None
-        Facts about the file that the user states in place of estimates; of an own one, the frame rate alone counts.
+        Facts about the file that the user states in place of estimates.
 
     Raises
     ------
     MotionFileError
-        If the file cannot be read, or its skeleton is not a human's.
+        If the file cannot be read, its skeleton is not a human's, or it is the figure's own, of which nothing but the
+        frame rate is there to state.
     """
     hints, motion = hints or Hints(), read_motion(path)
     if hints.frame_rate is not None:
         motion = replace(motion, fps=hints.frame_rate, timed=True)
     if (clip := own_clip(motion)) is not None:
+        if estimated := hints.of_estimates():
+            what = f"it is on the figure's own skeleton, whatever {' and '.join(estimated)} would state"
+            raise MotionFileError(path, 0, what, f"no {' or '.join(estimated)}")
         return Loaded(clip, None)
     roles = roles_of(motion.joints, motion.parents) if hints.roles is None else stated_roles(hints.roles, motion)
     if isinstance(roles, str):

@@ -9,7 +9,7 @@ import numpy as np
 from models.phantom.kinematics import R_HP
 from models.phantom.spec import CLOSING_JOINTS, GIMBAL_JOINTS, MOTOR_JOINTS, phantom_spec
 
-WIDTH, HEIGHT = 960, 720
+WIDTH, HEIGHT = 960, 720  # [pixels]
 
 
 def render(path: str, theta: tuple[float, float, float], gimbal: tuple[float, float, float]) -> None:

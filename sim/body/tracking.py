@@ -115,8 +115,6 @@ class TrackingReport:
         RMS over joints and time of the angle between a joint and its reference [deg].
     root_error, root_error_max : float
         RMS and largest distance of the root from its reference [m].
-    residual_force, residual_force_max : float
-        RMS and peak force of `stance`, as shares of body weight.
     residual_in_flight : float
         Largest component of the residual while the reference flies [N, N m]; zero by construction.
     stance, without_ground_force : Residual
@@ -136,8 +134,6 @@ class TrackingReport:
     joint_error: float
     root_error: float
     root_error_max: float
-    residual_force: float
-    residual_force_max: float
     residual_in_flight: float
     stance: Residual
     without_ground_force: Residual
@@ -261,7 +257,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
         measure.add(wrench[up & rows & (times <= motion.ends)])
         return measure.summary()
 
-    stance, stands = residual(~flies), up & ~flies
+    stands = up & ~flies
     return TrackingReport(
         seconds=period * len(times),
         flight_seconds=period * float(np.sum(flies)),
@@ -270,10 +266,8 @@ def report(motion: TrackedMotion) -> TrackingReport:
         joint_error=float(np.rad2deg(_rms(angles))),
         root_error=_rms(root),
         root_error_max=float(root.max(initial=0.0)),
-        residual_force=stance.force_rms,
-        residual_force_max=stance.force_max,
         residual_in_flight=float(np.abs(wrench[up & flies]).max(initial=0.0)),
-        stance=stance,
+        stance=residual(~flies),
         without_ground_force=residual(~bears),
         grounded=float(np.mean(bears[stands])) if stands.any() else 1.0,
         slide=_slide(motion.contacts, touches),

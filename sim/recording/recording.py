@@ -11,7 +11,6 @@ Other programs can open the file of a killed run with ``h5py.File(path, "r", swm
 
 import json
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import h5py
@@ -229,7 +228,5 @@ class Recording:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -3,7 +3,6 @@
 import html
 import time
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,9 +12,9 @@ from controllers.state import Array
 from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
-from sim.viewer.views import VIEWS, look_from, open_with
+from sim.viewer.views import VIEWS, add_view_buttons, open_with
 
-_FPS = 30.0
+_FPS = 30.0  # pictures sent a second, at most
 
 
 class LivePage:
@@ -44,7 +43,7 @@ class LivePage:
         self._server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields")
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._clock = self._server.gui.add_html("")
-        views = self._server.gui.add_button_group("Look at", tuple(VIEWS))
+        add_view_buttons(self._server.gui)
         ghost = "animation h(p)" if figure == "physical" else ""
         name = "physical figure" if figure == "physical" else "animation h(p)"
         self._stage = LiveStage(self._server.scene, model, drawn, radius, p_WH, name, ghost)
@@ -52,11 +51,6 @@ class LivePage:
         light(self._server.scene)
         open_with(self._server, lambda client: VIEWS["both"])
         self._shown = 0.0
-
-        @views.on_click
-        def _(event: Any) -> None:
-            if event.client is not None:
-                look_from(event.client, VIEWS[views.value])
 
     def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
         """Show a moment with notes below its time, at most 30 times a second; calls in between are ignored."""

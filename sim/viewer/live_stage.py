@@ -19,7 +19,7 @@ from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_shapes, coarser, tube
 from sim.viewer.shown import Shown
 
-MAGNIFICATION = 8.0
+MAGNIFICATION = 8.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # [m] where the hand frame's origin is drawn, out of the figure's reach
 GHOST_AT = np.array([-0.75, 0.45, 0.0])  # [m] offset of the ghost from the figure
 METRES_PER_NEWTON = 0.12  # drawn length of a force

@@ -22,9 +22,9 @@ from sim.viewer.framing import followed, typical_peak
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_shapes, tube
 
-FPS = 30.0
+FPS = 30.0  # [1/s]
 SECONDS = 60.0  # [s] longest replay; of a longer run the beginning is shown
-MAGNIFICATION = 4.0
+MAGNIFICATION = 4.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin is drawn, out of the figure's reach
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
 ARROW = 0.6  # [m] drawn length of a large force (`typical_peak`)

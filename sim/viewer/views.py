@@ -8,9 +8,10 @@ import viser
 
 from controllers.state import Array
 
-FIELD_OF_VIEW = np.deg2rad(34.0)
+FIELD_OF_VIEW = np.deg2rad(34.0)  # vertical [rad]: a ball at the upper edge is drawn 1/cos 17°, 5 % longer than wide
 PANEL = 335.0  # [px] width of viser's panel
 PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel covers the lower part
+LEAST_FREE = 0.3  # least share of the width beside the panel: reached by windows below 479 px that are no phone's
 SHEET = 0.6  # share of the height that the panel covers on a phone
 DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not reported its own
 
@@ -54,7 +55,7 @@ def camera_of(view: View, width: float, height: float) -> Camera:
     m h/(2 tan(α/2)). It is shifted by half of what the panel covers, so that the view is centred in the rest.
     """
     phone = width < PHONE * height
-    free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, 0.3 * width), height)
+    free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, LEAST_FREE * width), height)
     metres = max(2.0 * half / pixels for half, pixels in zip(view.half, free, strict=True))
     side = np.array(view.side) / np.linalg.norm(view.side)
     right, up = screen_axes(-side)
@@ -67,6 +68,16 @@ def screen_axes(forward: Array) -> tuple[Array, Array]:
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     return right, np.cross(right, forward)
+
+
+def add_view_buttons(gui: viser.GuiApi) -> None:
+    """Add buttons that show one of `VIEWS` in the browser in which they are pressed."""
+    views = gui.add_button_group("Look at", tuple(VIEWS))
+
+    @views.on_click
+    def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.client is not None:
+            look_from(event.client, VIEWS[views.value])
 
 
 def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, size: tuple[float, float]) -> None:

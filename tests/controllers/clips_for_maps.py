@@ -3,7 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.legs.limbs import Limb
+from sim.compilation.kernel_units import map_units
 
 JOINTS = 3
 # The three joints as a leg: hip, knee that flexes about y, ankle.
@@ -53,3 +55,14 @@ def difference(end, start):
 def stylus(r, angle, z):
     """Stylus pose at cylindrical coordinates, upright."""
     return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
+
+
+def check_compiled(h_map, x):
+    """Whether the compiled entries give a map's pose and derivative at a stylus pose to the last bit."""
+    (kind, params, memory), pose, other = h_map.compiled(), *np.empty((2, h_map.nq))
+    units, jacobian = map_units([(kind, params)]), np.empty((h_map.nv, 6))
+    evaluate_map(units, kind, params, x, memory, pose)
+    evaluate_map_jacobian(units, kind, params, x, memory, other, jacobian)
+    np.testing.assert_array_equal(pose, h_map.pose(x))
+    np.testing.assert_array_equal(other, pose)
+    np.testing.assert_array_equal(jacobian, h_map.jacobian(x))

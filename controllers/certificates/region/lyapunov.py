@@ -219,7 +219,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     The matrices M that must be positive definite are linear in the unknowns. IPOPT first minimises s, then the inverse
     of the level set's size, with a barrier −Σ log det(M + s I); it starts from an interior point, with s large.
     """
-    n, scale, entries = axis.size, axis.scale, axis.size * (axis.size + 1) // 2
+    n, entries = axis.size, axis.size * (axis.size + 1) // 2
     x, s = ca.SX.sym("x", 2 * entries + 6 + CHANNELS), ca.SX.sym("s")
 
     def form_of(values: Any) -> Form:
@@ -231,23 +231,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
         return Form(low, slope, hand, rate, sigma, bound, gauge, gains, limits.pushes)  # pyright: ignore[reportArgumentType]
 
     form, size = form_of(x), x[2 * entries + 5]
-    sigma, bound = form.sigma, form.bound
-    force = np.array([axis.stiffness, 0.0, axis.damping] + [0.0] * axis.delay) * scale / limits.force
-    reach = [force, np.eye(n)[0] * scale / limits.distance, np.eye(n)[1] * scale / limits.speed]
-    reach += [row * scale / limits.force for row in np.eye(n)[3:]]
-    logs: list[Any] = [ca.log(value + s) for value in (sigma, bound, 100.0 - size, 100.0 - bound, 100.0 - sigma)]
-    for z in cell.corners():
-        a, p = axis.numbers(z).tolist(), form.matrix(z)
-        for early in (True, False):
-            pushes = axis.pushes(a, z[0], cell.lever(z[0]), limits.pushes, early)
-            logs += _pivots(decrease(axis, a, pushes, p, form), s)
-    for z in cell.corners(2):
-        p = form.matrix(z)
-        logs.append(ca.log(size - FILTER_WEIGHT * p[2][2] + s))
-        logs += [ca.log(value + s) for value in (bound - p[0][0], size - p[0][0], size - SPEED_WEIGHT * p[1][1])]
-        for row in reach:
-            logs += _pivots([[p[i][j] - row[i] * row[j] for j in range(n)] for i in range(n)], s)
-    barrier = -ca.sum1(ca.vertcat(*logs)) / len(logs)
+    barrier = _barrier(axis, cell, limits, form, size, s)
     options = {
         "ipopt.print_level": 0,
         "print_time": 0,
@@ -274,6 +258,27 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     return found._replace(
         alpha=np.array(found.alpha), beta=np.array(found.beta), hand=np.array(found.hand), gains=tuple(found.gains)
     )
+
+
+def _barrier(axis: Axis, cell: Cell, limits: Limits, form: Form, size: Any, s: Any) -> Any:
+    """−Σ log det(M + s I), as a mean: for the decrease, the limits, and the size of a form of symbols."""
+    n, scale, sigma, bound = axis.size, axis.scale, form.sigma, form.bound
+    force = np.array([axis.stiffness, 0.0, axis.damping] + [0.0] * axis.delay) * scale / limits.force
+    reach = [force, np.eye(n)[0] * scale / limits.distance, np.eye(n)[1] * scale / limits.speed]
+    reach += [row * scale / limits.force for row in np.eye(n)[3:]]
+    logs: list[Any] = [ca.log(value + s) for value in (sigma, bound, 100.0 - size, 100.0 - bound, 100.0 - sigma)]
+    for z in cell.corners():
+        a, p = axis.numbers(z).tolist(), form.matrix(z)
+        for early in (True, False):
+            pushes = axis.pushes(a, z[0], cell.lever(z[0]), limits.pushes, early)
+            logs += _pivots(decrease(axis, a, pushes, p, form), s)
+    for z in cell.corners(2):
+        p = form.matrix(z)
+        logs.append(ca.log(size - FILTER_WEIGHT * p[2][2] + s))
+        logs += [ca.log(value + s) for value in (bound - p[0][0], size - p[0][0], size - SPEED_WEIGHT * p[1][1])]
+        for row in reach:
+            logs += _pivots([[p[i][j] - row[i] * row[j] for j in range(n)] for i in range(n)], s)
+    return -ca.sum1(ca.vertcat(*logs)) / len(logs)
 
 
 def _pivots(matrix: Any, shift: Any) -> list[Any]:

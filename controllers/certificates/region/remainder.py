@@ -101,17 +101,15 @@ def remainder(
     forms = np.array([form.numbers(z) for z in cell.corners(2)])
     inverses: Array = np.asarray(np.linalg.inv(forms), dtype=np.float64)
 
-    def reach(row: Array) -> float:
+    def largest(*numbers: float) -> float:
         """Largest value of a row vector on ‖x‖ ≤ 1; P⁻¹ is convex in z, so the maximum is at a corner."""
+        row = np.array([*numbers, *np.zeros(n - len(numbers))]) * scale
         return float(np.sqrt(np.einsum("i,nij,j->n", row, inverses, row).max()))
 
-    def rows(*numbers: float) -> Array:
-        return np.array([*numbers, *np.zeros(n - len(numbers))]) * scale
-
-    e, v, y = (reach(rows(*np.eye(3)[i])) for i in range(3))
-    force = max(reach(rows(k, 0.0, b)), reach(np.eye(n)[-1] * scale) if axis.delay else 0.0)
+    e, v, y = (largest(*np.eye(3)[i]) for i in range(3))
+    force = max(largest(k, 0.0, b), largest(*np.eye(n)[-1]) if axis.delay else 0.0)
     spring, viscous = cell.high[2], cell.high[1]
-    total = reach(rows(k + spring, viscous, b))
+    total = largest(k + spring, viscous, b)
     pace_share, slow_share = b / (b + cell.low[1]), b / (b + viscous)
     pace = pace_share * course.pace
     swing = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
@@ -154,13 +152,7 @@ def remainder(
     rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * swing) / slowest * speed
     drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
     if axis.slides:
-        row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(n - 3)])
-        turn = float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
-        part = forms[:, 0].copy()
-        part[:, 0] = 0.0
-        spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
-        cross = 0.5 * spread / scale[0] ** 2 * e
-        cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
+        turn, cross = _turn(forms, scale), _cross(form, forms, inverses, tube, e, scale)
         again = 0.5 * bend * bend / max(course.curvature, 1e-9)
         rate += bend * (pace * e + swing * _pair(inverses, scale, e, v) * level) * cross
         rate += (bend + again) * v * swing * t * speed * cross
@@ -171,6 +163,22 @@ def remainder(
         rate=SAFE * rate, drift=SAFE * drift, newtons=SAFE * newtons, metric=SAFE * metric,
         shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
     )  # fmt: skip
+
+
+def _turn(forms: Array, scale: Array) -> float:
+    """√V of a change by 1 m/s of the velocity and the filtered velocity, as where φ̇ turns."""
+    row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(len(scale) - 3)])
+    return float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
+
+
+def _cross(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e: float, scale: Array) -> float:
+    """Largest change of √V, on √V = 1, for each metre by which e moves along the curve."""
+    part = forms[:, 0].copy()
+    part[:, 0] = 0.0
+    spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
+    cross = 0.5 * spread / scale[0] ** 2 * e
+    cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
+    return cross
 
 
 def _least(forms: Array, i: int, scale: Array) -> float:

@@ -90,22 +90,8 @@ def _return_gap(motion: Motion, own: Features) -> float:
     return float(np.clip(seconds / (seconds + motion.duration), *_GAP))
 
 
-def _points(own: Features) -> Array:
-    return np.concatenate([own.pose, _REACTION * own.velocity, _FOOT * own.support], axis=1)
-
-
-class _Costs(NamedTuple):
+def _costs(own: Array, others: list[tuple[Array, Phase]], scale: float) -> Array:
     """Mismatch of a clip's samples (columns) with other clips at steps of the lap (rows); zero in their gaps."""
-
-    table: Array
-
-    def at(self, lap: Array, s: Array) -> Array:
-        rows = np.round(lap * _STEPS).astype(np.int64) % _STEPS
-        columns = np.round(np.clip(s, 0.0, 1.0) * (SAMPLES - 1)).astype(np.int64)
-        return np.where(s <= 1.0, self.table[rows, columns], 0.0)
-
-
-def _costs(own: Array, others: list[tuple[Array, Phase]], scale: float) -> _Costs:
     lap = np.arange(_STEPS) / _STEPS
     table = np.zeros((_STEPS, SAMPLES))
     for points, phase in others:
@@ -113,17 +99,24 @@ def _costs(own: Array, others: list[tuple[Array, Phase]], scale: float) -> _Cost
         there = points[np.round(np.minimum(s, 1.0) * (SAMPLES - 1)).astype(np.int64)]
         square = squared_distances(there, own)
         table += np.where(s[:, None] <= 1.0, square / (square + scale**2), 0.0)
-    return _Costs(table / len(others))
+    return table / len(others)
 
 
-def _warped(costs: _Costs, start: float, gap: float) -> Phase:
+def _cost_at(costs: Array, lap: Array, s: Array) -> Array:
+    """Entries of the table of `_costs` at shares of the lap and of the clip's time; 0 beyond the clip."""
+    rows = np.round(lap * _STEPS).astype(np.int64) % _STEPS
+    columns = np.round(np.clip(s, 0.0, 1.0) * (SAMPLES - 1)).astype(np.int64)
+    return np.where(s <= 1.0, costs[rows, columns], 0.0)
+
+
+def _warped(costs: Array, start: float, gap: float) -> Phase:
     """Phase with the lead of least cost that is zero at start and end, by dynamic programming."""
     lap = np.arange(_STEPS) / _STEPS
     leads = np.arange(-_BAND, _BAND + 1) / (_STEPS * _FINE)
     s = lap[:, None] / (1.0 - gap) + leads
     # A closed clip continues with its next lap; an open one is clamped to its ends.
     s = np.mod(s, 1.0) if gap == 0.0 else np.where(lap[:, None] < 1.0 - gap, np.clip(s, 0.0, 1.0), 2.0)
-    table = costs.at((start + lap)[:, None] + 0.0 * leads, s)
+    table = _cost_at(costs, (start + lap)[:, None] + 0.0 * leads, s)
     total = np.full(len(leads), np.inf)
     total[_BAND] = 0.0
     steps = np.zeros((_STEPS, len(leads)), dtype=np.int64)
@@ -157,13 +150,13 @@ def _smoothed(lead: Array, gap: float) -> CubicSpline:
     return CubicSpline(knots, smooth * min(1.0, _STEEPEST / max(steepest, 1e-12)), bc_type="periodic")
 
 
-def _mismatch(costs: _Costs, phase: Phase) -> float:
+def _mismatch(costs: Array, phase: Phase) -> float:
     lap = np.arange(_STEPS) / _STEPS
     s = phase.share(lap)
-    return float(costs.at(lap, np.mod(s, 1.0) if phase.gap == 0.0 else s).mean())
+    return float(_cost_at(costs, lap, np.mod(s, 1.0) if phase.gap == 0.0 else s).mean())
 
 
-def _placed(costs: _Costs, gap: float) -> Phase:
+def _placed(costs: Array, gap: float) -> Phase:
     """Phase with the best shift of a clip and, if it is worth it, the best warp."""
     # The gap of every open clip contains the angle 0, where the lap ends.
     starts = np.arange(_STEPS) / _STEPS if gap == 0.0 else gap * np.linspace(0.1, 0.9, 9)
@@ -193,7 +186,7 @@ def common_lap(motions: list[Motion], own: list[Features]) -> list[Phase]:
     own : list of Features
         Features of the motions at `SAMPLES` steps.
     """
-    points = [_points(each) for each in own]
+    points = [np.concatenate([each.pose, _REACTION * each.velocity, _FOOT * each.support], axis=1) for each in own]
     gaps = [_return_gap(motion, each) for motion, each in zip(motions, own, strict=True)]
     coarse = [each[::16] for each in points]
     n = len(motions)

@@ -90,6 +90,106 @@ def near_clips(numbers: Array, angle: float, r: float, z: float, clips: IntArray
     return count
 
 
+# Below, row 0 of an array is a value, and rows 1 to 3 are its derivatives by θ, r and z.
+
+
+@njit
+def _proximities(r: float, z: float, sites: Array, slopes: Array, f: Array) -> int:
+    """Write 1/d_i − 1/R_i, whose cube is W_i, into f (4, m); returns the clip of the largest."""
+    nearest = 0
+    for i in range(sites.shape[0]):
+        dr, dz, reach = r - sites[i, 0], z - sites[i, 1], sites[i, 2]
+        d = np.sqrt(dr * dr + dz * dz + _NEAR * _NEAR)
+        f[0, i] = 1.0 / d - 1.0 / reach
+        cube = 1.0 / (d * d * d)
+        f[1, i] = (dr * slopes[i, 0] + dz * slopes[i, 1]) * cube + slopes[i, 2] / (reach * reach)
+        f[2, i], f[3, i] = -dr * cube, -dz * cube
+        if f[0, i] > f[0, nearest]:
+            nearest = i
+    return nearest
+
+
+@njit
+def _shares(f: Array, nearest: int, v: Array, w: Array, changes: Array) -> None:
+    """Write W_i over the largest one into v (4, m), and ŵ_i and its derivatives into w and changes."""
+    top, total, rise = f[0, nearest], 0.0, work_array(3)
+    rise[:] = 0.0
+    for i in range(w.shape[0]):
+        share = f[0, i] / top
+        v[0, i] = share**3
+        total += v[0, i]
+        for way in range(3):
+            slope = f[1 + way, i] - share * f[1 + way, nearest]
+            v[1 + way, i] = 3.0 * share * share * slope / top
+            rise[way] += v[1 + way, i]
+    for i in range(w.shape[0]):
+        w[i] = v[0, i] / total
+        for way in range(3):
+            changes[way, i] = (v[1 + way, i] - w[i] * rise[way]) / total
+
+
+@njit
+def _centre(w: Array, changes: Array, places: Array, point: Array) -> None:
+    """Subtract q̄ = Σ ŵ_i q_i from the sites q_i, `places` (4, m, 2), and from q, `point` (4, 2)."""
+    mean = work_array((4, 2))
+    mean[:] = 0.0
+    for i in range(w.shape[0]):
+        for k in range(2):
+            mean[0, k] += w[i] * places[0, i, k]
+            for way in range(3):
+                mean[1 + way, k] += changes[way, i] * places[0, i, k] + w[i] * places[1 + way, i, k]
+    for row in range(4):
+        for k in range(2):
+            point[row, k] -= mean[row, k]
+            for i in range(w.shape[0]):
+                places[row, i, k] -= mean[row, k]
+
+
+@njit
+def _fit_plane(places: Array, point: Array, v: Array, ridge: Array, e: Array) -> None:
+    """Write e_i, what the plane of least squares adds at the point, into e (4, m)."""
+    m = places.shape[1]
+    a11, a12, a22 = ridge[0], 0.0, ridge[0]
+    for i in range(m):
+        x, y = places[0, i, 0], places[0, i, 1]
+        a11, a12, a22 = a11 + v[0, i] * x * x, a12 + v[0, i] * x * y, a22 + v[0, i] * y * y
+    determinant = a11 * a22 - a12 * a12
+    u_r, u_z = point[0, 0], point[0, 1]
+    g_r, g_z = (a22 * u_r - a12 * u_z) / determinant, (a11 * u_z - a12 * u_r) / determinant
+    for i in range(m):
+        e[0, i] = v[0, i] * (places[0, i, 0] * g_r + places[0, i, 1] * g_z)
+    for row in range(1, 4):
+        d_u_r, d_u_z = point[row, 0] - ridge[row] * g_r, point[row, 1] - ridge[row] * g_z
+        for i in range(m):
+            x, y, dx, dy = places[0, i, 0], places[0, i, 1], places[row, i, 0], places[row, i, 1]
+            along, d_along = x * g_r + y * g_z, dx * g_r + dy * g_z
+            d_u_r -= (v[row, i] * along + v[0, i] * d_along) * x + v[0, i] * along * dx
+            d_u_z -= (v[row, i] * along + v[0, i] * d_along) * y + v[0, i] * along * dy
+            e[row, i] = v[row, i] * along + v[0, i] * d_along
+        h_r, h_z = (a22 * d_u_r - a12 * d_u_z) / determinant, (a11 * d_u_z - a12 * d_u_r) / determinant
+        for i in range(m):
+            e[row, i] += v[0, i] * (places[0, i, 0] * h_r + places[0, i, 1] * h_z)
+
+
+@njit
+def _add_limited(e: Array, w: Array, changes: Array) -> None:
+    """Add χ e_i to the weights and their derivatives."""
+    square, rise = 0.0, work_array(3)
+    rise[:] = 0.0
+    for i in range(w.shape[0]):
+        square += e[0, i] * e[0, i]
+        for way in range(3):
+            rise[way] += 2.0 * e[0, i] * e[1 + way, i]
+    x = square / (_MOST * _MOST)
+    chi = (1.0 + x * x) ** -0.25
+    for way in range(3):
+        d_chi = -0.5 * x * chi**5 * rise[way] / (_MOST * _MOST)
+        for i in range(w.shape[0]):
+            changes[way, i] += chi * e[1 + way, i] + d_chi * e[0, i]
+    for i in range(w.shape[0]):
+        w[i] += chi * e[0, i]
+
+
 @njit
 def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array, w: Array, changes: Array) -> None:
     """Weights of the nearby clips.
@@ -108,84 +208,24 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
         Written: derivatives by θ, r and z.
     """
     m = sites.shape[0]
-    f, df = work_array(m), work_array((3, m))
-    nearest = 0
-    for i in range(m):
-        dr, dz, reach = r - sites[i, 0], z - sites[i, 1], sites[i, 2]
-        d = np.sqrt(dr * dr + dz * dz + _NEAR * _NEAR)
-        f[i] = 1.0 / d - 1.0 / reach
-        cube = 1.0 / (d * d * d)
-        df[0, i] = (dr * slopes[i, 0] + dz * slopes[i, 1]) * cube + slopes[i, 2] / (reach * reach)
-        df[1, i], df[2, i] = -dr * cube, -dz * cube
-        if f[i] > f[nearest]:
-            nearest = i
-    # All W are divided by the largest, and points are relative to its site, so that the result is exact at a site.
-    top, v, dv, total, mean = f[nearest], work_array(m), work_array((3, m)), 0.0, work_array((4, 3))
-    mean[:] = 0.0
-    for i in range(m):
-        share = f[i] / top
-        v[i] = share**3
-        total += v[i]
-        for k in range(3):
-            dv[k, i] = 3.0 * share * share * (df[k, i] - share * df[k, nearest]) / top
-            mean[1 + k, 2] += dv[k, i]
-    place, d_place = work_array((m, 2)), work_array((m, 2))
+    f, v, e = work_array((4, m)), work_array((4, m)), work_array((4, m))
+    places, point, ridge = work_array((4, m, 2)), work_array((4, 2)), work_array(4)
+    nearest = _proximities(r, z, sites, slopes, f)
+    _shares(f, nearest, v, w, changes)
+    # As all W are divided by the largest, and points are relative to its site, the result is exact at a site.
+    ridge[0] = numbers[_LAMBDA] / f[0, nearest] ** 3
+    for way in range(3):
+        ridge[1 + way] = -3.0 * ridge[0] * f[1 + way, nearest] / f[0, nearest]
+    places[:], point[:] = 0.0, 0.0
     for i in range(m):
         for k in range(2):
-            place[i, k], d_place[i, k] = sites[i, k] - sites[nearest, k], slopes[i, k] - slopes[nearest, k]
-            mean[0, k] += v[i] / total * place[i, k]
-    for way in range(3):
-        for i in range(m):
-            w[i] = v[i] / total
-            changes[way, i] = (dv[way, i] - w[i] * mean[1 + way, 2]) / total
-            for k in range(2):
-                mean[1 + way, k] += changes[way, i] * place[i, k] + (w[i] * d_place[i, k] if way == 0 else 0.0)
-
-    ridge = numbers[_LAMBDA] / top**3
-    a11, a12, a22 = ridge, 0.0, ridge
-    for i in range(m):
-        x, y = place[i, 0] - mean[0, 0], place[i, 1] - mean[0, 1]
-        a11, a12, a22 = a11 + v[i] * x * x, a12 + v[i] * x * y, a22 + v[i] * y * y
-    determinant = a11 * a22 - a12 * a12
-    u_r, u_z = r - sites[nearest, 0] - mean[0, 0], z - sites[nearest, 1] - mean[0, 1]
-    g_r, g_z = (a22 * u_r - a12 * u_z) / determinant, (a11 * u_z - a12 * u_r) / determinant
-    e, de, square, d_square = work_array(m), work_array((3, m)), 0.0, work_array(3)
-    d_square[:] = 0.0
-    for i in range(m):
-        e[i] = v[i] * ((place[i, 0] - mean[0, 0]) * g_r + (place[i, 1] - mean[0, 1]) * g_z)
-        square += e[i] * e[i]
-    for way in range(3):
-        d_u_r, d_u_z = -mean[1 + way, 0], -mean[1 + way, 1]
-        if way == 0:
-            d_u_r, d_u_z = d_u_r - slopes[nearest, 0], d_u_z - slopes[nearest, 1]
-        elif way == 1:
-            d_u_r += 1.0
-        else:
-            d_u_z += 1.0
-        d_ridge = -3.0 * ridge * df[way, nearest] / top
-        d_u_r, d_u_z = d_u_r - d_ridge * g_r, d_u_z - d_ridge * g_z
-        for i in range(m):
-            x, y = place[i, 0] - mean[0, 0], place[i, 1] - mean[0, 1]
-            dx, dy = -mean[1 + way, 0], -mean[1 + way, 1]
-            if way == 0:
-                dx, dy = dx + d_place[i, 0], dy + d_place[i, 1]
-            along, d_along = x * g_r + y * g_z, dx * g_r + dy * g_z
-            d_u_r -= (dv[way, i] * along + v[i] * d_along) * x + v[i] * along * dx
-            d_u_z -= (dv[way, i] * along + v[i] * d_along) * y + v[i] * along * dy
-            de[way, i] = dv[way, i] * along + v[i] * d_along
-        h_r, h_z = (a22 * d_u_r - a12 * d_u_z) / determinant, (a11 * d_u_z - a12 * d_u_r) / determinant
-        for i in range(m):
-            de[way, i] += v[i] * ((place[i, 0] - mean[0, 0]) * h_r + (place[i, 1] - mean[0, 1]) * h_z)
-            d_square[way] += 2.0 * e[i] * de[way, i]
-
-    x = square / (_MOST * _MOST)
-    chi = (1.0 + x * x) ** -0.25
-    for way in range(3):
-        d_chi = -0.5 * x * chi**5 * d_square[way] / (_MOST * _MOST)
-        for i in range(m):
-            changes[way, i] += chi * de[way, i] + d_chi * e[i]
-    for i in range(m):
-        w[i] += chi * e[i]
+            places[0, i, k], places[1, i, k] = sites[i, k] - sites[nearest, k], slopes[i, k] - slopes[nearest, k]
+    point[0, 0], point[0, 1] = r - sites[nearest, 0], z - sites[nearest, 1]
+    point[1, 0], point[1, 1] = -slopes[nearest, 0], -slopes[nearest, 1]
+    point[2, 0], point[3, 1] = 1.0, 1.0
+    _centre(w, changes, places, point)
+    _fit_plane(places, point, v, ridge, e)
+    _add_limited(e, w, changes)
 
 
 def reaches(sites: Array, r_range: tuple[float, float], z_range: tuple[float, float]) -> Array:

@@ -2,7 +2,6 @@
 
 import time
 from collections import deque
-from dataclasses import replace
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -220,12 +219,6 @@ class Engine:
                 self._record = self.tubes.record_at(place.memory)
                 return place.params + StretchyGains._fields.index("until")
         return 0
-
-
-def take_session(session: Session, config: RunConfig, handled: tuple[tuple[float, float], ...]) -> Session:
-    """The session with which a take is measured: with the gains at its end, and the spans in which the hand dragged."""
-    parts = replace(session.parts, config=config, handled=handled)
-    return replace(session, parts=parts)
 
 
 def _within_reach(point: Array, centre: Array, reach: float) -> Array:

@@ -219,9 +219,9 @@ class _Runner:
         shown: dict[str, Any] = {
             "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
             "recording": 0.0 if self._take is None else self._take.seconds(engine), "qpos": shown_configuration(servo),
-            "reference": servo.reference.pose, "p": hand[POSITION], "v": hand[VELOCITY], "switch": hand[HAND_SWITCH],
+            "reference": servo.reference.pose, "p": hand[POSITION], "switch": hand[HAND_SWITCH],
             "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
-            "phase": trace[TRACE_PHASE], "residual": float(np.linalg.norm(servo.figure.applied[:3])),
+            "residual": float(np.linalg.norm(servo.figure.applied[:3])),
             "target": np.full(3, np.nan) if engine.drag is None else engine.drag.target,
             "ghost": self._ghost(trace, servo.reference.pose),
         }  # fmt: skip

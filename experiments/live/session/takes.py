@@ -1,14 +1,14 @@
 """Takes: recorded spans of a live session, each in a folder like those of ``hvf run``, for ``hvf report``."""
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config.part import to_dict, to_json
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
-from experiments.live.session.engine import Engine, take_session
+from experiments.live.session.engine import Engine
 from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
 from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.stretch_summary import stretch_summary
@@ -88,7 +88,8 @@ class Take:
         if seconds < LEAST:
             self._recorder.close()
             raise SimError(f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {LEAST:g} s or more")
-        session = take_session(engine.session, engine.config, tuple(self._handled))
+        parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled))
+        session = replace(engine.session, parts=parts)
         speed = SpeedSummary(seconds / (time.perf_counter() - self._wall), 0.0, peak_memory_mb())
         with Recording(self.folder / RECORDING) as recording:
             summary = summarise(

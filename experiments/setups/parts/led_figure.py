@@ -25,7 +25,7 @@ from models.mocap.motion.clip import CLOSES, Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import lap_of
 
-_PHASES = 256
+_PHASES = 256  # samples of a lap that tell which feet stand: of a lap of a second, one in 4 ms
 _UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
 _SWING = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 

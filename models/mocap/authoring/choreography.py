@@ -12,7 +12,7 @@ from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step
 from models.mocap.authoring.balance import balanced_clip
 from models.mocap.motion.clip import Clip
 
-FPS = 60.0
+FPS = 60.0  # [1/s]
 
 
 def angry() -> Choreography:

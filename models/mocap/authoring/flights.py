@@ -12,14 +12,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from models.arrays import Array
-from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
+from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.authoring.authoring import Arm
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
 from models.mocap.motion.clip import Clip
 
-FPS = 120.0
+FPS = 120.0  # [1/s]
 _HIP = 0.0875  # half the distance of the hips [m]: the feet stand below them
 # Symmetric degrees of freedom, with the weights of a distance of a radian (metre) from the sketch.
 _ACTIVE = (
@@ -94,6 +93,7 @@ class Flight(NamedTuple):
     weights: Weights
 
 
+# Arms that hang, and that are swung back before a jump.
 _HANG = Arm(raised=8, plane=60, elbow=14)
 _BACK = Arm(raised=48, plane=165, elbow=18)
 

@@ -15,13 +15,12 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
-from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
+from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task
 from models.mocap.motion.clip import Clip
 
-FPS = 120.0
+FPS = 120.0  # [1/s]
 _ACTIVE = (
     ("position", "xyz"), ("root", "xyz"), ("abdomen", "xyz"), ("chest", "xyz"), ("head", "xyz"),
     *((f"{side}_{joint}", axes) for side in ("left", "right")

@@ -27,8 +27,8 @@ _CERTAIN = 0.005
 _NEAR, HAND_REACH = 0.06, 0.12
 # Speed below which a palm rests [m/s]. With 0.55 LAFAN's fall from 36 s, whose hands then stand more briefly, falls.
 _HAND_SLOW = 0.6
-# Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures (../shared/prepare-prototype.md):
-# ±1 cm and ±0.1 m/s move the residual of what is prepared by less than 1 point.
+# Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures with a prototype: ±1 cm and
+# ±0.1 m/s move the residual of what is prepared by less than 1 point.
 _REACH, _SLOW = 0.045, 0.55
 # Share of the root's speed below which they stand, too, but do not rest: if they did, SNU's run, led, would have a
 # residual of 15 % of weight instead of 8, and the embedded run's soles would slide by 3.8 cm instead of 2.4.

@@ -11,8 +11,11 @@ from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
 from models.mocap.motion import quaternions
+from models.mocap.motion.clip import pose_difference
 
-_DELTA = 1e-3  # [s] step of the finite differences for angular velocity and acceleration
+# Step of the finite differences for angular velocity and acceleration [s]. Half or twice moves the backflip's
+# velocities, of up to 10 rad/s, by 5e-5 or 2e-4, and its accelerations, of up to 116 rad/s², by 5e-4 or 2e-3.
+_DELTA = 1e-3
 
 
 def coordinate(joint: str, axis: str) -> int:
@@ -51,19 +54,10 @@ def reflection() -> Array:
 def poses(coordinates: Array) -> Array:
     """MuJoCo poses of coordinates, shape (..., 57) → (..., 75); quaternions are exp(½ rotation vector)."""
     shape = coordinates.shape[:-1]
-    vectors = coordinates[..., 3:].reshape(*shape, 18, 3)
-    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
     pose = np.empty((*shape, N_POSE))
     pose[..., :3] = coordinates[..., :3]
-    turns = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
-    pose[..., 3:] = turns.reshape(*shape, 72)
+    pose[..., 3:] = quaternions.exponential(coordinates[..., 3:].reshape(*shape, 18, 3)).reshape(*shape, 72)
     return pose
-
-
-def _turns(a: Array, b: Array) -> Array:
-    """log(a⁻¹ b) of the rotations in two arrays of poses, shape (m, 54)."""
-    first, second = (p[:, 3:].reshape(-1, 4) for p in (a, b))
-    return quaternions.logarithm(quaternions.product(quaternions.conjugate(first), second)).reshape(len(a), 54)
 
 
 def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:
@@ -71,6 +65,6 @@ def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:
     bend = 0.5 * _DELTA**2 * ddu
     before, now, after = poses(u - _DELTA * du + bend), poses(u), poses(u + _DELTA * du + bend)
     velocity, acceleration = du.copy(), ddu.copy()
-    velocity[:, 3:] = _turns(before, after) / (2 * _DELTA)
-    acceleration[:, 3:] = (_turns(now, after) - _turns(before, now)) / _DELTA**2
+    velocity[:, 3:] = pose_difference(before, after)[:, 3:] / (2 * _DELTA)
+    acceleration[:, 3:] = (pose_difference(now, after) - pose_difference(before, now))[:, 3:] / _DELTA**2
     return now, velocity, acceleration

@@ -163,12 +163,6 @@ class Floor:
         return columns.transpose(0, 2, 1) @ np.linalg.solve(inside, np.broadcast_to(np.diag(self._scale), inside.shape))
 
 
-def soles() -> Array:
-    """Centres of the contact spheres in the frames of their feet, shape (8, 3) [m]."""
-    model = figure_model()
-    return np.array([model.geom(name).pos for name in FOOT_CONTACTS])
-
-
 def residual(demand: Demand, grip: Array) -> Array:
     """Residual wrench r = w − A f that contact forces leave, shape (m, 6) [N, N m]."""
     return demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)

@@ -61,7 +61,8 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
         then = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
         changed = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
         bend = _turn(axis, np.where(changed, then - np.abs(now), 0.0))
-        swing = _arc(upper + quaternions.rotated(bend, lower), np.where(changed[:, None], wanted, upper + lower))
+        now_at, wanted_at = upper + quaternions.rotated(bend, lower), np.where(changed[:, None], wanted, upper + lower)
+        swing = quaternions.arcs(_unit(now_at), _unit(wanted_at))
         new_thigh = quaternions.product(swing, segments[:, first])
         new_shank = quaternions.product(swing, quaternions.product(bend, segments[:, second]))
         for body, parent, child in (
@@ -85,8 +86,5 @@ def _turn(axis: Array, angle: Array) -> Array:
     return np.concatenate([np.cos(half), np.sin(half) * axis], axis=1)
 
 
-def _arc(u: Array, v: Array) -> Array:
-    """The smallest rotations that turn directions u into directions v, less than half a turn apart, (n, 3) → (n, 4)."""
-    u, v = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (u, v))
-    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
-    return q / np.linalg.norm(q, axis=1, keepdims=True)
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

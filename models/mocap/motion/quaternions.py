@@ -1,4 +1,4 @@
-"""Arrays of unit quaternions (wxyz): product, rotation of vectors, heading, logarithm, slerp."""
+"""Arrays of unit quaternions (wxyz): product, rotation of vectors, heading, exponential, logarithm, arcs, slerp."""
 
 import numpy as np
 
@@ -44,6 +44,22 @@ def heading(q: Array) -> Array:
     """Angle about z [rad] by which the x axis is turned in the plane, shape (...)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def exponential(v: Array) -> Array:
+    """Rotations by rotation vectors [rad] of shape (..., 3), shape (..., 4)."""
+    half = v / 2.0
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    return np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1)
+
+
+def arcs(u: Array, v: Array) -> Array:
+    """The smallest rotations from unit vectors u to v, (n, 3) → (n, 4); for opposite vectors about any normal axis."""
+    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
+    length = np.linalg.norm(q, axis=1, keepdims=True)
+    aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
+    q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
 def logarithm(q: Array) -> Array:
@@ -97,6 +113,4 @@ def sign_continuous(q: Array) -> Array:
 
 def slerped(q: Array, r: Array, share: float | Array) -> Array:
     """Spherical linear interpolation by `share` (0 to 1) from q to r along the shortest rotation, shape (..., 4)."""
-    half = share / 2 * logarithm(product(conjugate(q), r))
-    angle = np.linalg.norm(half, axis=-1, keepdims=True)
-    return product(q, np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1))
+    return product(q, exponential(share * logarithm(product(conjugate(q), r))))

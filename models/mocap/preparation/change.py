@@ -16,12 +16,14 @@ from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssu
 
 from models.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
-from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.poses import around, plus
 
 DEGREE = 5
-_STEP = 1e-3  # step of the finite differences for velocities and accelerations [s]
+# Step of the finite differences for velocities and accelerations [s]. Half or twice moves accelerations of up to 250
+# rad/s², of a kick with rough changes, by 1.7 or 4.2. SNU's run is prepared alike to 0.03° RMS, its walk with half
+# otherwise by 0.6° (it lacks 2.8 % of weight instead of 2.6), with twice by 0.02°.
+_STEP = 1e-3
 _HELD = DEGREE - 1  # outer control points at either end of an open motion that equal the first or last free one
 _MARGIN = 12  # frames beyond a closed clip's ends: their influence on its cubic spline decays by 0.27 a frame, to 1e-7
 
@@ -124,21 +126,14 @@ class Change:
             plus(self._reference_at(times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
             for o in (-1.0, 0.0, 1.0)
         ]
-        m = len(times)
-        turns = [pose[:, 3:].reshape(m, 18, 4) for pose in moments]
-
-        def between(a: Array, b: Array) -> Array:
-            return quaternions.logarithm(quaternions.product(quaternions.conjugate(a), b)).reshape(m, 54)
-
-        v, a = np.empty((m, N_TANGENT)), np.empty((m, N_TANGENT))
-        v[:, :3] = (moments[2][:, :3] - moments[0][:, :3]) / (2 * _STEP)
-        a[:, :3] = (moments[2][:, :3] - 2 * moments[1][:, :3] + moments[0][:, :3]) / _STEP**2
-        v[:, 3:] = between(turns[0], turns[2]) / (2 * _STEP)
-        a[:, 3:] = (between(turns[1], turns[2]) - between(turns[0], turns[1])) / _STEP**2
+        before, now, after = moments
+        v = pose_difference(before, after) / (2 * _STEP)
+        a = (pose_difference(now, after) - pose_difference(before, now)) / _STEP**2
+        a[:, :3] = (after[:, :3] - 2 * now[:, :3] + before[:, :3]) / _STEP**2
         if self._rests:
             rests = (times <= 0.0) | (times >= self._end - 1e-9)
             v[rests] = a[rests] = 0.0
-        return State(moments[1], v, a)
+        return State(now, v, a)
 
     def changed(self, x: Array, fps: float) -> Clip:
         """The changed clip at a frame rate [1/s]; closed if the clip was."""

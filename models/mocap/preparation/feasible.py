@@ -94,9 +94,6 @@ class FeasibleWeights:
         return np.repeat([self.place, self.root, *joints], 3)
 
 
-_WEIGHTS = FeasibleWeights()
-
-
 class Feasible(NamedTuple):
     """A motion made feasible.
 
@@ -147,9 +144,8 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS,
-    passage: bool = False,
-) -> Feasible:  # fmt: skip
+    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, passage: bool = False
+) -> Feasible:
     """The motion nearest to a clip that is feasible with a given contact schedule, as far as it can be found.
 
     Parameters
@@ -162,13 +158,11 @@ def feasible(
         Largest number of Gauss–Newton iterations.
     fps : float
         Frame rate of the result [1/s].
-    weights : FeasibleWeights
-        Weights of the errors.
     passage : bool
         Whether the clip is a part of a longer motion that is unchanged beyond its ends.
     """
     change = Change(clip, _KNOT, _STEP, passage)
-    problem = _Problem(change, schedule, weights)
+    problem = _Problem(change, schedule)
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
     sizes = change.size(points)
@@ -191,10 +185,10 @@ def _rms(values: Array) -> float:
 class _Problem:
     """The least-squares problem of one clip."""
 
-    def __init__(self, change: Change, schedule: Stances, weights: FeasibleWeights) -> None:
-        self.change, self.w = change, weights
+    def __init__(self, change: Change, schedule: Stances) -> None:
+        self.change, self.w = change, FeasibleWeights()
         self.contacts = WITH_HANDS[: schedule.standing.shape[1]]
-        self.floor = Floor(weights.moment / weights.force, self.contacts)
+        self.floor = Floor(self.w.moment / self.w.force, self.contacts)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
         self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
         self.grounded = (schedule.standing | schedule.sliding)[frames]
@@ -203,8 +197,8 @@ class _Problem:
         self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
         self.low, self.high = joint_range()[..., 0] + MARGIN, joint_range()[..., 1] - MARGIN
         self.fixed = Normal(change)
-        tracking = weights.tracking() ** 2
-        calm = np.where(np.arange(N_TANGENT) < 3, weights.sway, weights.jerk) ** 2
+        tracking = self.w.tracking() ** 2
+        calm = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
         for interval in range(change.intervals):
             here = np.flatnonzero(change.first == interval)
             blocks = [np.einsum("ma,mb->ab", basis[here], basis[here]) for basis in (change.basis[0], change.basis[3])]
@@ -269,15 +263,13 @@ class _Problem:
     def errors(self, x: Array, with_jacobian: bool, instants: npt.NDArray[np.intp] | slice = _ALL) -> _Errors:
         """Nonlinear errors of a change: torques (51), wrench (6), slip (3k), depth (k), limits (51)."""
         w, k = self.w, len(self.contacts)
-        slips, depths = slice(_W, _W + 3 * k), slice(_W + 3 * k, _W + 4 * k)
         state = self.change.states(x.reshape(-1, N_TANGENT), instants)
         m = len(state.q)
         pushing, grounded, pinned = self.pushing[instants], self.grounded[instants], self.pinned[instants]
         dynamics = InverseDynamics(state, with_jacobian, self.contacts)
         demand = dynamics.demand
         grip = self.floor.grip(demand, pushing)
-        columns = demand.columns()
-        residual = demand.wrench - np.einsum("mij,mj->mi", columns, grip)
+        residual = demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)
         weight = self.floor.body_weight
         scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / weight
         scale = scale * np.repeat([w.force, w.moment], 3)
@@ -287,39 +279,47 @@ class _Problem:
         excess = vectors - np.clip(vectors, self.low, self.high)
         beyond = np.maximum(np.abs(excess), _EXACT)
         # Its square is 2 e |excess| - e² beyond e = _EXACT.
-        limited = excess / beyond * np.sqrt(2.0 * _EXACT * beyond - _EXACT**2)
+        root = np.sqrt(2.0 * _EXACT * beyond - _EXACT**2)
+        limited = excess / beyond * root
         share = demand.torque_on(grip) / torque_limit()
         strain = share - np.clip(share, -_STRONG, _STRONG)
         parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), low, w.limit * limited.reshape(m, 51)]
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
             return _Errors(weighted, None, residual, grip, share)
-        answer = self.floor.answer(demand, grip)
-        projection = np.eye(6) - columns @ answer
-        pushes = grip.reshape(m, k, 4) @ EDGES
         jacobian = np.zeros((m, 3, weighted.shape[1], N_TANGENT))
-        moving = dynamics.wrench
-        arms = np.zeros((m, 6, N_TANGENT))
-        for sphere in range(k):
-            # Moments of the contact forces change with their lever arms.
-            arms[:, 3:] -= quaternions.cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
-        moving[:, 0] -= arms
-        jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
+        self._differentiate_forces(jacobian, dynamics, grip, scale, strain)
+        slips, depths = slice(_W, _W + 3 * k), slice(_W + 3 * k, _W + 4 * k)
         jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
         jacobian[:, 0, depths] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        slope = w.limit * _EXACT / np.sqrt(2.0 * _EXACT * beyond - _EXACT**2) * (excess != 0)
+        slope = w.limit * _EXACT / root * (excess != 0)
         rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
         for joint in range(17):
             of = slice(3 * joint, 3 * joint + 3)
             jacobian[:, 0, depths.stop :][:, of, 6:][:, :, of] = rates[:, joint]
+        return _Errors(weighted, jacobian, residual, grip, share)
+
+    def _differentiate_forces(
+        self, jacobian: Array, dynamics: InverseDynamics, grip: Array, scale: Array, strain: Array
+    ) -> None:
+        """Write the rows of torques and residual wrench; the contact forces follow the wrench by `Floor.answer`."""
+        demand, moving = dynamics.demand, dynamics.wrench
+        answer = self.floor.answer(demand, grip)
+        projection = np.eye(6) - demand.columns() @ answer
+        pushes = grip.reshape(len(grip), -1, 4) @ EDGES
+        arms = np.zeros((len(grip), 6, N_TANGENT))
+        for sphere in range(len(self.contacts)):
+            # Moments of the contact forces change with their lever arms.
+            arms[:, 3:] -= quaternions.cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
+        moving[:, 0] -= arms
+        jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
         hot = np.flatnonzero(np.any(strain != 0, axis=1))
         if len(hot):
-            gain = w.strain * (strain[hot] != 0) / torque_limit()
+            gain = self.w.strain * (strain[hot] != 0) / torque_limit()
             follows = demand.levers()[hot] @ answer[hot]
             torque = dynamics.torque[hot] - np.einsum("mti,moin->motn", follows, moving[hot])
             torque[:, 0] -= dynamics.leaning(pushes, hot)
             jacobian[hot, :, :_N] = gain[:, None, :, None] * torque
-        return _Errors(weighted, jacobian, residual, grip, share)
 
 
 class Borne(NamedTuple):
@@ -346,7 +346,7 @@ class Borne(NamedTuple):
 def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
     change = Change(clip, _KNOT, _STEP, passage)
-    problem = _Problem(change, schedule, _WEIGHTS)
+    problem = _Problem(change, schedule)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
     weight = problem.floor.body_weight
     pushes = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight

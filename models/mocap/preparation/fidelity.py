@@ -10,8 +10,8 @@ from models.mocap.preparation.bounds import beyond
 from models.mocap.preparation.looping import Looped
 from models.mocap.preparation.poses import resampled
 
-# Largest RMS distances [rad], [rad], [m]. In the prototype (../shared/prepare-prototype.md) gaits moved by 1.7 to 3°,
-# fighting and a punch by 7 to 8°, roots by 2.3 to 6.6 cm.
+# Largest RMS distances of joints of a gait and of another motion [rad], and of the root [m]: in a prototype of the
+# preparation gaits moved by 1.7 to 3°, fighting and a punch by 7 to 8°, roots by 2.3 to 6.6 cm.
 GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
 _LISTED = 5  # joints listed
 _TRAVELS = 0.4  # way of a lap beyond which a closed clip that does not turn over is a gait [m]

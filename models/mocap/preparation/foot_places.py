@@ -19,8 +19,8 @@ from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.spans import cleaned, spans
 
-# Rate [rad/s] and angle [rad] from which a foot turns in its stance: no walk or run of ../shared/mocap has such a turn;
-# other values were not tried.
+# Rate [rad/s] and angle [rad] from which a foot turns in its stance: no walk or run among the 28 captures of
+# docs/validation/prepared-captures.md has such a turn; other values were not tried.
 _TURNING, _TURN = 1.5, np.deg2rad(45.0)
 # Vertical load above which something must bear [body weights]: half or twice changes whether a sphere stands in 0.9 %
 # or less of the frames of 19 captures.

@@ -22,7 +22,8 @@ from models.mocap.motion.spans import cleaned, spans
 
 # [body weights]: of 39 times that a palm rests near the floor in falls of LAFAN and in a crawl, a roll and two gettings
 # up of DeepMimic, 32 make up for 0.27 or more, 7 for 0.17 or less; with half of it five more bear load, with twice
-# three fewer. No hand bears load in the other captures of ../shared/mocap but two cartwheels (0.64 and more).
+# three fewer. Of the 28 captures of docs/validation/prepared-captures.md hands bear load in two cartwheels alone (0.64
+# and more).
 _NEEDED = 0.2
 
 

@@ -14,7 +14,8 @@ from models.mocap.dynamics.floor_forces import Demand, carriers
 from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
 
-_ANGLE, _RATE = 1e-5, 1e-4  # steps of the finite differences [rad], [rad/s]
+# Steps of the finite differences [rad], [rad/s]: half or twice of either moves derivatives by 6e-6 of them at most.
+_ANGLE, _RATE = 1e-5, 1e-4
 
 
 class InverseDynamics:
@@ -53,16 +54,13 @@ class InverseDynamics:
         by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
         self.spheres, self.com = np.zeros((many, len(geoms), 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
         self.anchors, self.turns = np.zeros((2, many, c, 3, N_TANGENT))
-        result, moved, full = np.zeros(N_TANGENT), np.zeros(model.nq), np.empty((N_TANGENT, N_TANGENT))
-        step = np.zeros(N_TANGENT)
-        kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
         for k in range(m):
             d.qpos[:], d.qvel[:], d.qacc[:] = state.q[k], state.v[k], state.a[k]
-            kinematics(model, d)
-            places(model, d)
-            rates(model, d)
-            inverse(model, d, 1, result)
-            force[k], spheres[k], com[k] = result, d.geom_xpos[geoms], d.subtree_com[1]
+            mujoco.mj_kinematics(model, d)
+            mujoco.mj_comPos(model, d)
+            mujoco.mj_comVel(model, d)
+            mujoco.mj_rne(model, d, 1, force[k])
+            spheres[k], com[k] = d.geom_xpos[geoms], d.subtree_com[1]
             anchors[k], frames[k], root[k] = d.xpos[bodies], d.xmat[bodies], d.xmat[1].reshape(3, 3)
             if not with_jacobian:
                 continue
@@ -71,27 +69,7 @@ class InverseDynamics:
             for i, body in enumerate(bodies):
                 mujoco.mj_jac(model, d, self.anchors[k, i], self.turns[k, i], anchors[k, i], body)
             mujoco.mj_jacSubtreeCom(model, d, self.com[k], 1)
-            mujoco.mj_crb(model, d)
-            _full_mass(model, d, full)
-            by[k, 2] = full
-            qvel, qpos, here = d.qvel, d.qpos, state.q[k]
-            for i in range(3, N_TANGENT):
-                qvel[i] += _RATE
-                rates(model, d)
-                inverse(model, d, 1, result)
-                qvel[i] = state.v[k, i]
-                by[k, 1, :, i] = (result - force[k]) / _RATE
-            for i in range(3, N_TANGENT):
-                step[i] = _ANGLE
-                moved[:] = here
-                mujoco.mj_integratePos(model, moved, step, 1.0)
-                step[i] = 0.0
-                qpos[:] = moved
-                kinematics(model, d)
-                places(model, d)
-                rates(model, d)
-                inverse(model, d, 1, result)
-                by[k, 0, :, i] = (result - force[k]) / _ANGLE
+            _differentiate(model, d, force[k], by[k])
         arm = com - state.q[:, :3]
         moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
         wrench = np.concatenate((force[:, :3], moment), axis=1)
@@ -137,6 +115,35 @@ class InverseDynamics:
             change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, joint]
             leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, joint].transpose(0, 2, 1) @ change
         return leaning
+
+
+def _differentiate(model: mujoco.MjModel, d: mujoco.MjData, force: Array, by: Array) -> None:
+    """Write the derivatives of generalised forces (57,) by position, velocity and acceleration, shape (3, 57, 57)."""
+    changed, full = np.zeros(N_TANGENT), np.empty((N_TANGENT, N_TANGENT))
+    # Bound once: this loop calls them a hundred times for each of some hundred states in an iteration.
+    kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
+    mujoco.mj_crb(model, d)
+    _full_mass(model, d, full)
+    by[2] = full
+    qvel, qpos = d.qvel, d.qpos
+    here, speed, moved, step = qpos.copy(), qvel.copy(), np.zeros(model.nq), np.zeros(N_TANGENT)
+    for i in range(3, N_TANGENT):
+        qvel[i] += _RATE
+        rates(model, d)
+        inverse(model, d, 1, changed)
+        qvel[i] = speed[i]
+        by[1, :, i] = (changed - force) / _RATE
+    for i in range(3, N_TANGENT):
+        step[i] = _ANGLE
+        moved[:] = here
+        mujoco.mj_integratePos(model, moved, step, 1.0)
+        step[i] = 0.0
+        qpos[:] = moved
+        kinematics(model, d)
+        places(model, d)
+        rates(model, d)
+        inverse(model, d, 1, changed)
+        by[0, :, i] = (changed - force) / _ANGLE
 
 
 def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:

@@ -48,7 +48,7 @@ _BACK = (0.6, 1.0)  # duration of a way back [s], and what each radian of the la
 # twice changes none.
 _STEP, _YAW = 0.10, np.deg2rad(15.0)
 # Time in which limbs come to rest at an end [s]: in a longer one they pass their joint limits. The root has more for
-# each m/s of its speed, up to the last number.
+# each m/s of its speed [s per m/s], up to the last number [s].
 _REST = 0.35
 _REST_LONGER, _REST_LONGEST = 0.2, 0.8
 # How far a joint may leave its range as it comes to rest [rad], and how often its time is halved, down to 0.01 s.

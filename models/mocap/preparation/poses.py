@@ -18,9 +18,7 @@ def plus(poses: Array, tangents: Array) -> Array:
     """Poses plus tangents, (..., 75) and (..., 57) → (..., 75): mj_integratePos over a unit of time."""
     carried = np.array(poses, dtype=np.float64)
     carried[..., :3] += tangents[..., :3]
-    half = tangents[..., 3:].reshape(*tangents.shape[:-1], 18, 3) / 2.0
-    angle = np.linalg.norm(half, axis=-1, keepdims=True)
-    turn = np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1)
+    turn = quaternions.exponential(tangents[..., 3:].reshape(*tangents.shape[:-1], 18, 3))
     rotations = poses[..., 3:].reshape(*poses.shape[:-1], 18, 4)
     carried[..., 3:] = quaternions.product(rotations, turn).reshape(*poses.shape[:-1], 72)
     return carried
@@ -71,6 +69,14 @@ def around(clip: Clip, margin: int) -> tuple[Array, int]:
     turns = poses[:, 3:].reshape(len(poses), -1, 4)
     poses[:, 3:] = quaternions.sign_continuous(turns).reshape(len(poses), -1)
     return poses, margin
+
+
+def with_neighbours(clip: Clip, smooth: Clip) -> tuple[Array, Array, int]:
+    """Poses of a clip and of the same clip low-passed, closed ones with a lap before and after, and the first frame."""
+    if not clip.closes():
+        return clip.poses, smooth.poses, 0
+    poses, first = around(clip, clip.n_frames)
+    return poses, around(smooth, clip.n_frames)[0], first
 
 
 def sole_points(poses: Array) -> Array:

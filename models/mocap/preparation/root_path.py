@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import around, sole_points
+from models.mocap.preparation.poses import sole_points, with_neighbours
 from models.mocap.preparation.stances import sliding_support
 
 # σ [s]: about a frame of 30 Hz captures; the optimisation of the dynamics smooths further. With half and twice of it a
@@ -35,11 +35,7 @@ def on_resting_support(clip: Clip, smooth: Clip) -> Clip:
         The same low-passed.
     """
     n = clip.n_frames
-    if clip.closes():
-        poses, first = around(clip, n)
-        calm, _ = around(smooth, n)
-    else:
-        poses, calm, first = clip.poses, smooth.poses, 0
+    poses, calm, first = with_neighbours(clip, smooth)
     bearing = sliding_support(poses, calm, clip.fps)
     if not bearing.any():
         return clip

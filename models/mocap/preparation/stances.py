@@ -16,9 +16,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, soles
 from models.mocap.dynamics.contacts import standing_parts
-from models.mocap.dynamics.floor_forces import WITH_HANDS, soles
+from models.mocap.dynamics.floor_forces import WITH_HANDS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.spacetime import LAG
 from models.mocap.motion import quaternions
@@ -26,7 +26,7 @@ from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.motion.spans import cleaned, spans
 from models.mocap.preparation.foot_places import LOADED, lying, place_foot, turns
 from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
-from models.mocap.preparation.poses import around, contact_points, sole_points
+from models.mocap.preparation.poses import contact_points, sole_points, with_neighbours
 
 # Half or twice of each of the next numbers, down to `_SMOOTHING`, changes whether a sphere stands in 0.9 % or less of
 # the frames of 19 captures.
@@ -89,13 +89,8 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     smooth : Clip
         The same low-passed, from which the vertical load is computed.
     """
-    closed = clip.closes()
-    if closed:
-        # A lap to either side: a stance over the seam has one place, however long it is.
-        poses, first = around(clip, clip.n_frames)
-        calm, _ = around(smooth, clip.n_frames)
-    else:
-        poses, calm, first = clip.poses, smooth.poses, 0
+    # A lap to either side: a stance over the seam has one place, however long it is.
+    poses, calm, first = with_neighbours(clip, smooth)
     points, fps = contact_points(poses, WITH_HANDS), clip.fps
     parts, hands, load = _support(poses, points, calm, fps)
     if not hands.any():

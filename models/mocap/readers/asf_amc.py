@@ -25,8 +25,8 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
-FPS = 120.0
-_INCH = 0.0254
+FPS = 120.0  # [1/s], CMU's: an AMC file does not say its own
+_INCH = 0.0254  # [m]
 _FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 

@@ -16,7 +16,7 @@ from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.source_motion import SourceMotion
 
-_CENTIMETRES = 100.0
+_CENTIMETRES = 100.0  # in a metre: the file's unit of length, as is usual for BVH
 _TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
          "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
 _TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]

@@ -16,9 +16,9 @@ from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 _LONGEST = 0.1  # longest gap that is interpolated [s]
 # Least ratio of a gap's jumps to the 95th percentile of the joint's steps, and of a single frame's distance from the
-# middle of its neighbours to the 95th percentile of such distances. Of the captures in ../shared/mocap and the embedded
-# clips, at their own rates and down to 15 Hz, joints that turn out and back by `_TURN` have at most 4.9; but for a hand
-# of CMU 16_09, whose markers flip for a frame.
+# middle of its neighbours to the 95th percentile of such distances. Of the captures of
+# docs/validation/prepared-captures.md and the embedded clips, at their own rates and down to 15 Hz, joints that turn
+# out and back by `_TURN` have at most 4.9; but for a hand of CMU 16_09, whose markers flip for a frame.
 _TIMES = 5.5
 # Half or twice of `_LONGEST` or of the next numbers changes none of the 17 captures of the tuning half, but for half of
 # `_TURN`, which changes one by 0.3° RMS.

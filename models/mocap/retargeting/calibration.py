@@ -27,7 +27,7 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
-from models.mocap.retargeting.segment_frames import arcs, carried, frames
+from models.mocap.retargeting.segment_frames import carried, frames
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 from models.mocap.retargeting.sole_calibration import calibrated_foot, flat_frames
 
@@ -163,7 +163,8 @@ def _put_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
         turned = carried(source, wanted, straight)
         if name == "pelvis":
             # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
-            turned = quaternions.product(arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
+            side = quaternions.rotated(turned, np.array([0.0, 1.0, 0.0]))
+            turned = quaternions.product(quaternions.arcs(side, hips), turned)
         body.put(name, turned)
     if "abdomen" not in body.roles.segments:
         body.put("abdomen", quaternions.slerped(body.of("pelvis"), body.of("chest"), 0.5))
@@ -234,12 +235,12 @@ def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool)
         ]
         own = quaternions.rotated(segments[:, 0], abdomen) + quaternions.rotated(segments[:, 1], chest)
         own = unit(own + (ends[0] + ends[1]) / 2.0)
-        turn = arcs(own, np.where(np.isnan(trunk), own, trunk))
+        turn = quaternions.arcs(own, np.where(np.isnan(trunk), own, trunk))
         segments[:, carried] = quaternions.product(turn[:, None], segments[:, carried])
         if not clavicled:
             continue
         own = quaternions.rotated(turn, unit(ends[0] - ends[1]))
-        turn = arcs(own, np.where(np.isnan(shoulders), own, shoulders))
+        turn = quaternions.arcs(own, np.where(np.isnan(shoulders), own, shoulders))
         segments[:, sides] = quaternions.product(turn[:, None], segments[:, sides])
 
 
@@ -251,7 +252,7 @@ def _limb(
     if np.isnan(bone).any():
         return parent if source is None else carried(source, parent, np.ones(len(parent)))
     bone = unit(bone)
-    straight = quaternions.product(arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
+    straight = quaternions.product(quaternions.arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
     unbent = quaternions.rotated(straight, np.eye(3)[across])
     sine = np.linalg.norm(hinge, axis=1, keepdims=True)
     evidence = np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent
@@ -267,4 +268,4 @@ def _limb(
     columns[:, third] = np.cross(columns[:, (third + 1) % 3], columns[:, (third + 2) % 3])
     turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
     # In files that stretch bones, or bend them at joints in between, bones turn relative to the joint frames.
-    return quaternions.product(arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)
+    return quaternions.product(quaternions.arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
 from models.mocap.motion import quaternions
 
 # Largest height difference of the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
@@ -36,7 +36,6 @@ _UNEVEN = 0.025
 # than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
-_PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
 
 
 def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array]:
@@ -58,7 +57,7 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     """
     ankles = root[:, None, 2] + _ankles(segments)[..., 2]
     feet = segments[:, _FEET]
-    points = _contact_points()
+    points = soles().reshape(2, 4, 3)
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
     floor = _floor(heights)
     bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
@@ -67,12 +66,6 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     segments = segments.copy()
     segments[:, _FEET] = quaternions.product(feet, quaternions.about_axis(1, bend))
     return root - np.array([0.0, 0.0, floor]), segments
-
-
-def _contact_points() -> Array:
-    """Centres of the contact spheres in the frames of the feet, shape (2, 4, 3)."""
-    model = figure_model()
-    return np.array([[model.geom(f"{side}_{place}").pos for place in _PLACES] for side in ("left", "right")])
 
 
 def _ankles(segments: Array) -> Array:
@@ -94,16 +87,16 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     root, segments, fps
         As in `on_the_floor`.
     """
-    soles = (root[:, None] + _ankles(segments))[:, :, None] + quaternions.rotated(
-        segments[:, _FEET][:, :, None], _contact_points()
+    points = (root[:, None] + _ankles(segments))[:, :, None] + quaternions.rotated(
+        segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3)
     )
-    middle = soles.mean(axis=2)
-    lower = np.arange(len(soles)), np.argmin(middle[..., 2], axis=1)
-    if len(soles) < 4:
+    middle = points.mean(axis=2)
+    lower = np.arange(len(points)), np.argmin(middle[..., 2], axis=1)
+    if len(points) < 4:
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
     # Not `contacts.standing_parts`: there is no floor yet over which a sole could be low.
-    stands = (np.ptp(soles[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
+    stands = (np.ptp(points[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
     begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also where the other foot takes over
     stances = int(begins.sum())
     slopes = _slopes(middle[lower][stands], stances) if stances >= _STEPS else np.zeros(2)

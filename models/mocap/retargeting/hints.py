@@ -40,3 +40,8 @@ class Hints:
             raise ModelError(f"rest frame is {self.rest_frame}; expected a frame of the file, counted from 0")
         if self.frame_rate is not None and not 0.1 <= self.frame_rate <= 1e4:
             raise ModelError(f"frame rate is {self.frame_rate:g} a second; expected 0.1 to 10000, such as 60")
+
+    def of_estimates(self) -> tuple[str, ...]:
+        """Options of the command line that are stated in place of an estimate; nobody estimates a frame rate."""
+        stated = {"--up": self.up, "--rest-frame": self.rest_frame, "--roles": self.roles}
+        return tuple(option for option, value in stated.items() if value is not None)

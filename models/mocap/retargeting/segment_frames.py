@@ -1,4 +1,4 @@
-"""Rotations of segments: from two directions, by a constant offset from a joint, and from one direction to another."""
+"""Rotations of segments: from two directions, and by a constant offset from a joint."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,12 +22,3 @@ def carried(source: Array, wanted: Array, weights: Array) -> Array:
     offsets = Rotation.from_quat(quaternions.product(quaternions.conjugate(source), wanted), scalar_first=True)
     constant = np.asarray(offsets.mean(weights).as_quat(scalar_first=True))
     return quaternions.product(source, constant)
-
-
-def arcs(u: Array, v: Array) -> Array:
-    """The smallest rotations from unit vectors u to v, (n, 3) → (n, 4); for opposite vectors about any normal axis."""
-    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
-    length = np.linalg.norm(q, axis=1, keepdims=True)
-    aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
-    q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
-    return q / np.linalg.norm(q, axis=1, keepdims=True)

@@ -16,8 +16,9 @@ _PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs,
 # the joints of 19 captures by 0.5° RMS, twice by 0.02°.
 _LOW = 0.05
 _ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
-# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the captures of ../shared/mocap, 30° in one of
-# fifty others. A squat on the toes, and single poses with a foot in the air, have 37 to 114°.
+# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the 28 captures of
+# docs/validation/prepared-captures.md, 30° in one of fifty others. A squat on the toes, and single poses with a foot in
+# the air, have 37 to 114°.
 _STRANGE = np.deg2rad(35.0)
 _SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals: half or twice changes none of 17 captures
 # Standard deviation of a sole's likely inclination about that of the mean ankle: half or twice turns the joints of 19

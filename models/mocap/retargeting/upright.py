@@ -30,10 +30,11 @@ from models.mocap.retargeting.skeleton_roles import Roles
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 # Half or twice of β, or of any of the numbers below but the least scores, finds the same axes for 17 captures.
 _CUSTOM = 0.1  # β
-_CERTAIN = 0.25  # least lead of the best axis over the next: files of ../shared/mocap have 0.72 and more
-# Least score of the best axis where bodies rest on the ground, and where they hardly do. In files of
-# ../shared/mocap it is 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a
-# second have 0.1 and less, and 0.37 and less.
+# Least lead of the best axis over the next: the 28 captures of docs/validation/prepared-captures.md have 0.72 and more.
+_CERTAIN = 0.25
+# Least score of the best axis where bodies rest on the ground, and where they hardly do. In the same captures it is
+# 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a second have 0.1 and less,
+# and 0.37 and less.
 _LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes

@@ -6,10 +6,8 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.legs.limbs import Limb
-from sim.compilation.kernel_units import map_units
-from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, check_compiled, difference, stylus, swinging
 
 R = (0.03, 0.07)
 LOWER, RED, BLUE = (
@@ -70,14 +68,7 @@ def test_the_derivative_agrees_with_differences_on_the_manifold():
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    compiled, x = MAP.compiled(), stylus(0.05, 2.0, 0.01)
-    pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-    units = map_units([(compiled.kind, compiled.params)])
-    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
-    np.testing.assert_array_equal(pose, MAP.pose(x))
-    np.testing.assert_array_equal(other, pose)
-    np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+    check_compiled(MAP, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(

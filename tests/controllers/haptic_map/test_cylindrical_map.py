@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 from controllers.curves.cylinder import eased
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
 from controllers.motion.mean import mean_rotation
-from sim.compilation.kernel_units import map_units
-from tests.controllers.clips_for_maps import JOINTS, LEG, difference, matrices, stylus, swinging
+from tests.controllers.clips_for_maps import JOINTS, LEG, check_compiled, difference, matrices, stylus, swinging
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]
@@ -200,14 +198,7 @@ def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    compiled, x = MOVING.compiled(), stylus(0.05, 2.0, 0.01)
-    pose, other, jacobian = np.empty(MOVING.nq), np.empty(MOVING.nq), np.empty((MOVING.nv, 6))
-    units = map_units([(compiled.kind, compiled.params)])
-    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
-    np.testing.assert_array_equal(pose, MOVING.pose(x))
-    np.testing.assert_array_equal(other, pose)
-    np.testing.assert_array_equal(jacobian, MOVING.jacobian(x))
+    check_compiled(MOVING, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
-from sim.compilation.kernel_units import map_units
-from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, check_compiled, difference, stylus, swinging
 
 ROWS = 48
 TURN = 2.0 * np.pi
@@ -67,14 +65,7 @@ def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    compiled, x = MAP.compiled(), stylus(0.05, 2.0, 0.004)
-    pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-    units = map_units([(compiled.kind, compiled.params)])
-    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
-    np.testing.assert_array_equal(pose, MAP.pose(x))
-    np.testing.assert_array_equal(other, pose)
-    np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+    check_compiled(MAP, stylus(0.05, 2.0, 0.004))
 
 
 def test_a_clip_is_moved_over_the_ground_as_a_whole():

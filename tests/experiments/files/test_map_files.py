@@ -15,7 +15,7 @@ from controllers.haptic_map.lifted import Lifted
 from experiments.cli import main
 from experiments.config.part import to_dict
 from experiments.config.words import run_config
-from experiments.files.archives import read_archive, write_archive
+from experiments.files.archives import load_archive, write_archive
 from experiments.files.field_files import save_field
 from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
 from experiments.fitting.figure_legs import figure_legs
@@ -138,7 +138,7 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
     write_archive(path, "Lifted", {})
     monkeypatch.undo()
     with pytest.raises(SimError, match="of version 2 of the format, this program reads 1"):
-        read_archive(path, ("Lifted",), "map")
+        load_archive(path, {"Lifted": Lifted.from_arrays}, "map")
 
 
 def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):

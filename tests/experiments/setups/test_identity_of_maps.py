@@ -33,7 +33,7 @@ def residual(config: RunConfig) -> float:
 
 @cache
 def bound(name: str) -> float:
-    return track(embedded(name), SECONDS, TrackingConfig()).residual_force + POINTS
+    return track(embedded(name), SECONDS, TrackingConfig()).stance.force_rms + POINTS
 
 
 @pytest.mark.slow

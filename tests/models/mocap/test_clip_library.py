@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from models.mocap.library import convert, embedded, embedded_names, load, load_c
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.own_bvh import write_bvh
+from models.mocap.retargeting.hints import Hints
 
 
 @pytest.fixture
@@ -66,3 +69,21 @@ def test_a_clip_can_be_converted_onto_itself(own_file):
     before = load_clip(own_file)
     convert(own_file, own_file, overwrite=True)
     np.testing.assert_allclose(load_clip(own_file).poses, before.poses, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("hints", "option"),
+    [
+        (Hints(up="+Y"), "--up"),
+        (Hints(rest_frame=2), "--rest-frame"),
+        (Hints(roles=Path("roles.toml")), "--roles"),
+    ],
+)
+def test_what_an_own_file_leaves_nothing_to_state_of_is_refused(own_file, tmp_path, hints, option):
+    with pytest.raises(MotionFileError, match=rf"the figure's own skeleton.*expected no {option}"):
+        convert(own_file, tmp_path / "out.bvh", hints=hints)
+    assert not (tmp_path / "out.bvh").exists()
+
+
+def test_the_frame_rate_of_an_own_file_can_be_stated(own_file):
+    assert load(own_file, Hints(frame_rate=50.0)).clip.fps == 50.0

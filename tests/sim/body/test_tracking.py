@@ -30,7 +30,7 @@ def test_a_feasible_motion_needs_no_help():
     result = track(_squats(), 2.5)
     assert result.joint_error < 1.0
     assert result.root_error_max < 0.005
-    assert result.residual_force_max < 0.01
+    assert result.stance.force_max < 0.01
     # 1 or 0.9992 by a start moved by 1 nm: one update of 1250, and three may be.
     assert result.grounded > 0.997
     assert result.flight_seconds == 0.0
@@ -42,8 +42,8 @@ def test_the_residual_of_a_clip_that_is_not_repeated_is_not_diluted_by_the_time_
     angry = embedded("angry")
     part = Clip(angry.poses[: angry.n_frames // 3], angry.fps, "part of angry")
     short, long = track(part, part.duration), track(part, part.duration + 3.0)
-    assert short.residual_force > 0.005
-    assert long.residual_force == pytest.approx(short.residual_force, rel=1e-2)
+    assert short.stance.force_rms > 0.005
+    assert long.stance.force_rms == pytest.approx(short.stance.force_rms, rel=1e-2)
     assert long.seconds == pytest.approx(short.seconds + 3.0, abs=0.01)
 
 
@@ -51,21 +51,21 @@ def test_the_figure_holds_a_push_up():
     """Its palms are where load is planned for: what else of a hand touched the floor would hold them above it."""
     result = track(held(61), 1.0)
     assert result.falls == ()
-    assert result.residual_force < 0.02
+    assert result.stance.force_rms < 0.02
     assert result.root_error_max < 0.01
 
 
 def test_light_and_tall_figures_squat_too():
     result = track(_squats(), 1.0, TrackingConfig(mass=50.0))
     assert result.joint_error < 1.0
-    assert result.residual_force_max < 0.01
+    assert result.stance.force_max < 0.01
 
 
 def test_the_walk_stays_within_its_figures():
     result = track(embedded("walk"), 4.0)
     assert result.joint_error <= 5.0
     assert result.root_error_max <= 0.05
-    assert result.residual_force <= 0.04  # 0.057 where a foot is not planned to be set down
+    assert result.stance.force_rms <= 0.04  # 0.057 where a foot is not planned to be set down
     assert result.grounded >= 0.99
     assert result.slide <= 0.03
     assert result.warnings == 0
@@ -99,7 +99,7 @@ def test_every_embedded_clip_goes_through_the_physics(name):
     result = track(embedded(name), 1.65 if name == "backflip" else 2.0)
     assert result.warnings == 0
     assert result.residual_in_flight == 0.0
-    assert result.residual_force_max <= FigureGains().force_bound * (1 + 1e-9)
+    assert result.stance.force_max <= FigureGains().force_bound * (1 + 1e-9)
     assert np.isfinite(result.joint_error)
     assert result.joint_error < 2.0
 
@@ -120,7 +120,7 @@ def test_an_infeasible_motion_shows_in_the_residual():
     poses = np.tile(glide.poses[0], (121, 1))
     poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, feet and all
     result = track(Clip(poses, 60.0, "glide"), 1.5)
-    assert result.residual_force > 0.05 or result.root_error > 0.05
+    assert result.stance.force_rms > 0.05 or result.root_error > 0.05
 
 
 def test_the_same_motion_tracks_the_same_every_time():

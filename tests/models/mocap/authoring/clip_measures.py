@@ -1,12 +1,14 @@
 """What a clip does, measured from its frames through MuJoCo alone: feet, centre of mass, momentum, floor forces."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import mujoco
 import numpy as np
 from scipy.optimize import nnls
 
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, JOINTS, figure_model, joint_range
+from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
 
 G = 9.81
@@ -27,7 +29,9 @@ class Measures:
     touching: np.ndarray
 
 
-def measure(clip: Clip) -> Measures:
+@cache
+def measured(name: str) -> Measures:
+    clip = embedded(name)
     model = figure_model()
     data = mujoco.MjData(model)
     geoms = [model.geom(name).id for name in FOOT_CONTACTS]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from clip_measures import G, acceleration, limit_excess, measure, overlap, residuals, rms, slide, steps
+from clip_measures import G, acceleration, measured, rms, steps
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
 from models.mocap.authoring import gait
@@ -18,11 +18,6 @@ RIGHT = slice(4, 8)
 @pytest.fixture(scope="module", params=sorted(GAITS))
 def name(request):
     return request.param
-
-
-@pytest.fixture(scope="module")
-def measured():
-    return {name: measure(embedded(name)) for name in GAITS}
 
 
 def joint_angle(clip, joint, axis):
@@ -43,31 +38,11 @@ def test_goes_straight_ahead_at_its_speed_and_closes(name):
     assert abs(clip.displacement.yaw) < 1e-6
 
 
-def test_second_step_mirrors_the_first(name, measured):
-    m, half = measured[name], round(GAITS[name].period * gait.FPS / 2)
+def test_second_step_mirrors_the_first(name):
+    m, half = measured(name), round(GAITS[name].period * gait.FPS / 2)
     ahead = np.array([GAITS[name].speed * GAITS[name].period / 2, 0, 0])
     left, right = m.soles[:-half, LEFT], m.soles[half:, RIGHT]
     np.testing.assert_allclose(right - ahead, left * (1, -1, 1), atol=1e-6)
-
-
-def test_feet_do_not_slide_nor_sink(name, measured):
-    assert slide(measured[name]) < 0.006
-    assert measured[name].soles[..., 2].min() > -0.003
-
-
-def test_joints_stay_inside_their_ranges(name):
-    assert limit_excess(embedded(name)) < 0
-
-
-def test_limbs_do_not_run_through_one_another(name):
-    assert overlap(embedded(name)) < 0.008
-
-
-def test_floor_contact_alone_can_drive_it(name, measured):
-    force, moment = residuals(measured[name])
-    assert rms(force) < 0.005
-    assert force.max() < 0.02
-    assert rms(moment) < 0.002
 
 
 def test_accelerations_change_little_from_frame_to_frame(name):
@@ -77,15 +52,15 @@ def test_accelerations_change_little_from_frame_to_frame(name):
     assert change.max() < 0.35 * lap.max()
 
 
-def test_walk_has_double_support_and_never_flies(measured):
-    touching = measured["walk"].touching
+def test_walk_has_double_support_and_never_flies():
+    touching = measured("walk").touching
     left, right = touching[:, LEFT].any(axis=1), touching[:, RIGHT].any(axis=1)
     assert (left | right).all()
     assert 0.15 < (left & right).mean() < 0.35
 
 
-def test_walk_strikes_with_the_heel_and_leaves_with_the_toe(measured):
-    touching = measured["walk"].touching
+def test_walk_strikes_with_the_heel_and_leaves_with_the_toe():
+    touching = measured("walk").touching
     heel, toe = touching[:, :2].any(axis=1), touching[:, 2:4].any(axis=1)
     change = np.diff((heel | toe).astype(int))
     down, up = np.flatnonzero(change == 1) + 1, np.flatnonzero(change == -1)
@@ -97,8 +72,8 @@ def test_walk_strikes_with_the_heel_and_leaves_with_the_toe(measured):
     assert not heel[up].any()
 
 
-def test_walk_has_the_two_humps_of_a_normal_floor_force(measured):
-    force = acceleration(measured["walk"])[:, 2] / G + 1
+def test_walk_has_the_two_humps_of_a_normal_floor_force():
+    force = acceleration(measured("walk"))[:, 2] / G + 1
     half = round(gait.WALK.period * gait.FPS / 2)
     step = force[:half]
     assert 1.05 < step.max() < 1.5
@@ -106,14 +81,14 @@ def test_walk_has_the_two_humps_of_a_normal_floor_force(measured):
     assert step.mean() == pytest.approx(1.0, abs=0.02)
 
 
-def test_walk_bobs_and_sways_as_people_do(measured):
-    com = measured["walk"].com
+def test_walk_bobs_and_sways_as_people_do():
+    com = measured("walk").com
     assert 0.015 < np.ptp(com[:, 2]) < 0.06
     assert 0.015 < np.ptp(com[:, 1]) < 0.07
 
 
-def test_run_flies_between_steps_and_falls_with_g(measured):
-    m = measured["run"]
+def test_run_flies_between_steps_and_falls_with_g():
+    m = measured("run")
     air = ~m.touching.any(axis=1)
     assert 0.15 < air.mean() < 0.45
     inner = air[3:-3] & air[2:-4] & air[4:-2] & air[1:-5] & air[5:-1]
@@ -134,8 +109,8 @@ def test_joint_angles_follow_the_published_curves(name, joint, sign):
     assert np.corrcoef(angle, curve)[0, 1] > 0.9
 
 
-def test_arms_swing_against_the_legs_and_elbows_bend_forwards_only(name, measured):
-    clip, bodies = embedded(name), measured[name].bodies
+def test_arms_swing_against_the_legs_and_elbows_bend_forwards_only(name):
+    clip, bodies = embedded(name), measured(name).bodies
 
     def ahead(body):
         return bodies[:, 1 + BODIES.index(body), 0] - bodies[:, 1, 0]

@@ -6,7 +6,7 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation import feasible
 from models.mocap.preparation.change import DEGREE, Change, Normal
-from models.mocap.preparation.feasible import FeasibleWeights, _Problem
+from models.mocap.preparation.feasible import _Problem
 from models.mocap.preparation.poses import plus, resampled, smoothed
 from models.mocap.preparation.stances import stances
 
@@ -69,7 +69,7 @@ def test_a_passage_goes_on_at_its_ends_as_it_was():
 
 def test_memory_does_not_hold_all_jacobians(change, monkeypatch):
     """The normal equations by chunks of knot intervals are those of all at once."""
-    problem = _Problem(change, stances(change.clip, change.clip), FeasibleWeights())
+    problem = _Problem(change, stances(change.clip, change.clip))
     x = 1e-3 * np.random.default_rng(4).normal(size=change.n_points * N_TANGENT)
     whole, g = problem._linearised(x)
     monkeypatch.setattr(feasible, "_CHUNK", 3)
@@ -105,7 +105,7 @@ def test_the_jacobian_of_the_errors(change, monkeypatch):
     """Against central differences along random changes; contacts keep their edges for so small a step."""
     monkeypatch.setattr(feasible, "_STRONG", 0.02)  # so that most torques count, those of standing legs among them
     clip = change.clip
-    problem = _Problem(change, stances(clip, smoothed(clip)), FeasibleWeights())
+    problem = _Problem(change, stances(clip, smoothed(clip)))
     # Narrow ranges, so that bent joints exceed them about all axes, where a rotation is no longer its vector's change.
     problem.low, problem.high = 0.05 * problem.low, 0.05 * problem.high
     rng = np.random.default_rng(3)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
-from models.mocap.dynamics.floor_forces import soles
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, soles
 from models.mocap.preparation.foot_places import place_foot, turns
 from models.mocap.preparation.stances import Stances, clearance
 

@@ -19,7 +19,7 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import feasible
 from models.mocap.preparation.change import DEGREE, Change
-from models.mocap.preparation.feasible import FeasibleWeights, _Problem, borne
+from models.mocap.preparation.feasible import _Problem, borne
 from models.mocap.preparation.hand_stances import bear_longer
 from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import stances
@@ -140,7 +140,7 @@ def test_the_jacobian_with_loaded_hands(monkeypatch):
     clip = Clip(np.array([pose_of(propped(angle)) for angle in arms]), 60.0, "push-up")
     schedule, change = stances(clip, clip), Change(clip, 0.1, 0.05, passage=True)
     assert schedule.hands.all()
-    problem, rng = _Problem(change, schedule, FeasibleWeights()), np.random.default_rng(6)
+    problem, rng = _Problem(change, schedule), np.random.default_rng(6)
     x, along = 1e-3 * rng.normal(size=(2, change.n_points * N_TANGENT)) * ((1.0,), (1e3,))
     errors = problem.errors(x, True)
     assert (errors.grip[:, 4 * PALMS.start :].sum(axis=1) > 0.1 * problem.floor.body_weight).all()
