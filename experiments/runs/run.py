@@ -211,9 +211,9 @@ def write_animations(out: Path, session: Session) -> None:
         n = -(-len(reference) // stride)
         per_frame = stride * session.servo.figure_ticks
         poses_at = default_poses(session, stride)
-        starts = range(0, n, BLOCK_FRAMES)
+        starts, stature = range(0, n, BLOCK_FRAMES), session.world.config.stature
         blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
-        write_bvh_blocks(
-            out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
-        )
-        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(*(c[rows] for c in on_curve)) for rows in blocks))
+        edited = (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
+        write_bvh_blocks(out / EDITED, n, fps, edited, stature)
+        default = (poses_at(*(c[rows] for c in on_curve)) for rows in blocks)
+        write_bvh_blocks(out / DEFAULT, n, fps, default, stature)

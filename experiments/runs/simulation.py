@@ -25,7 +25,7 @@ from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
 from experiments.runs.run_result import Run
-from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
+from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, for_size_of, own_parts, reached
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import intent_of, participant
@@ -80,7 +80,7 @@ class Cylindrical:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return cylindrical_parts(tuple(self.clips), _place(self), world.figure)
+        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), _place(self), model))
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Composite:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return composite_parts(tuple(self.clips), _place(self), world.figure)
+        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), _place(self), model))
 
 
 def _check_map(part: Cylindrical | Composite) -> None:

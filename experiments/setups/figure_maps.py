@@ -29,7 +29,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.balance import balanced
-from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.fitting.blendable import grounded, keeps_pace, longest_flight, not_blendable, off_pace, same
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import carried
 from experiments.fitting.push_trials import followed_map
@@ -42,7 +42,7 @@ from experiments.setups.modes.rivers import default_choice, river_bundle
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of, reached
 from experiments.setups.parts.part_types import ClipMapParts
-from models.humanoid.skeleton import N_POSE
+from models.humanoid.skeleton import DEFAULT_STATURE, N_POSE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 
@@ -70,6 +70,25 @@ class Place(NamedTuple):
     radius: float
     reach: float
     expressive: bool
+
+
+def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMapParts]) -> ClipMapParts:
+    """Map parts of a figure of any stature: made for the default one, whose motions clips are, and in proportion to it.
+
+    Lengths in proportion s at the same times scale accelerations by s, and gravity stays: a flight of the scaled motion
+    is ballistic at 1/√s of its own pace (equal Froude number, Alexander 1989, *Optimization and gaits in the locomotion
+    of vertebrates*, Physiol. Rev. 69, 1199-1227).
+    """
+    size = proportion(figure)
+    if size == 1.0:
+        return made(figure)
+    parts = made(figure_model())
+    flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
+    falls = (
+        f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
+        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' own pace"
+    )
+    return replace(parts, size=size, remarks=parts.remarks + ((falls,) if flying else ()))
 
 
 def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:

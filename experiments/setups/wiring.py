@@ -236,7 +236,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
-            lower_start(packed_legs(world.figure), poses[0])
+            lower_start(packed_legs(world.figure), poses[0], parts.maps.size)
         figure = _velocity(whole_map, argument[0], begin) if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:
