@@ -160,6 +160,7 @@ def _simulate(
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
     loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
+    rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
     loop.run(first)
     first_tick = time.perf_counter() - started
     with simulating(console, seconds) as reached:
@@ -169,7 +170,7 @@ def _simulate(
             if view:
                 clock.wait_until(t)
 
-        times = loop.run(seconds - first, progress)
+        times = loop.run(rest, progress)
     page.close()
     keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())

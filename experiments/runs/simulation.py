@@ -28,7 +28,7 @@ from experiments.runs.run_result import Run
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, for_size_of, own_parts, reached
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
-from experiments.setups.parts.hands import intent_of, participant
+from experiments.setups.parts.hands import TRACED, intent_of, participant
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates
@@ -174,8 +174,8 @@ class User:
             return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
         if self.traces is None:
             return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
-        path = self.traces.point(np.arange(0.0, seconds, 0.01))
-        return Arm(path=path, period=0.01, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+        path = self.traces.point(np.arange(0.0, seconds + 2.0 * TRACED, TRACED))
+        return Arm(path=path, period=TRACED, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
 
 
 class Tick(NamedTuple):

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from controllers.blending.clip_arrays import clip_arrays
+from controllers.curves.cylinder import AXIS
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, ClipMap
@@ -71,6 +72,15 @@ class Place(NamedTuple):
     reach: float
     expressive: bool
 
+    def radii(self) -> tuple[float, float]:
+        """Ends of the domain in radius [m]; raises `ParameterError` if it reaches the axis, where phases meet."""
+        if self.radius - self.reach <= AXIS:
+            raise ParameterError(
+                f"reach is {self.reach:g} m about a curve of radius {self.radius:.3g} m; expected less than "
+                f"{max(self.radius - AXIS, 0.0):.3g} m, so that the map ends before the axis, or a larger radius"
+            )
+        return self.radius - self.reach, self.radius + self.reach
+
 
 def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMapParts]) -> ClipMapParts:
     """Map parts of a figure of any stature: made for the default one, whose motions clips are, and in proportion to it.
@@ -100,7 +110,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         If there are none, or more than four, or they do not fit together.
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
-    radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
+    radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
 
     def with_legs_of(owner: int) -> CylindricalMap:
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
@@ -127,7 +137,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         If there are none, or more than three, or they do not fit together.
     """
     lower, red, blue = _motions(clips, 3, "composite")
-    legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
+    legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
     apart = _out_of_step(clips, 3, lap)
     made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)

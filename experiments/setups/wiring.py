@@ -182,7 +182,10 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         walker = walker_at.py_func(field.walkers.state, 0)
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
-        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
+        step = config.clock.physics_step
+        if isinstance(parts.user, Arm):
+            parts.user.check_step(step)
+        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, step)
         device = simulated_phantom(
             phantom_port(world.model, world.data, period, phantom_of(config.device).cutoff), user
         )
