@@ -52,8 +52,8 @@ class Verdict:
     reason: str
     margin: float | None = None
     assumptions: tuple[str, ...] = ()
-    counterexample: Mapping[str, object] = field(default_factory=dict[str, object])
-    figures: Mapping[str, object] = field(default_factory=dict[str, object])
+    counterexample: Mapping[str, object] = field(default_factory=dict[str, object], repr=False)
+    figures: Mapping[str, object] = field(default_factory=dict[str, object], repr=False)
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Outcome):

@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 from controllers.state import Array
 
 _MARGIN = 0.15  # share of the interval at each edge over which the blend is eased
-_AXIS = 1e-3  # [m] distance from the axis below which the derivatives are those at this distance
+AXIS = 1e-3  # [m] distance from the axis below which the derivatives are those at this distance
 
 
 @njit
@@ -43,7 +43,7 @@ def cylinder(x: Array, chain: Array) -> tuple[float, float]:
     angle = np.arctan2(x[1], x[0])
     if angle < 0.0:
         angle = min(angle + 2.0 * np.pi, 2.0 * np.pi)
-    inside = max(radius, _AXIS)
+    inside = max(radius, AXIS)
     chain[:] = 0.0
     chain[0, 0], chain[0, 1] = -x[1] / (inside * inside), x[0] / (inside * inside)
     chain[1, 0], chain[1, 1] = x[0] / inside, x[1] / inside

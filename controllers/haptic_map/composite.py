@@ -8,7 +8,7 @@ from numba import njit
 
 from controllers.blending.blend import blend
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
-from controllers.curves.cylinder import blend_weight, checked_interval, cylinder
+from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.limbs import Limb
@@ -79,7 +79,7 @@ class Composite(AnimationMap):
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
         self.r_range, self.upper_joints, self.apart = r_range, tuple(upper_joints), apart
-        numbers = checked_interval("r_range", r_range, 1e-3)
+        numbers = checked_interval("r_range", r_range, AXIS)
         super().__init__(COMPOSITE, composite_map, (lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
                          apart)  # fmt: skip
         self.share = 1.0

@@ -9,7 +9,7 @@ from numba import njit
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.blend import blend_corrected
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
-from controllers.curves.cylinder import blend_weight, checked_interval, cylinder, eased
+from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.footfalls import foot_corrections
@@ -149,7 +149,7 @@ class Cylindrical(AnimationMap):
                 f"the cylindrical map blends {_CLIPS} clips, got {len(clips)}; give one more than once"
             )
         self.r_range, self.z_range = r_range, z_range
-        numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
+        numbers = (*checked_interval("r_range", r_range, AXIS), *checked_interval("z_range", z_range, -np.inf))
         if not 0 <= legs_of < _CLIPS:
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
         self.upper, self.legs_of, self.share = tuple(upper), legs_of, 1.0

@@ -16,6 +16,7 @@ from controllers.haptic_map.lifted_kernel import LIFTED, lifted_map
 from controllers.haptic_map.own_map import OWN, own_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
+from controllers.haptic_map.sized import SIZED, size_pose, unsized
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
@@ -29,6 +30,7 @@ MAP_KERNELS: dict[int, Kernel] = {
     EXPRESSIVE: express,
     LED: led_map,
     OWN: own_map,
+    SIZED: size_pose,
 }
 """Kernels by kind; the kernel of a map that wraps another map modifies the output of the wrapped map's kernel."""
 
@@ -40,9 +42,10 @@ _call = kernel_call(MAP_ARGUMENTS)
 
 
 def kinds_of(kind: int, params: Array) -> tuple[int, ...]:
-    """Kinds of kernels that a map needs: its own, and that of a map that it wraps."""
-    base, _ = base_of.py_func(kind, params)
-    return (kind,) if base == kind else (kind, base)
+    """Kinds of kernels that a map needs: its own, and those of the maps that it wraps."""
+    inner, given = unsized.py_func(kind, params)
+    base, _ = base_of.py_func(inner, given)
+    return tuple(dict.fromkeys((kind, inner, base)))
 
 
 @njit
@@ -50,11 +53,14 @@ def evaluate_map_jacobian(
     units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
 ) -> None:
     """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
-    base, numbers = base_of(kind, params)
-    if units[base] == 0 or units[kind] == 0:
+    inner, given = unsized(kind, params)
+    base, numbers = base_of(inner, given)
+    if units[base] == 0 or units[inner] == 0 or units[kind] == 0:
         raise ControllerError("the kernel of this haptic map is not compiled; its kind is missing in the units")
     _call(units[base], (numbers, x, memory, pose, jacobian))
-    if kind == EXPRESSIVE:
+    if inner == EXPRESSIVE:
+        _call(units[inner], (given, x, memory, pose, jacobian))
+    if kind == SIZED:
         _call(units[kind], (params, x, memory, pose, jacobian))
 
 

@@ -18,7 +18,6 @@ from controllers.fields.leading import Leading
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
-from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.modes.lead import leading
 from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
@@ -41,7 +40,7 @@ def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
         If a number is out of its interval, or the clip cannot be led.
     """
     figure = figure_model(config.scene.stature, config.scene.mass)
-    return leading(mode, led_map(clip, figure_legs(figure))[1])
+    return leading(mode, led_map(clip, figure)[1])
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:

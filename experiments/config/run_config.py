@@ -92,7 +92,7 @@ class Figure:
         In the physics, with torques and contacts; the animation itself, evaluated and recorded, which is faster; or the
         device alone, for tuning.
     stature : float
-        Height of the figure [m].
+        Height of the figure [m]; it moves as the clips do, in proportion.
     mass : float
         Of the figure [kg].
     smoothing : float

@@ -160,6 +160,7 @@ def _simulate(
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
     loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
+    rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
     loop.run(first)
     first_tick = time.perf_counter() - started
     with simulating(console, seconds) as reached:
@@ -169,7 +170,7 @@ def _simulate(
             if view:
                 clock.wait_until(t)
 
-        times = loop.run(seconds - first, progress)
+        times = loop.run(rest, progress)
     page.close()
     keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
@@ -211,9 +212,9 @@ def write_animations(out: Path, session: Session) -> None:
         n = -(-len(reference) // stride)
         per_frame = stride * session.servo.figure_ticks
         poses_at = default_poses(session, stride)
-        starts = range(0, n, BLOCK_FRAMES)
+        starts, stature = range(0, n, BLOCK_FRAMES), session.world.config.stature
         blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
-        write_bvh_blocks(
-            out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
-        )
-        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(*(c[rows] for c in on_curve)) for rows in blocks))
+        edited = (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
+        write_bvh_blocks(out / EDITED, n, fps, edited, stature)
+        default = (poses_at(*(c[rows] for c in on_curve)) for rows in blocks)
+        write_bvh_blocks(out / DEFAULT, n, fps, default, stature)

@@ -33,7 +33,14 @@ from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations
 from experiments.setups.session import Session
 from models.errors import ModelError
+from sim.errors import SimError
 from sim.recording.recording import Recording
+
+
+class NoChannel(SimError, KeyError):
+    """A run has no channel of that name; a `KeyError` too, as of any mapping, so that ``in`` and ``get`` work."""
+
+    __str__ = Exception.__str__  # that of KeyError puts the message in quotes
 
 
 class Channels(Mapping[str, Array]):
@@ -44,6 +51,9 @@ class Channels(Mapping[str, Array]):
 
     def __getitem__(self, name: str) -> Array:
         with Recording(self._run.folder / RECORDING) as recording:
+            if name not in recording.groups[self._group]:
+                known = ", ".join(sorted(recording.groups[self._group]))
+                raise NoChannel(f"no channel {name!r}; {self._group} has {known}")
             return recording.channel(self._group, name)[:]
 
     def __iter__(self) -> Iterator[str]:

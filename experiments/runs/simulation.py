@@ -33,6 +33,7 @@ from experiments.setups.figure_maps import (
     Place,
     composite_parts,
     cylindrical_parts,
+    for_size_of,
     lifted_parts,
     own_parts,
     reached,
@@ -40,7 +41,7 @@ from experiments.setups.figure_maps import (
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
-from experiments.setups.parts.hands import intent_of, participant
+from experiments.setups.parts.hands import TRACED, intent_of, participant
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates, check_seconds
@@ -93,7 +94,7 @@ class Cylindrical:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return cylindrical_parts(tuple(self.clips), _place(self), world.figure)
+        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), _place(self), model))
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class Composite:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return composite_parts(tuple(self.clips), _place(self), world.figure)
+        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), _place(self), model))
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,8 @@ class Lifted:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return lifted_parts(*self._made, MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive))
+        part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
+        return for_size_of(world.figure, lambda _: lifted_parts(*self._made, part))
 
 
 def _check_map(part: Cylindrical | Composite) -> None:
@@ -244,8 +246,8 @@ class User:
             return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
         if self.traces is None:
             return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
-        path = self.traces.point(np.arange(0.0, seconds, 0.01))
-        return Arm(path=path, period=0.01, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+        path = self.traces.point(np.arange(0.0, seconds + 2.0 * TRACED, TRACED))
+        return Arm(path=path, period=TRACED, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
 
 
 class Tick(NamedTuple):

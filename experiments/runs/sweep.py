@@ -97,8 +97,11 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     if isinstance(part, FunctionLaw) and len(names) == 1:
         return part(**{names[0]: value})
     if not is_dataclass(part) or isinstance(part, type) or names[0] not in {f.name for f in fields(part)}:
-        known = [f.name for f in fields(part)] if is_dataclass(part) else []
-        raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {', '.join(known)}")
+        if not is_dataclass(part) or isinstance(part, type):
+            whole = path.removesuffix("." + ".".join(names))
+            raise ParameterError(f"{path}: {whole} is a {type(part).__name__}; expected whole values of {whole}")
+        known = ", ".join(f.name for f in fields(part))
+        raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {known}")
     new = value if len(names) == 1 else _set(getattr(part, names[0]), names[1:], value, path)
     return replaced(part, **{names[0]: new})
 

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from controllers.blending.clip_arrays import clip_arrays
+from controllers.curves.cylinder import AXIS
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, ClipMap
@@ -29,7 +30,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.balance import balanced
-from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.fitting.blendable import grounded, keeps_pace, longest_flight, not_blendable, off_pace, same
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import carried
 from experiments.fitting.push_trials import followed_map
@@ -42,7 +43,7 @@ from experiments.setups.modes.rivers import default_choice, river_bundle
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of, reached
 from experiments.setups.parts.part_types import ClipMapParts
-from models.humanoid.skeleton import N_POSE
+from models.humanoid.skeleton import DEFAULT_STATURE, N_POSE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import kept_folder
 
@@ -71,6 +72,34 @@ class Place(NamedTuple):
     reach: float
     expressive: bool
 
+    def radii(self) -> tuple[float, float]:
+        """Ends of the domain in radius [m]; raises `ParameterError` if it reaches the axis, where phases meet."""
+        if self.radius - self.reach <= AXIS:
+            raise ParameterError(
+                f"reach is {self.reach:g} m about a curve of radius {self.radius:.3g} m; expected less than "
+                f"{max(self.radius - AXIS, 0.0):.3g} m, so that the map ends before the axis, or a larger radius"
+            )
+        return self.radius - self.reach, self.radius + self.reach
+
+
+def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMapParts]) -> ClipMapParts:
+    """Map parts of a figure of any stature: made for the default one, whose motions clips are, and in proportion to it.
+
+    Lengths in proportion s at the same times scale accelerations by s, and gravity stays: a flight of the scaled motion
+    is ballistic at 1/√s of its own pace (equal Froude number, Alexander 1989, *Optimization and gaits in the locomotion
+    of vertebrates*, Physiol. Rev. 69, 1199-1227).
+    """
+    size = proportion(figure)
+    if size == 1.0:
+        return made(figure)
+    parts = made(figure_model())
+    flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
+    falls = (
+        f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
+        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' own pace"
+    )
+    return replace(parts, size=size, remarks=parts.remarks + ((falls,) if flying else ()))
+
 
 def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
@@ -81,7 +110,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         If there are none, or more than four, or they do not fit together.
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
-    radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
+    radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
 
     def with_legs_of(owner: int) -> CylindricalMap:
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
@@ -108,7 +137,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         If there are none, or more than three, or they do not fit together.
     """
     lower, red, blue = _motions(clips, 3, "composite")
-    legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
+    legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
     apart = _out_of_step(clips, 3, lap)
     made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)

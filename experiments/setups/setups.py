@@ -7,7 +7,7 @@ import mujoco
 
 from experiments.config.maps import Led, Map
 from experiments.config.run_config import RunConfig
-from experiments.setups.figure_maps import MAP_SETUPS
+from experiments.setups.figure_maps import MAP_SETUPS, for_size_of
 from experiments.setups.modes.bunny import bunny_parts
 from experiments.setups.modes.follow import follow_parts
 from experiments.setups.modes.lead import lead_parts
@@ -49,8 +49,10 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
         If there is no such clip, file or curve, or the Phantom does not reach the curve.
     """
     played, remarks = clips_for(config.map) if clips is None else (clips, ())
-    setups: dict[str, Callable[..., MapParts[Any]]] = {**MAP_SETUPS, "led": led_parts}
-    return setups[config.map.kind](config, config.map, played, figure).said(remarks)
+    if isinstance(config.map, Led):
+        return led_parts(config, config.map, played, figure).said(remarks)
+    setup = MAP_SETUPS[config.map.kind]
+    return for_size_of(figure, lambda model: setup(config, config.map, played, model)).said(remarks)
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:

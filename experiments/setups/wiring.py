@@ -199,7 +199,10 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         walker = walker_at.py_func(field.walkers.state, 0)
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
-        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
+        step = config.clock.physics_step
+        if isinstance(parts.user, Arm):
+            parts.user.check_step(step)
+        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, step)
         device = simulated_phantom(
             phantom_port(world.model, world.data, period, phantom_of(config.device).cutoff), user
         )
@@ -252,7 +255,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends:
-            lower_start(packed_legs(world.figure), poses[0])
+            lower_start(packed_legs(world.figure), poses[0], parts.maps.size)
         figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:

@@ -18,12 +18,12 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
-from controllers.haptic_map.animation import ClipMap
 from controllers.state import VELOCITY, Array
 from experiments.config.words import run_config
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
 from experiments.setups.parts.governor import speeds_along
+from experiments.setups.parts.part_types import ClipMapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
@@ -80,9 +80,9 @@ class Bench:
         self._config = run_config(clips=("backflip",), figure="none", lap=2.7, tube=TUBE)
         session = self._session()
         self.curve = session.parts.maps.curve
-        clip_map = session.parts.maps.haptic_map
-        assert isinstance(clip_map, ClipMap)
-        self.speeds = speeds_along(clip_map, self.curve)
+        maps = session.parts.maps
+        assert isinstance(maps, ClipMapParts)
+        self.speeds = speeds_along(maps, self.curve)
         phases = np.linspace(self.curve.start, self.curve.end, len(self.speeds))
         flying = phases[self.speeds[:, 0] > 0.0]
         self.flight = (float(flying[0]), float(flying[-1]))

@@ -211,6 +211,11 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
     return spec
 
 
+def proportion(figure: mujoco.MjModel) -> float:
+    """Lengths of a figure's model (`figure_model`) over those of the default stature [1]."""
+    return float(figure.geom(FOOT_CONTACTS[0]).size[0]) / CONTACT_RADIUS
+
+
 def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> float:
     """Height of the figure's centre of mass above the floor in the rest pose [m]."""
     model = figure_model(stature, mass)

@@ -151,3 +151,5 @@ PREMIUM_1_5 = PhantomParameters(
     elbow_limit=_deg(-65, 55),
     gimbal_limit=(_deg(-148.5, 148.5), _deg(-130, 130), _deg(-167.5, 167.5)),
 )
+
+LEAST_TIP = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0

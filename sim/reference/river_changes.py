@@ -25,6 +25,7 @@ from controllers.haptic_map.river_clips import (
     stop_clip,
     take_course,
 )
+from controllers.haptic_map.sized import size_of
 from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_way
 from controllers.rotations import rotate
@@ -41,6 +42,13 @@ def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pos
     memory[:] = reference.memory
     ahead_in_clip(params, memory, seconds)
     evaluate_map(reference.units, reference.kind, reference.params, reference.scratch_x, memory, pose)
+
+
+@njit
+def _place(reference: CompiledReference, pose: Array, x: float, y: float, turn: float) -> None:
+    """As `place_clip`, in lengths of the figure that is shown; the lap's frame is in those of the clips."""
+    size = size_of(reference.kind, reference.params)
+    place_clip(reference.memory, pose[:2] / size, x / size, y / size, turn)
 
 
 @njit
@@ -68,7 +76,7 @@ def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, f
         limb_end(transition.limbs[foot], transition.shown[0], old)
         limb_end(transition.limbs[foot], transition.ahead[row], new)
         turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
-        place_clip(reference.memory, new, old[0], old[1], turn)
+        _place(reference, new, old[0], old[1], turn)
         moved = math.hypot(new[0] - old[0], new[1] - old[1])
     return foot, moved
 
@@ -80,11 +88,11 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     The new motion is placed ahead of the figure by the stopping distance of the difference of their horizontal and yaw
     velocities, so that the figure is neither turned back nor pulled; or, if there is a pivot foot, where that stands.
     """
-    transition, memory, period = reference.transition, reference.memory, reference.period
+    transition, period = reference.transition, reference.period
     shown, change = transition.shown, transition.change
     look_around(reference, reference.going)
     pose = reference.pose
-    place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
+    _place(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
     look_around(reference, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
     set_duration(transition, 0.0, period)
@@ -94,7 +102,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
     _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
     way[2] = stopping_way(spin, twist, seconds)
-    place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
+    _place(reference, pose, pose[0] + way[0], pose[1] + way[1], way[2])
     _, moved = _stand_on_pivot(reference, params)
     set_duration(transition, moved, period)
     # A longer change ends at another pose: place the motion again by where it stands then.
@@ -113,19 +121,20 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     The figure must stand and the new clip must not be in flight during the transition; see `sim.reference.waiting`. A
     river that has waited long enough is let through regardless.
     """
-    transition, memory = reference.transition, reference.scratch_memory
+    transition, memory, x = reference.transition, reference.scratch_memory, reference.scratch_x
+    size = size_of(reference.kind, reference.params)
     if waits_no_longer(transition):
         return True
-    if not stands(transition, reference.pose, reference.velocity[2]):
+    if not stands(transition, reference.pose, reference.velocity[2], size):
         return False
     for k in range(3):
         memory[:] = reference.memory
         change_clip(memory, river, phase)
         # Evaluated first to get the phase from the hand's position: the field may time the curve unlike the clip.
-        evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
+        evaluate_map(reference.units, reference.kind, reference.params, x, memory, transition.ahead[0])
         ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
-        evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
-        if leaps(transition, transition.ahead[0]):
+        evaluate_map(reference.units, reference.kind, reference.params, x, memory, transition.ahead[0])
+        if leaps(transition, transition.ahead[0], size):
             return False
     return True
 
@@ -159,7 +168,7 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
     begin_change(memory, river, change, gate)
     hold_at_gate(params, memory, gate)
     evaluate_map(reference.units, reference.kind, reference.params, x, memory, new)
-    place_clip(memory, new, old[0], old[1], heading_between(new, old))
+    _place(reference, new, old[0], old[1], heading_between(new, old))
     go_on(memory, phase, ahead)
 
 

@@ -50,46 +50,49 @@ def approach(state: Array, goal: float, period: float) -> None:
 
 
 @njit
-def _height(limb: Array, end: Array, k: int) -> float:
+def _height(limb: Array, end: Array, k: int, size: float) -> float:
     """Height over the floor [m] of the contact sphere in column k of a limb's row, its end being at `end` (7,)."""
-    return end[2] + lever(limb, k, end)[2] - CONTACT_RADIUS
+    return end[2] + lever(limb, k, end)[2] - size * CONTACT_RADIUS
 
 
 @njit
-def clearance(limbs: Array, ends: Array, pose: Array) -> float:
+def clearance(limbs: Array, ends: Array, pose: Array, size: float) -> float:
     """Height over the floor of the lowest point of all soles [m], by a soft minimum; `ends` (n, 7) is scratch.
 
-    Eight level points count 4 mm (ln 8 of `SOFTNESS`) lower.
+    Eight level points count 4 mm (ln 8 of `SOFTNESS`) lower. `size`: lengths of the figure over the default's [1].
     """
     least = math.inf
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
         for k in range(LIMB, limbs.shape[1], 3):
-            least = min(least, _height(limbs[n], ends[n], k))
+            least = min(least, _height(limbs[n], ends[n], k, size))
     total = 0.0
     for n in range(limbs.shape[0]):
         for k in range(LIMB, limbs.shape[1], 3):
-            total += math.exp((least - _height(limbs[n], ends[n], k)) / SOFTNESS)
+            total += math.exp((least - _height(limbs[n], ends[n], k, size)) / SOFTNESS)
     return least - SOFTNESS * math.log(total)
 
 
 @njit
-def lower_to_floor(limbs: Array, ends: Array, share: float, pose: Array) -> None:
-    """Lower a pose (75,) by a share of its feet's clearance; `limbs` are `packed_steppers`, `ends` (n, 7) scratch."""
+def lower_to_floor(limbs: Array, ends: Array, share: float, pose: Array, size: float) -> None:
+    """Lower a pose (75,) by a share of its feet's clearance; `limbs` are `packed_steppers`, `ends` (n, 7) scratch.
+
+    `size`: lengths of the figure over the default's [1].
+    """
     if share <= 0.0 or limbs.shape[0] == 0:
         return
-    above = clearance(limbs, ends, pose)
+    above = clearance(limbs, ends, pose, size)
     upright = 1.0 - 2.0 * (pose[4] ** 2 + pose[5] ** 2)
     if above > 0.0:
         pose[2] -= min(share, 1.0) * cubic_step(2.0 * upright) * above**3 / (above**2 + _ROUND**2)
 
 
 @entry_point
-def lower_start(limbs: Array, pose: Array) -> None:
+def lower_start(limbs: Array, pose: Array, size: float) -> None:
     """Lower the initial pose (75,) of a run fully to the floor; see `lower_to_floor`."""
-    lower_to_floor(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)
+    lower_to_floor(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose, size)
 
 
 def lower_start_unit() -> Unit:
     """The compilation unit of `lower_start`."""
-    return Unit.of(lower_start, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"))
+    return Unit.of(lower_start, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"), types.float64)

@@ -7,7 +7,6 @@ figure is shown in (`sim.reference.river_changes`). Only such a map needs that c
 from numba import njit
 
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
-from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import (
     COURSE,
     changing,
@@ -17,6 +16,7 @@ from controllers.haptic_map.river_clips import (
     phase_rate,
     takes_over,
 )
+from controllers.haptic_map.sized import innermost, size_of
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
@@ -82,7 +82,7 @@ def _smooth(reference: CompiledReference, stylus: Array) -> None:
 def _play(reference: CompiledReference, trace: Array) -> None:
     """Begin a change to the clip of the active river, or to rest, where one is due."""
     period, river = reference.period, trace[TRACE_RIVER]
-    _, params = base_of(reference.kind, reference.params)
+    _, params = innermost(reference.kind, reference.params)
     # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
     over = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
@@ -117,6 +117,7 @@ def _differentiate(reference: CompiledReference) -> None:
 def _settle(reference: CompiledReference) -> None:
     """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
     s, period, transition = reference.settled, reference.period, reference.transition
+    size = size_of(reference.kind, reference.params)
     for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
         share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
-        lower_to_floor(transition.limbs, transition.ends, share, pose)
+        lower_to_floor(transition.limbs, transition.ends, share, pose, size)

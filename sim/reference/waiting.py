@@ -17,15 +17,15 @@ _PATIENCE = 1.0  # [s] for which a change waits at most
 
 
 @njit
-def stands(transition: Transition, pose: Array, rise: float) -> bool:
-    """Whether a figure is on the floor and not about to take off, given the vertical speed of its root [m/s]."""
-    return clearance(transition.limbs, transition.ends, pose) < _FEET_DOWN and rise < _RISES
+def stands(transition: Transition, pose: Array, rise: float, size: float) -> bool:
+    """Whether a figure of a size stands and is not about to take off, with the vertical speed of its root [m/s]."""
+    return clearance(transition.limbs, transition.ends, pose, size) < _FEET_DOWN and rise < _RISES
 
 
 @njit
-def leaps(transition: Transition, pose: Array) -> bool:
-    """Whether a pose is in the middle of a flight, where no new motion may begin."""
-    return clearance(transition.limbs, transition.ends, pose) > _FEET_UP
+def leaps(transition: Transition, pose: Array, size: float) -> bool:
+    """Whether a pose of a figure of a size is in the middle of a flight, where no new motion may begin."""
+    return clearance(transition.limbs, transition.ends, pose, size) > _FEET_UP
 
 
 @njit

@@ -76,6 +76,8 @@ class Law(ABC):
         """Field times a number."""
         return self.gated(Weight.constant(factor))
 
+    __mul__ = __rmul__
+
     def gated(self, weight: Weight) -> "Program":
         """Field times a weight: s F."""
         of_kind("weight", weight, Weight)
@@ -195,6 +197,10 @@ class Program(Law):
                 f"a field of {len(laws)} laws with the codes {laws} needs their kernels and names; "
                 f"got {len(self.kernels)} kernels and {len(self.laws)} laws"
             )
+
+    def __repr__(self) -> str:
+        joins = [Join(code).name.lower() for code in self.ops[:, OP_CODE].tolist() if code < 0]
+        return f"<field of {', '.join(map(repr, self.laws))}{', joined by ' * bool(joins)}{', '.join(joins)}>"
 
     @staticmethod
     def of(

@@ -141,7 +141,8 @@ class PathMeasure:
         self._released = -math.inf
         self._replayed = "replayed" in recording.texts
         self._pushes: list[PushSummary] = []
-        self._pushing = False
+        self._pushing, self._from = False, np.zeros(3)
+        self._along = False  # whether the field has been along a curve at any tick
 
     def add(self, ticks: Mapping[str, Array]) -> Mask:
         """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
@@ -150,7 +151,9 @@ class PathMeasure:
         last = np.maximum.accumulate(np.where(at_work, t, self._released))
         pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
         self._released = float(last[-1])
-        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
+        along = np.isfinite(ticks["distance"])  # a law without a curve leaves it infinite
+        self._along |= bool(along.any())
+        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed & along])
         self._add_phase(t, ticks["phase"])
         self._add_place(t, ticks["p"])
         handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
@@ -179,7 +182,10 @@ class PathMeasure:
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
         for first, last in spans(at_work):
             block = slice(first, last)
-            away = ticks["p"][block] - ticks["nearest"][block]
+            if not (first == 0 and self._pushing):
+                self._from = ticks["p"][first].copy()
+            along = np.isfinite(ticks["distance"][block])
+            away = ticks["p"][block] - np.where(along[:, None], ticks["nearest"][block], self._from)
             distance = np.linalg.norm(away, axis=1)
             k = int(np.argmax(distance))
             cosine = float(away[k] @ ticks["user"][block][k] / max(distance[k] * size[block][k], 1e-12))
@@ -199,7 +205,7 @@ class PathMeasure:
         lap_seconds = seconds / laps if laps >= 1.0 else None
         stopped = self._moved if self._time - self._moved >= SETTLING else None
         moving = (seconds if stopped is None else stopped - self._first) or math.inf
-        pace = None if math.isnan(clip) else laps * clip / moving
+        pace = None if math.isnan(clip) or not self._along else laps * clip / moving
         alone = 1e3 * self._alone.root if self._alone.count else None
         return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes), stopped, pace)
 

@@ -19,7 +19,7 @@ class PushSummary:
     peak_force : float
         [N]
     deviation_mm : float
-        Largest distance from the curve during the push.
+        Largest distance from the curve during the push; in a field without a curve, from where the push began.
     along_push : float
         Cosine between force and deviation where the deviation is largest: 1 if the stylus moved along the push.
     """
@@ -54,7 +54,8 @@ class PathSummary:
         Time from which the stylus stood still within a millimetre until the end, if that was a second or more [s], as
         it does at the end of an open curve.
     pace : float or None
-        Pace at which the clips were played while the stylus moved, relative to their own; None if a lap plays no clip.
+        Pace at which the clips were played while the stylus moved, relative to their own; None if a lap plays no clip,
+        or the field has no curve.
     """
 
     deviation_rms_mm: float | None

@@ -91,7 +91,7 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
     """The same rivers, each restricted to the speeds at which the flights of its animation are ballistic enough."""
     rivers = tuple(
-        replace(river, speeds=speeds_along(maps.haptic_map, curve, i, river.curve))
+        replace(river, speeds=speeds_along(maps, curve, i, river.curve))
         for i, (river, curve) in enumerate(zip(choice.bundle.rivers, choice.given, strict=True))
     )
     return choice._replace(bundle=replace(choice.bundle, rivers=rivers))

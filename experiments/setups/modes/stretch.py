@@ -90,11 +90,13 @@ def _parts(
     config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts, course: Trajectory,
     performance: _Performance, remarks: tuple[str, ...],
 ) -> Parts:  # fmt: skip
-    if mode.bump > 0.5 * maps.curve.duration:
+    if mode.bump > 0.5 * course.duration:
+        # The course is timed to lead the Phantom at the lap's pace, and is a little shorter.
         lap = maps.curve.duration
+        least, most = np.ceil(21.0 * mode.bump * lap / course.duration) / 10.0, np.floor(49.0 * course.duration) / 100.0
         raise ParameterError(
             f"a lap of {lap:g} s is too short for a bend of --bump {mode.bump:g} s to either side; expected --lap "
-            f"{2.0 * mode.bump:g} or more, or --bump {0.5 * lap:g} or less"
+            f"{least:g} or more, or --bump {most:g} or less"
         )
     user = _user(config, mode, maps)
     seek, damping = tube_gains(mode)

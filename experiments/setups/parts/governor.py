@@ -41,7 +41,7 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
     return Clip(map_poses(haptic_map, stylus, memory), (frames - 1) / seconds, "along the curve")
 
 
-def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
+def speeds_along(maps: ClipMapParts, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
     """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
 
     The animation h∘φ along the curve is judged: the clip itself where only one clip plays, and between clips their
@@ -49,7 +49,9 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
 
     Parameters
     ----------
-    haptic_map, curve, river
+    maps : ClipMapParts
+        Parts of the map. The animation is that of the default figure; one of size s falls as it does at 1/√s the pace.
+    curve, river
         As in `animation_along`.
     course : Trajectory, optional
         The curve along which a field leads, with the same samples at other times (`pace.course_of`); by default
@@ -69,13 +71,13 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
         clip_ballistics,  # statistics take long to import, for a run without a governor
     )
 
-    clip, led = animation_along(haptic_map, curve, river), curve if course is None else course
+    clip, led = animation_along(maps.haptic_map, curve, river), curve if course is None else course
     shown = np.linspace(led.start, led.end, clip.n_frames)
     phases = np.interp(shown, np.asarray(led.times), np.asarray(curve.times))
     share = np.clip((phases - curve.start) / curve.duration, 0.0, 1.0)
     # |φ̇| when a pass takes as long as the clips do.
     recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
-    low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration)
+    low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration / np.sqrt(maps.size))
     # Where the least speed is infinite, no speed makes the motion ballistic: none is demanded of the hand.
     low = np.where(np.isfinite(low), low, 0.0)
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
@@ -94,7 +96,7 @@ def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps:
     """
     if governor is None:
         return law, 0.0
-    speeds = speeds_along(maps.haptic_map, maps.curve, course=course)
+    speeds = speeds_along(maps, maps.curve, course=course)
     made = Governor(course, speeds, governor.governor_drag, maps.reach)
     return Governed(law, made), float(speeds[:, 0].max())
 

@@ -33,6 +33,7 @@ RIVER_PUSH = 1.0
 NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
 SLOWEST = 0.0235  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
+TRACED = 0.01  # [s] between samples of a path that the hand traces
 
 _CROSSING = 0.5  # share of the lap at which the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
@@ -130,8 +131,8 @@ def user_hand(
         intent = ChangeOver(other) if isinstance(intent, ChangeOver) else intent
         return participant(user.person, intent, curve, seconds, seed)
     if user.does == "trace":
-        times = np.arange(0.0, seconds, 0.01)
-        return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
+        times = np.arange(0.0, seconds + 2.0 * TRACED, TRACED)  # beyond the end, where a path rests
+        return Arm(path=curve.point(times), period=TRACED, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
 
 

@@ -1,6 +1,6 @@
 """Map parts of a led figure: the clip that is led, its map and gait, and remarks about both."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -19,7 +19,7 @@ from experiments.fitting.led_balance import balanced_on_ground
 from experiments.setups.parts.clips import BLINK, load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
-from models.humanoid.skeleton import CONTACT_RADIUS
+from models.humanoid.skeleton import CONTACT_RADIUS, proportion
 from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.motion.clip import CLOSES, Clip
 from models.mocap.motion.spans import spans
@@ -47,7 +47,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
     """
     if len(clips) != 1:
         raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
-    made, gait = led_map(clips[0], figure_legs(figure))
+    made, gait = led_map(clips[0], figure)
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
         refined=lambda: (balanced_on_ground(made, gait, figure), ()),
@@ -76,11 +76,12 @@ def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     return captured, (*remarks_captured, f"{names}: flies when prepared, and is led as captured, by steps")
 
 
-def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
+def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
     A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise.
+    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise. A figure of another stature
+    moves in proportion, with strides of its size.
 
     Raises
     ------
@@ -89,12 +90,15 @@ def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     """
     lap, closes = lap_of(clip), clip.closes(CLOSES)
     marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
-    clip = lap.clip
+    size, legs = proportion(figure), figure_legs(figure)
+    scale = np.where(np.arange(lap.clip.poses.shape[1]) < 3, size, 1.0)
+    clip = replace(lap.clip, poses=lap.clip.poses * scale)
+    capture = Capture(CONTACT_RADIUS * size)
     if not closes:
-        return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+        return _led(clip, legs, stances(marks, clip.fps), capture)
     made = _led(clip, legs, marks.planted[:-1], None)
     if made[0].flies and not made[0].grounds:
-        steps = _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+        steps = _led(clip, legs, stances(marks, clip.fps), capture)
         return steps if steps[0].grounds else made
     return made
 

@@ -11,6 +11,7 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.bundle import RiverBundle
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.sized import Sized
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import Array
 from controllers.walking.walking import Walking
@@ -105,6 +106,8 @@ class MapParts(Generic[Map]):
         Whether the stylus's orientation turns the figure.
     plays_rivers : bool
         Whether every river plays a clip of its own.
+    size : float
+        Lengths of the figure over those of the figure that the map is made for [1].
     remarks : tuple of str
         Remarks for the user, a line each.
     static : Static
@@ -120,13 +123,15 @@ class MapParts(Generic[Map]):
     moves: bool = False
     expressive: bool = False
     plays_rivers: bool = False
+    size: float = 1.0
     remarks: tuple[str, ...] = ()
     static: Static = field(default_factory=dict)
 
     @property
     def whole_map(self) -> HapticMap:
-        """The map, with gaze and lean if it has them."""
-        return expressive_figure(self.haptic_map) if self.expressive else self.haptic_map
+        """The map, with gaze and lean if it has them, for the figure's size."""
+        whole = expressive_figure(self.haptic_map) if self.expressive else self.haptic_map
+        return whole if self.size == 1.0 else Sized(whole, self.size)
 
     def said(self, remarks: tuple[str, ...]) -> Self:
         """The same parts with more remarks, put before the present ones."""

@@ -12,11 +12,12 @@ import numpy as np
 
 from models.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import SEGMENTS, figure_model
+from models.humanoid.skeleton import DEFAULT_STATURE, SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.source_motion import SourceMotion
 
 _CENTIMETRES = 100.0  # in a metre: the file's unit of length, as is usual for BVH
+_ROUNDED = 1e-6  # a file's bones have six digits after the point [cm], in a skeleton of 1 m
 _TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
          "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
 _TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
@@ -63,7 +64,9 @@ def write_bvh(clip: Clip, path: Path) -> None:
     write_bvh_blocks(path, clip.n_frames, clip.fps, [clip.poses])
 
 
-def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Array]) -> None:
+def write_bvh_blocks(
+    path: Path, n_frames: int, fps: float, blocks: Iterable[Array], stature: float = DEFAULT_STATURE
+) -> None:
     """Write a motion given block by block, with memory independent of its length.
 
     Parameters
@@ -76,6 +79,8 @@ def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Arr
         Frames per second [1/s].
     blocks : iterable of array (k, 75)
         Poses, in order.
+    stature : float
+        Of the figure whose poses they are [m]; the bones are its.
 
     Raises
     ------
@@ -86,7 +91,7 @@ def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Arr
     """
     written, last = 0, None
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        header = [*_hierarchy(), "MOTION", f"Frames: {n_frames}", f"Frame Time: {1.0 / fps!r}"]
+        header = [*_hierarchy(stature), "MOTION", f"Frames: {n_frames}", f"Frame Time: {1.0 / fps!r}"]
         file.write("\n".join(header) + "\n")
         for poses in blocks:
             angles = _angles(poses, last)
@@ -111,8 +116,8 @@ def _angles(poses: Array, last: Array | None) -> Array:
     return np.unwrap(np.vstack((last, angles)), axis=0)[1:]
 
 
-def _hierarchy() -> list[str]:
-    lines, model = ["HIERARCHY"], figure_model()
+def _hierarchy(stature: float) -> list[str]:
+    lines, model = ["HIERARCHY"], figure_model(stature)
     open_segments: list[int] = []
     for index, segment in enumerate(SEGMENTS):
         while open_segments and open_segments[-1] != segment.parent:
@@ -126,7 +131,7 @@ def _hierarchy() -> list[str]:
         lines += [f"{indent}{'JOINT' if index else 'ROOT'} {segment.joint}", f"{indent}{{",
                   f"{indent}\tOFFSET {_vector(offset)}", f"{indent}\tCHANNELS {positions} {channels}"]  # fmt: skip
         if segment.joint in _TIPS:
-            tip = _vector(np.array(_TIPS[segment.joint]))
+            tip = _vector(np.array(_TIPS[segment.joint]) * stature / DEFAULT_STATURE)
             lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {tip}", f"{indent}\t}}"]
         open_segments.append(index)
     return lines + ["\t" * depth + "}" for depth in reversed(range(len(open_segments)))]
@@ -137,16 +142,21 @@ def _vector(world: Array) -> str:
 
 
 def own_clip(motion: SourceMotion) -> Clip | None:
-    """The clip, if `write_bvh` wrote the file or Blender exported it again (same joints and bones); else None."""
+    """The clip, if `write_bvh` wrote the file or Blender exported it again (same joints and bones); else None.
+
+    Of a figure of another stature, whose bones are all in one proportion, it is the same motion of the default figure.
+    """
     if motion.joints != tuple(segment.joint for segment in SEGMENTS):
         return None
     if motion.parents != tuple(segment.parent for segment in SEGMENTS):
         return None
     model = figure_model()
     bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:] * _CENTIMETRES
+    size = float(np.linalg.norm(motion.offsets[1:]) / np.linalg.norm(bones))
+    size = 1.0 if abs(size - 1.0) < _ROUNDED else size
     for turn in _AXES.values():
-        if np.abs(motion.offsets[1:] @ turn.T - bones).max() <= 1e-4:
+        if np.abs(motion.offsets[1:] @ turn.T - size * bones).max() <= 1e-4:
             quaternion = np.concatenate((motion.rotations[..., :1], motion.rotations[..., 1:] @ turn.T), axis=-1)
-            position = motion.translations[:, 0] @ turn.T / _CENTIMETRES
+            position = motion.translations[:, 0] @ turn.T / (_CENTIMETRES * size)
             return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)
     return None

@@ -10,8 +10,11 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.state import Array
+from models.phantom.parameters import LEAST_TIP, PREMIUM_1_5
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push, Turn, grab_table, push_table, turn_table
+
+_INERTIA = min(PREMIUM_1_5.gimbal_inertia)  # [kg m²]
 
 
 @njit
@@ -219,6 +222,31 @@ class Arm:
         if len(self.path) > 0 and len(self.grabs) > 0:
             raise SimError(f"an arm that traces a path cannot grab as well; got {len(self.grabs)} grabs")
         grab_table(self.grabs)
+
+    def check_step(self, physics_step: float) -> None:
+        """Refuse a physics step for which an impedance of this arm, whose force is held for a step, is too stiff.
+
+        A spring k and a damper b on a mass m, stepped by semi-implicit Euler with a step h, are stable for
+        k h² + 2 b h < 4 m: h < 2 (√(b² + 4 k m) − b)/k, with the least apparent mass of the tip, or inertia of the
+        stylus.
+
+        Raises
+        ------
+        SimError
+            If the step is too long.
+        """
+        springs: list[tuple[str, float, float, float]] = []
+        if self.turns:
+            springs.append(("hand that turns the stylus", self.turn_stiffness, self.turn_damping, _INERTIA))
+        if len(self.path) > 0 or self.grabs:
+            springs.append(("arm", self.stiffness, self.damping, LEAST_TIP))
+        for what, k, b, m in springs:
+            most = 4.0 * m / (b + math.sqrt(b * b + 4.0 * k * m)) if k + b > 0.0 else math.inf
+            if physics_step > most:
+                raise SimError(
+                    f"the {what} needs a physics step of {math.floor(1e5 * most) / 1e5:g} s or less, got "
+                    f"{physics_step:g} s; choose a smaller --physics-step"
+                )
 
     def compiled(self) -> CompiledArm:
         """The arm as arrays for the servo loop."""

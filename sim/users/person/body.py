@@ -14,11 +14,11 @@ import math
 import numpy as np
 
 from controllers.state import Array
+from models.phantom.parameters import LEAST_TIP
 from sim.errors import SimError
 from sim.users.person.person import Person
 
 REFERENCE_GRIP = 2.0  # [N] grip force at which impedances are given: the middle of Fu & Cavusoglu 2012
-LEAST_TIP = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0
 _STIFF_AXIS = np.deg2rad(40.0)  # from straight ahead towards the midline: the line from shoulder to hand
 _UP = 0.6  # vertical over largest stiffness (m): between the axes of the horizontal ellipse
 

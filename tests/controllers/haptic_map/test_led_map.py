@@ -51,7 +51,7 @@ def test_straight_on_the_figure_does_what_the_clip_does(figure, name):
 @pytest.mark.parametrize(("name", "bend"), [("walk", 0.7), ("run", 0.2)])
 def test_feet_that_stand_stay_where_they_stand(figure, name, bend):
     clip = embedded(name)
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     path = winding(gait, bend)
     places = np.arange(gait.reach, path_front(path) - gait.reach - 0.2, 0.01)
     shown = soles(figure, [led.pose(walker(s), path) for s in places])
@@ -68,7 +68,7 @@ def test_feet_that_stand_stay_where_they_stand(figure, name, bend):
 def test_a_knee_that_straightens_in_a_bend_is_not_stopped(figure):
     # The run's legs reach out to 3° of flexion before they land; leaning raises the outer hip.
     clip = embedded("run")
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     knees = [figure.joint(f"{side}_knee").dofadr[0] + 1 for side in ("left", "right")]
 
     def jerk(path):
@@ -82,7 +82,7 @@ def test_a_knee_that_straightens_in_a_bend_is_not_stopped(figure):
 
 def test_the_pelvis_turns_only_while_a_foot_bears(figure):
     clip = embedded("run")
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     from controllers.walking.walking import Walking
 
     shares = Walking(gait).shares
@@ -110,7 +110,7 @@ def _yaw(pose):
 
 
 def test_the_derivative_is_that_of_the_pose(figure):
-    led, gait = led_map(embedded("walk"), figure_legs(figure))
+    led, gait = led_map(embedded("walk"), figure)
     path, h = winding(gait, 0.7), 1e-6
     for s in np.random.default_rng(2).uniform(0.5, 7.5, 100):
         jacobian = led.jacobian(walker(s), path)

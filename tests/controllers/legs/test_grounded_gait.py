@@ -25,7 +25,7 @@ def figure():
 
 @pytest.fixture(scope="module")
 def run(figure):
-    return led_map(embedded("run"), figure_legs(figure))
+    return led_map(embedded("run"), figure)
 
 
 def test_runs_of_a_mask_go_round():
@@ -84,7 +84,7 @@ def test_the_derivatives_by_place_and_form_are_those_of_the_pose(run, held):
 
 
 def test_a_walk_has_one_form_only(figure):
-    led, gait = led_map(embedded("walk"), figure_legs(figure))
+    led, gait = led_map(embedded("walk"), figure)
     assert not led.grounds
     assert not gait.flies
     np.testing.assert_array_equal(led.pose(walker(0.7, 1.0)), led.pose(walker(0.7, 0.0)))

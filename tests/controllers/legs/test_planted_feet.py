@@ -79,7 +79,7 @@ def test_windows_are_one_within_the_runs_of_a_mask() -> None:
 @pytest.mark.parametrize("name", ["walk", "run"])
 def test_a_clip_that_skates_stands_on_a_bent_path(figure, name: str) -> None:
     clip = skating(name)
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     path = bent_path(gait, 0.5, 7.0)
     places = np.arange(gait.reach, path_front(path) - gait.reach - 0.2, 0.01)
     shown = soles(figure, [led.pose(walker(s), path) for s in places])
@@ -93,7 +93,7 @@ def test_a_clip_that_skates_stands_on_a_bent_path(figure, name: str) -> None:
 
 def test_a_foot_that_stands_lies_level(figure) -> None:
     clip = skating("walk")
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     shown = soles(figure, [led.pose(walker(s)) for s in np.arange(0.0, gait.stride, 0.01)])
     toes, heels = shown[:, 2:4], shown[:, 0:2]
     flat = (toes[..., 2].min(axis=1) < 0.003) & (heels[..., 2].min(axis=1) < 0.003)
@@ -124,7 +124,7 @@ def test_a_sole_that_rolls_from_heel_to_toes_lies_flat_in_between(figure) -> Non
 
 def test_a_capture_that_flies_steps_instead(figure) -> None:
     clip = skating("run")
-    led, gait = led_map(clip, figure_legs(figure))
+    led, gait = led_map(clip, figure)
     assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
     # Its limbs swing as fast already as they do in the run.
     assert leading(Lead(), gait).walking.forward == 1.0
@@ -142,7 +142,7 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
 @pytest.mark.parametrize("name", ["walk", "run"])
 def test_a_clip_that_closes_is_led_as_it_is(figure, name: str) -> None:
     clip = embedded(name)
-    led, _ = led_map(clip, figure_legs(figure))
+    led, _ = led_map(clip, figure)
     plain = Led((clip.poses, clip.fps), figure_legs(figure), led.phase)
     for s in np.linspace(0.0, led.stride, 30):
         np.testing.assert_array_equal(led.pose(walker(s)), plain.pose(walker(s)))
@@ -152,7 +152,7 @@ def test_a_clip_that_closes_is_led_as_it_is(figure, name: str) -> None:
 def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
-    led, gait = led_map(load_clip(MOCAP / file), figure_legs(figure))
+    led, gait = led_map(load_clip(MOCAP / file), figure)
     path = bent_path(gait, 0.35, gait.reach + 2.0 * led.stride + 1.0)
     places = np.arange(gait.reach, gait.reach + 2.0 * led.stride, 0.01)
     # On its levelled floor this one's heel lands flatter, and slides by 3.17 cm as it rolls.
@@ -164,7 +164,7 @@ def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
 
 
 def test_the_derivative_of_a_planted_capture_is_that_of_the_pose(figure) -> None:
-    led, gait = led_map(skating("walk"), figure_legs(figure))
+    led, gait = led_map(skating("walk"), figure)
     path, h = bent_path(gait, 0.5, 7.0), 1e-6
     for s in np.random.default_rng(4).uniform(1.0, 5.0, 60):
         jacobian = led.jacobian(walker(s), path)

@@ -247,3 +247,34 @@ def test_kinematic_and_absent_figures_leave_the_stylus_where_it_is() -> None:
     assert runs[1].summary.figure is None
     assert runs[2].summary.animation is None
     np.testing.assert_allclose(runs[1].frames["reference"], runs[0].frames["reference"], atol=2e-3)
+
+
+def test_a_channel_is_looked_for_as_in_any_mapping() -> None:
+    run = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), figure=hvf.Figure(kind="none")).run(0.1)
+    assert "force" in run.ticks
+    assert "forces" not in run.ticks
+    assert run.ticks.get("forces") is None
+    with pytest.raises(hvf.SimError, match=r"^no channel 'forces'; ticks has .*force, .*tank"):
+        run.ticks["forces"]
+
+
+def test_what_is_printed_of_a_field_and_of_a_certificate_is_read_at_a_glance() -> None:
+    field = (0.5 * hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)
+    said = repr(field)
+    assert said.startswith("<field of Follow(curve=<closed curve of 97 samples, 0.3 m in 2 s>, k_r=300, ")
+    assert said.endswith("level(k=50.0), joined by gate, add, limit>")
+    verdicts = repr(hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8))))
+    assert len(verdicts) < 1500
+    assert "array(" not in verdicts
+
+
+def test_a_field_is_scaled_from_either_side() -> None:
+    follow, hand = hvf.Follow(CURVE, k_r=300, b_d=8), hvf.HandState.at([0.04, 0.0, -0.01])
+    np.testing.assert_array_equal((follow * 0.5).wrench(hand).force, (0.5 * follow).wrench(hand).force)
+
+
+def test_a_number_within_a_sequence_is_not_swept_and_it_is_said_what_is() -> None:
+    push = hvf.User(pushes=[hvf.Push(at=0.0, seconds=0.1, force=1.0)])
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), user=push)
+    with pytest.raises(hvf.ParameterError, match=r"user\.pushes is a list; expected whole values of user\.pushes"):
+        with_values(sim, {"user.pushes.force": 2.0})

@@ -47,7 +47,7 @@ def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str)
     poses = _poses(name)
     before, lowered = _lowest(poses), poses.copy()
     for pose in lowered:
-        lower_to_floor(LEGS, ENDS, 1.0, pose)
+        lower_to_floor(LEGS, ENDS, 1.0, pose, 1.0)
     assert before.max() > 0.03
     assert _lowest(lowered).max() < 0.006
     assert _lowest(lowered).min() > before.min() - 1e-9
@@ -57,7 +57,7 @@ def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str)
     np.testing.assert_array_equal(np.delete(lowered, 2, axis=1), np.delete(poses, 2, axis=1))
     for pose, own in zip(lowered, poses, strict=True):
         pose[:] = own
-        lower_to_floor(LEGS, ENDS, 0.0, pose)
+        lower_to_floor(LEGS, ENDS, 0.0, pose, 1.0)
     np.testing.assert_array_equal(lowered, poses)
 
 
@@ -66,7 +66,7 @@ def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
     over = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
     lowered = over.copy()
     for pose in lowered:
-        lower_to_floor(LEGS, ENDS, 1.0, pose)
+        lower_to_floor(LEGS, ENDS, 1.0, pose, 1.0)
     assert len(over) > 5
     np.testing.assert_array_equal(lowered, over)
 

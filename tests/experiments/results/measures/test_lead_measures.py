@@ -127,24 +127,24 @@ def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
 
 @pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
 def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
-    led, gait = led_map(embedded(name), figure_legs(figure_model()))
+    led, gait = led_map(embedded(name), figure_model())
     assert gait.support[0] == most
     assert support_at(gait, np.array([0.0]))[0] == most
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
 
 def test_who_leads_a_clip_that_flies_is_told_so() -> None:
-    legs = figure_legs(figure_model())
-    walk, run = (led_map(embedded(name), legs)[0] for name in ("walk", "run"))
+    figure = figure_model()
+    walk, run = (led_map(embedded(name), figure)[0] for name in ("walk", "run"))
     jerked = embedded("run").poses.copy()
     jerked[-20:, 7:11] = jerked[-21, 7:11]
-    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), legs)
+    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), figure)
     assert gait_remark("walk", walk) == ()
     assert "led slowly it goes without flights" in gait_remark("run", run)[0]
     assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture)[0]
     standing = np.zeros((8, 2), dtype=bool)
     standing[:4, 0] = True
-    hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, standing)
+    hop = Led((embedded("run").poses, embedded("run").fps), figure_legs(figure), 0.0, standing)
     assert "may fall where it is slow" in gait_remark("hop", hop)[0]
 
 
@@ -173,7 +173,7 @@ def test_what_leaps_too_far_to_stay_on_the_ground_is_led_by_steps_though_it_clos
     flies = ~contacts(run).planted.any(axis=1)
     far, flights = run.poses.copy(), np.count_nonzero(flies[1:] & ~flies[:-1])
     far[:, 0] += np.cumsum(flies) * flights / flies.sum()
-    led, gait = led_map(Clip(far, run.fps, "leaps"), figure_legs(figure_model()))
+    led, gait = led_map(Clip(far, run.fps, "leaps"), figure_model())
     assert not led.flies
     assert led.grounds
     assert gait.grounded

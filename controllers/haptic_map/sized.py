@@ -1,0 +1,110 @@
+"""Maps of a figure of another size: the same joint angles, the root's position in proportion to the body's lengths."""
+
+import numpy as np
+from numba import njit
+
+from controllers.checks import of_kind
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.expressive import base_of
+from controllers.state import Array, Pose
+
+SIZED = 9
+_KIND, _SIZE, _HEADER = 0, 1, 2
+
+
+@njit
+def unsized(kind: int, params: Array) -> tuple[int, Array]:
+    """Kind and parameters of the map that a `Sized` map wraps; its own if it wraps none."""
+    if kind != SIZED:
+        return kind, params
+    return int(params[_KIND]), params[_HEADER:]
+
+
+@njit
+def innermost(kind: int, params: Array) -> tuple[int, Array]:
+    """Kind and parameters of the map that is left without size and expression."""
+    inner, numbers = unsized(kind, params)
+    return base_of(inner, numbers)
+
+
+@njit
+def size_of(kind: int, params: Array) -> float:
+    """Size s of a map's figure over that of its clips [1]."""
+    return params[_SIZE] if kind == SIZED else 1.0
+
+
+@njit
+def size_pose(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Sized`: scale the root's position of the wrapped map's pose, and its derivative unless it is empty.
+
+    Parameters
+    ----------
+    params : Array
+        Parameters of a `Sized`.
+    x, memory : Array
+        Stylus pose (7,) and memory of the wrapped map; neither is used.
+    pose, jacobian : Array, shapes (nq,), (nv, 6)
+        Pose and derivative of the wrapped map; updated.
+    """
+    for i in range(3):
+        pose[i] *= params[_SIZE]
+    for i in range(min(3, jacobian.shape[0])):
+        for k in range(jacobian.shape[1]):
+            jacobian[i, k] *= params[_SIZE]
+
+
+class Sized(HapticMap):
+    r"""A map for a figure whose lengths are all s times those of the figure of its clips.
+
+    .. math:: h_s(x) = (s\,p(x),\; q(x)), \qquad h(x) = (p(x),\; q(x))
+
+    p is the position of the root, q all rotations. Every point of the body is then at s times its place, so soles that
+    stand on the floor still do, and do not skate.
+
+    Parameters
+    ----------
+    base : HapticMap
+        A map to poses of root position, root quaternion, then joint quaternions (wxyz).
+    size : float
+        s [1].
+
+    Raises
+    ------
+    ParameterError
+        If the size is no number, not positive, or not finite.
+    """
+
+    def __init__(self, base: HapticMap, size: float) -> None:
+        of_kind("size", size, float)
+        if not 0.0 < size < np.inf:
+            raise ParameterError(f"size is {size:g}; expected more than 0, and finite")
+        self.base, self.size = base, float(size)
+        kind, params, _ = base.compiled()
+        self._params = np.concatenate([[kind, self.size], params])
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self.base.nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent."""
+        return self.base.nv
+
+    def compiled(self) -> CompiledMap:
+        """The map in the form of its kernel, with the memory of a new run."""
+        return CompiledMap(SIZED, self._params, self.base.compiled().memory)
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h_s(x), shape (nq,), of a stylus pose (7,); memory as in the wrapped map."""
+        pose = self.base.pose(x, memory)
+        pose[:3] *= self.size
+        return pose
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative, shape (nv, 6): columns linear, then angular velocity in H; memory as in the wrapped map."""
+        jacobian = self.base.jacobian(x, memory)
+        jacobian[:3] *= self.size
+        return jacobian
