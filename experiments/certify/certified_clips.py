@@ -10,9 +10,10 @@ from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
-from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.results.folder import RECORDING, clips_of, config_of, scene_of
 from experiments.results.measures.run_measures import SETTLING
 from experiments.setups.setups import clips_for
+from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 
@@ -27,6 +28,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     """Configuration and clips of a recorded run, of which the last is its animation as it was played.
 
     Without a recording: the given configuration, and the clips of its map's file or those that it names.
+    What a figure of another stature played is given on the default one, as the clips are.
 
     Raises
     ------
@@ -35,10 +37,20 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     """
     if folder is not None:
         with Recording(folder / RECORDING) as recording:
-            return config_of(recording), (*clips_of(recording), *played(recording))
+            config, size = config_of(recording), scene_of(recording).stature / DEFAULT_STATURE
+            shown = (clip.resized(1.0 / size) for clip in played(recording))
+            return config, (*clips_of(recording), *shown)
     if isinstance(config.map, MapFile):
         return config, load_figure_map(Path(config.map.file))[1]
     return config, clips_for(config.map)[0]
+
+
+def similar(clip: Clip, size: float) -> Clip:
+    """The default figure's motion that is dynamically similar to a clip on a figure of size s (equal Froude number).
+
+    With lengths s times as long at the same times it accelerates s times as much, as the clip does at √s of its pace.
+    """
+    return clip if size == 1.0 else replace(clip, fps=clip.fps * size**0.5)
 
 
 def played(recording: Recording) -> tuple[Clip, ...]:
@@ -51,15 +63,19 @@ def played(recording: Recording) -> tuple[Clip, ...]:
     return (Clip(poses, rate / stride, PLAYED),) if len(poses) > 1 else ()
 
 
-def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:
-    """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with those of all clips listed."""
-    found = [(clip.name, clip_ballistics(clip, judging).certificate.verdicts) for clip in clips]
+def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING, size: float = 1.0) -> dict[str, Verdict]:
+    """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with those of all clips listed.
+
+    `size`: lengths of the figure over those of the default one, for which the clips are [1].
+    """
+    found = [(clip.name, clip_ballistics(similar(clip, size), judging).certificate.verdicts) for clip in clips]
     told: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(((name, of[kind]) for name, of in found), key=lambda pair: _ORDER.index(pair[1].verdict))
         each = {name: of[kind].verdict for name, of in found}
         listed = ", ".join(f"{clip} {known}" for clip, known in each.items())
-        reason = f"{name}: {worst.reason}" + (f"; each: {listed}" if len(each) > 1 else "")
+        by = "" if size == 1.0 else f" by a figure of {size * DEFAULT_STATURE:g} m, times over {size**0.5:.2f}"
+        reason = f"{name}{by}: {worst.reason}" + (f"; each: {listed}" if len(each) > 1 else "")
         assumptions = (*worst.assumptions, _PACE) if PLAYED not in each or len(each) > 1 else worst.assumptions
         told[kind] = replace(worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": each})
     return told

@@ -152,7 +152,7 @@ def certificate_inputs(
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
         "curve": given_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
-        "judging": judging,
+        "judging": (judging, config.figure.stature),
         "figure": (config.figure.stature, config.figure.mass, mode.floor_scale) if isinstance(mode, Lead) else None,
         "period": sampling.period,
         "delay": sampling.delay,

@@ -39,6 +39,7 @@ from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, left_out
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.defaults import resolved
+from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.motion.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
@@ -125,7 +126,7 @@ def certify_into(
         return held
     main, verdicts = _field_verdicts(config, delay, hands, push, clips)
     if clips:
-        verdicts |= certify_clips(clips, judging)
+        verdicts |= certify_clips(clips, judging, config.figure.stature / DEFAULT_STATURE)
     certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
     plots: dict[str, tuple[Figure, str]] = {PLOT: (stability_figure(main, verdicts["stability"]), "stability boundary")}
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:

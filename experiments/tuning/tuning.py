@@ -230,7 +230,10 @@ def _sentence(config: TuneConfig, c: Comparison) -> str:
         return f"Against {c.contender}, {unit}: the same, {c.tuned:.3g}."
     word = "better" if c.better_by > 0.0 else "worse"
     shown = "" if c.low > 0.0 or c.high < 0.0 else ", so no difference is shown"
+    gained = f"95 % interval of what is gained {c.low:.3g} to {c.high:.3g}{shown}"
+    if np.isnan(c.low):
+        gained = "no difference is shown: an interval takes three users or more, who do not gain the same"
     return (
         f"Against {c.contender}, on {config.held_back.number} held-back users, {unit}: {c.tuned:.3g} for {c.mean:.3g}, "
-        f"{word} by {abs(c.better_by):.3g} (95 % interval of what is gained {c.low:.3g} to {c.high:.3g}{shown})."
+        f"{word} by {abs(c.better_by):.3g} ({gained})."
     )

@@ -77,7 +77,7 @@ def test_a_mistake_is_one_line(
 
 def test_a_bend_that_a_lap_is_too_short_for_names_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["run", "--mode", "stretch", "--lap", "0.8", "--figure", "none", "--out", str(tmp_path / "run")]
-    assert "expected --lap 1 or more, or --bump 0.4 or less" in refused(command, capsys)
+    assert "expected --lap 1.1 or more, or --bump 0.39 or less" in refused(command, capsys)
 
 
 def test_a_motion_in_a_file_of_another_format_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -101,7 +101,7 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
         pairs = [f"{haptic_map.names[at.first]} – {haptic_map.names[at.second]}" for at in haptic_map.transitions]
         raise ParameterError(
             f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
-            f"{', '.join(pairs) or 'none'}; leave out --user push, or begin on another --curve"
+            f"{', '.join(pairs) or 'none'}; leave out --user push{', or begin on another --curve' * bool(pairs)}"
         )
     best = own[0]
     second = best.second if best.first == first else best.first

@@ -1,6 +1,6 @@
 """Map parts of a led figure: the clip that is led, its map and gait, and remarks about both."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -91,9 +91,7 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     lap, closes = lap_of(clip), clip.closes(CLOSES)
     marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
     size, legs = proportion(figure), figure_legs(figure)
-    scale = np.where(np.arange(lap.clip.poses.shape[1]) < 3, size, 1.0)
-    clip = replace(lap.clip, poses=lap.clip.poses * scale)
-    capture = Capture(CONTACT_RADIUS * size)
+    clip, capture = lap.clip.resized(size), Capture(CONTACT_RADIUS * size)
     if not closes:
         return _led(clip, legs, stances(marks, clip.fps), capture)
     made = _led(clip, legs, marks.planted[:-1], None)

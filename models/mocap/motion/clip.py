@@ -135,6 +135,11 @@ class Clip:
         """Whether the pelvis is upside down at some time, more than 120° from upright."""
         return self.least_upright < _TURNS_OVER
 
+    def resized(self, size: float) -> "Clip":
+        """The motion of a figure with lengths `size` times as long: p′ = size p of the root, the same rotations."""
+        lengths = np.where(np.arange(N_POSE) < 3, size, 1.0)
+        return Clip(self.poses * lengths, self.fps, self.name)
+
     def closes(self, tolerance: float = 1e-6) -> bool:
         """Whether the last frame is the first displaced over the floor, within `tolerance` [rad], [m] at the root."""
         if self.n_frames < 2:
