@@ -10,7 +10,7 @@ from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
-from experiments.results.folder import RECORDING, clips_of, config_of, scene_of
+from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.results.measures.run_measures import SETTLING
 from experiments.setups.setups import clips_for
 from models.humanoid.skeleton import DEFAULT_STATURE
@@ -37,7 +37,8 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     """
     if folder is not None:
         with Recording(folder / RECORDING) as recording:
-            config, size = config_of(recording), scene_of(recording).stature / DEFAULT_STATURE
+            config = config_of(recording)
+            size = config.figure.stature / DEFAULT_STATURE
             shown = (clip.resized(1.0 / size) for clip in played(recording))
             return config, (*clips_of(recording), *shown)
     if isinstance(config.map, MapFile):
