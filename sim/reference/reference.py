@@ -8,9 +8,8 @@ from numba import typeof, types
 
 from controllers.fields.algebra.instructions import VECTOR
 from controllers.haptic_map.base import CompiledMap, HapticMap
-from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.evaluate import evaluate_map, kinds_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS
-from controllers.haptic_map.sized import innermost
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
 from controllers.lent import Lent, lend
@@ -64,7 +63,7 @@ def poses_unit() -> Unit:
 
 def update_unit(reference: CompiledReference) -> Unit:
     """The compilation unit that advances a reference by one period (`sim.reference.update`), called by its address."""
-    plays = innermost.py_func(reference.kind, reference.params)[0] == RIVER_CLIPS
+    plays = RIVER_CLIPS in kinds_of(reference.kind, reference.params)
     return Unit.of(update_river_reference if plays else update_reference, Lent(typeof(reference)), VECTOR, VECTOR)
 
 
