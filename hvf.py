@@ -32,9 +32,10 @@ from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.lifting.lift_file import lift_into as lift
 from experiments.preparation.command import prepare_file as prepare
 from experiments.public import circle, clips, load, version
+from experiments.runs.map_objects import Composite, Cylindrical, Lifted
 from experiments.runs.run_result import Run
 from experiments.runs.run_words import run
-from experiments.runs.simulation import Composite, Cylindrical, Lifted, Simulation, Tick, User
+from experiments.runs.simulation import Simulation, Tick, User
 from experiments.runs.sweep import Swept, sweep
 from experiments.setups.parts.pace import paced
 from experiments.trials.study import Study

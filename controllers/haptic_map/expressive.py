@@ -8,7 +8,8 @@ from numba import njit
 
 from controllers.curves.cylinder import blend_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
+from controllers.haptic_map.wrapped import Wrapped
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
@@ -141,7 +142,7 @@ class ExpressiveJoint:
     high: tuple[float, float, float]
 
 
-class Expressive(HapticMap):
+class Expressive(Wrapped):
     r"""A map with joints that also turn with the stylus: gaze and lean.
 
     .. math:: q_k(p, R) = q_k(p) \otimes \exp e_k, \qquad e_{k,i} = f(g_{k,i}\, r_i;\, R_{k,i}), \qquad r = F \log R
@@ -182,22 +183,7 @@ class Expressive(HapticMap):
         if not joints:
             raise ParameterError("expression needs at least one joint that turns with the stylus")
         rows = [_checked_row(joint, last) for joint in joints]
-        self.base = base
-        self._params = np.concatenate([[kind, len(rows)], *rows, params])
-
-    @property
-    def nq(self) -> int:
-        """Numbers of a configuration."""
-        return self.base.nq
-
-    @property
-    def nv(self) -> int:
-        """Numbers of a tangent."""
-        return self.base.nv
-
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap(EXPRESSIVE, self._params, self.base.compiled().memory)
+        super().__init__(base, EXPRESSIVE, np.concatenate([[kind, len(rows)], *rows, params]))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the base map."""

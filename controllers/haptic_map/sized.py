@@ -5,8 +5,9 @@ from numba import njit
 
 from controllers.checks import of_kind
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.expressive import base_of
+from controllers.haptic_map.wrapped import Wrapped
 from controllers.state import Array, Pose
 
 SIZED = 9
@@ -54,7 +55,7 @@ def size_pose(params: Array, x: Array, memory: Array, pose: Array, jacobian: Arr
             jacobian[i, k] *= params[_SIZE]
 
 
-class Sized(HapticMap):
+class Sized(Wrapped):
     r"""A map for a figure whose lengths are all s times those of the figure of its clips.
 
     .. math:: h_s(x) = (s\,p(x),\; q(x)), \qquad h(x) = (p(x),\; q(x))
@@ -79,23 +80,9 @@ class Sized(HapticMap):
         of_kind("size", size, float)
         if not 0.0 < size < np.inf:
             raise ParameterError(f"size is {size:g}; expected more than 0, and finite")
-        self.base, self.size = base, float(size)
         kind, params, _ = base.compiled()
-        self._params = np.concatenate([[kind, self.size], params])
-
-    @property
-    def nq(self) -> int:
-        """Numbers of a configuration."""
-        return self.base.nq
-
-    @property
-    def nv(self) -> int:
-        """Numbers of a tangent."""
-        return self.base.nv
-
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap(SIZED, self._params, self.base.compiled().memory)
+        super().__init__(base, SIZED, np.concatenate([[kind, float(size)], params]))
+        self.size = float(size)
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h_s(x), shape (nq,), of a stylus pose (7,); memory as in the wrapped map."""

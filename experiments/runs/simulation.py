@@ -4,9 +4,8 @@ import itertools
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -17,38 +16,28 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
-from controllers.haptic_map.lifted import Lifted as LiftedMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
-from experiments.config.maps import MapFile
 from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
-from experiments.files.map_files import load_figure_map
+from experiments.runs.map_objects import FigureMap
 from experiments.runs.run_result import Run
 from experiments.setups.figure_maps import (
-    Place,
-    composite_parts,
-    cylindrical_parts,
-    for_size_of,
-    lifted_parts,
     own_parts,
     reached,
 )
-from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import TRACED, intent_of, participant
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates, check_seconds
-from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.devices.device import ticks_of
-from sim.errors import SimError
 from sim.loop.loop import Loop
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.hand.arm import Arm
@@ -58,138 +47,6 @@ from sim.users.person.person import Person
 from sim.world.world import World
 
 _MINUTE = 60.0  # [s]
-
-
-class FigureMap(Protocol):
-    """Factory of a haptic map for the figure of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        ...
-
-
-@dataclass(frozen=True)
-class Cylindrical:
-    """Cylindrical map: the angle sets the frame, radius and height blend four clips (the paper's Fig. 3).
-
-    Parameters
-    ----------
-    clips : sequence of Clip
-        Inner low, outer low, inner high, outer high; if there are fewer, they are repeated.
-    around : Trajectory
-        Curve about the z axis of H, in the middle of the map's domain.
-    reach : float
-        Half width of the domain about the curve, in radius and in height [m].
-    expressive : bool
-        Whether the figure's gaze and lean follow the orientation of the stylus.
-    """
-
-    clips: Sequence[Clip]
-    around: Trajectory = field(repr=False)
-    reach: float = 0.025
-    expressive: bool = False
-
-    def __post_init__(self) -> None:
-        _check_map(self)
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), _place(self), model))
-
-
-@dataclass(frozen=True)
-class Composite:
-    """Composite map: the lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
-
-    Parameters
-    ----------
-    clips : sequence of Clip
-        Lower body, upper body inside, upper body outside; if there are fewer, they are repeated.
-    around, reach, expressive
-        As in `Cylindrical`.
-    """
-
-    clips: Sequence[Clip]
-    around: Trajectory = field(repr=False)
-    reach: float = 0.025
-    expressive: bool = False
-
-    def __post_init__(self) -> None:
-        _check_map(self)
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), _place(self), model))
-
-
-@dataclass(frozen=True)
-class Lifted:
-    """Map that `hvf.lift` wrote: each clip lies along a curve of its own, and near several they are blended.
-
-    Parameters
-    ----------
-    file : path
-        The file (.npz).
-    curve : str
-        Name or number of the clip on whose curve the run begins; by default the first.
-    expressive : bool
-        As in `Cylindrical`.
-
-    Raises
-    ------
-    SimError
-        If the file holds no lifted map.
-    ParameterError
-        If the map has no such curve.
-    """
-
-    file: str | Path
-    curve: str = ""
-    expressive: bool = False
-
-    def __post_init__(self) -> None:
-        check_kinds(self)
-        _ = self.around
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the clips, and so of the curves."""
-        return self._made[0].names
-
-    @property
-    def around(self) -> Trajectory:
-        """The curve on which the run begins, timed by its clip: φ of a field that plays it."""
-        made, _ = self._made
-        return made.curve(curve_number(made, self.curve))
-
-    @property
-    def clips(self) -> tuple[Clip, ...]:
-        """The clips of the map."""
-        return self._made[1]
-
-    @cached_property
-    def _made(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
-        made, clips = load_figure_map(Path(self.file))
-        if not isinstance(made, LiftedMap):
-            raise SimError(f"{self.file}: its map is {type(made).__name__}; expected one that hvf.lift wrote")
-        return made, clips
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
-        return for_size_of(world.figure, lambda _: lifted_parts(*self._made, part))
-
-
-def _check_map(part: Cylindrical | Composite) -> None:
-    check_kinds(part)
-    if not 0.0 < part.reach < np.inf:
-        raise ParameterError(f"reach is {part.reach:g}; expected more than 0 m, and finite")
-
-
-def _place(part: Cylindrical | Composite) -> Place:
-    curve = reached(part.around)
-    points = curve.point(np.linspace(curve.start, curve.end, 65))
-    return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), part.reach, part.expressive)
 
 
 @dataclass(frozen=True)
