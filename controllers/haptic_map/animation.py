@@ -117,9 +117,14 @@ class AnimationMap(ClipMap):
         super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs)
 
     @property
+    def laps(self) -> int:
+        """Laps of the hand in which each clip is played a whole number of times."""
+        return 1
+
+    @property
     def lap_seconds(self) -> float:
         """Duration of a lap at which the clips, with their repeats, run on average at their own pace [s]."""
-        return self._lap_seconds
+        return self._lap_seconds / self.laps
 
     def lap_array(self) -> dict[str, Array]:
         """The lap that the map was made for, as an array by key; empty without one."""

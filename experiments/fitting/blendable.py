@@ -61,18 +61,39 @@ def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool
     return all(slowest <= pace <= fastest for pace in paces)
 
 
+def keep_own_pace(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> bool:
+    """Whether a round [s] plays every clip near enough to its own pace to be followed alone."""
+    return all(
+        (FLYING_SLOWEST if longest_flight(clip) > 0.0 else SLOWEST) <= loop.duration / seconds <= FLYING_FASTEST
+        for clip, loop in zip(clips, loops, strict=True)
+    )
+
+
+def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
+    """The clips as closed loops."""
+    return [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+
+
+def furthest_off(loops: Sequence[Loop], seconds: float) -> float:
+    """Largest |log| of the pace at which a round [s] plays a loop, relative to its own."""
+    return max(abs(float(np.log(loop.duration / seconds))) for loop in loops)
+
+
 def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
     """The loops, reordered to begin with the one of index `first`."""
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
-def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
-    """Remark on clips that a lap [s] plays much faster or slower than their own pace, as loops made by `in_step`."""
-    paces = {clip.name: loop.duration / lap for clip, loop in zip(clips, loops, strict=True)}
+def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int = 1) -> tuple[str, ...]:
+    """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `in_step`.
+
+    `laps` is the number of laps in a round, in which each loop is played once.
+    """
+    paces = {clip.name: loop.duration / (laps * lap) for clip, loop in zip(clips, loops, strict=True)}
     off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
     if not off:
         return ()
-    closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    best = natural_lap(led_by(grounded(clips), closed))
+    best = natural_lap(led_by(grounded(clips), closed_loops(clips)))
     better = f"--lap {best:.1f} suits them best" if abs(best / lap - 1.0) > _SAME else "no lap suits them all better"
-    return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; {better}",)
+    played = f"a lap of {lap:.1f} s plays" if laps == 1 else f"{laps} laps of {lap:.1f} s play"
+    return (f"{played} {', '.join(off)} times its own pace; {better}",)

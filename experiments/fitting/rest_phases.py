@@ -5,13 +5,14 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.stylus import stylus_path
-from controllers.haptic_map.river_clips import RIVER, RiverClips
+from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import RIVER
 from controllers.legs.sole_heights import STANDS
 from experiments.fitting.balance import nearest_supported
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import map_poses
 
-_ROWS = 96  # samples of a lap
+_ROWS = 96  # samples of a lap of the hand
 _SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
 _UNSUPPORTED = 1.0  # [m] distance assigned to phases in flight: larger than any other
 
@@ -30,10 +31,11 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         Model of the figure alone.
     """
     data, feet = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    centre, contacts = np.empty((_ROWS, 2)), np.empty((_ROWS, len(feet), 3))
+    rows = clips.laps * _ROWS
+    centre, contacts = np.empty((rows, 2)), np.empty((rows, len(feet), 3))
     rests: list[npt.NDArray[np.float64]] = []
     for river, curve in enumerate(clips.curves):
-        phases = curve.start + curve.duration * np.arange(_ROWS) / _ROWS
+        phases = curve.start + curve.duration * np.arange(rows) / _ROWS
         lap = clips.compiled().memory
         lap[RIVER] = river
         for i, pose in enumerate(map_poses(clips, stylus_path(curve.point(phases)), lap)):

@@ -15,7 +15,8 @@ from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
-from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
+from controllers.haptic_map.river_clips import LONGEST, RiverClips
+from controllers.haptic_map.river_memory import PHASE, RIVER
 from controllers.state import Array
 from experiments.console.progress import working
 from experiments.files.array_cache import is_kept, kept_array
@@ -39,10 +40,11 @@ _MOMENTS = 8  # moments of a stride at which a change by offsets is tried
 # eight do.
 _TRIES, _WELL = 2, 400.0
 _WAITS = 2.0  # [s] that a hand waits for the next gate, at most about
-_GATES = 3  # gates in a stride at most, since each takes some seconds to compute
-_MOST = 8  # strides in a lap at most
+_GATES = 3  # gates in a stride at most, unless it is long, since each takes some seconds to compute
+_LONGEST_WAIT = 4.0  # [s]: in clips with few strides, gates are as many as this needs
+_MOST = 8  # strides in a round at most
 _LONG = 8.0  # [s] after which a change that has not happened is given up
-_ROWS = 840  # samples of a lap: divisible by any number of strides up to `_MOST`
+_ROWS = 840  # samples of a round: divisible by any number of strides up to `_MOST`
 _REPEATS = 0.02  # [rad], [m] by which strides of one clip may differ
 
 
@@ -56,7 +58,7 @@ class _Passage(NamedTuple):
     second : Array, shape (n, nq)
         The new clip alone at the same times, placed where the figure is after the change.
     gate : float
-        Phase at which the transition begins, after the start of the lap [s].
+        Phase at which the transition begins, after the start of the round [s].
     """
 
     poses: Array
@@ -80,7 +82,7 @@ class _Passage(NamedTuple):
 
 
 class _Gate(NamedTuple):
-    """Where a transition is sought: its two rivers, a part of a stride, strides in a lap, and moments to try [s]."""
+    """Where a transition is sought: its two rivers, a part of a stride, strides in a round, and moments to try [s]."""
 
     first: int
     second: int
@@ -109,9 +111,10 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
     made_of = (made.compiled().params, np.array([blend]))
     gates: list[_Gate] = []
     for first, second in ((a, b) for a in rivers for b in rivers if a != b):
-        lap, strides = made.curves[first].duration, _strides(alike, first, second)
-        parts = min(int(np.ceil(lap / strides / _WAITS)), _GATES)
-        span = lap / strides / parts
+        strides = _strides(alike, first, second)
+        stride = made.round_seconds(first) / strides
+        parts = max(min(int(np.ceil(stride / _WAITS)), _GATES), int(np.ceil(stride / _LONGEST_WAIT)))
+        span = stride / parts
         gates += [_Gate(first, second, k, strides, span * (k + np.arange(_MOMENTS) / _MOMENTS)) for k in range(parts)]
     missing = [gate for gate in gates if not is_kept(kept_folder(__name__), gate.name, made_of, (-1, 57))]
     if missing:
@@ -119,9 +122,9 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
             side_by_side([(_kept, (alike, made_of, blend, figure, gate)) for gate in missing])
     changes: list[ClipChange] = []
     for gate in gates:
-        rows, lap = _kept(alike, made_of, blend, figure, gate), made.curves[gate.first].duration
+        rows, period = _kept(alike, made_of, blend, figure, gate), made.round_seconds(gate.first)
         if len(rows):
-            phases = (rows[0, 0] + lap / gate.strides * np.arange(gate.strides)) % lap
+            phases = (rows[0, 0] + period / gate.strides * np.arange(gate.strides)) % period
             changes.append(ClipChange(gate.first, gate.second, phases, rows[1:]))
     return made.with_changes(changes)
 
@@ -136,35 +139,42 @@ def _kept(made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: 
 
 
 def _strides(made: RiverClips, first: int, second: int) -> int:
-    """Into how many equal strides a lap of both clips divides."""
-    laps = [
-        _alone(made, river, np.arange(_ROWS) * made.curves[river].duration / _ROWS)[:, 7:] for river in (first, second)
+    """Into how many equal strides a round of both clips divides."""
+    rounds = [
+        _alone(made, river, np.arange(_ROWS) * made.round_seconds(river) / _ROWS)[:, 7:] for river in (first, second)
     ]
     for strides in range(_MOST, 1, -1):
-        if all(np.abs(lap - np.roll(lap, _ROWS // strides, axis=0)).max() < _REPEATS for lap in laps):
+        if all(np.abs(whole - np.roll(whole, _ROWS // strides, axis=0)).max() < _REPEATS for whole in rounds):
             return strides
     return 1
 
 
 def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
-    """Poses of a river's clip at phases [s] after the start of the lap, beginning with a given memory of the map."""
-    curve, own = made.curves[river], made.compiled().memory if memory is None else memory.copy()
+    """Poses of a river's clip at phases [s] after the start of the round, beginning with a given memory of the map."""
+    curve, own = made.curves[river], _begun(made, phases[0]) if memory is None else memory.copy()
     own[RIVER] = river
     return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), own)
+
+
+def _begun(made: RiverClips, phase: float) -> Array:
+    """Memory of a run that begins at a phase [s] after the start of the round."""
+    memory, start = made.compiled().memory, made.curves[0].start
+    memory[PHASE] = start + phase % made.round_seconds(0)
+    return memory
 
 
 def _passage(
     made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
 ) -> _Passage | None:
-    """The transition from one river's clip to another's at or soon after a moment of the lap [s]; None without one."""
-    curve = made.curves[first]
+    """The transition from one river's clip to another's at or soon after a moment of the round [s]; None without."""
+    curve, period = made.curves[first], made.round_seconds(first)
     lap = curve.duration
-    times = lap + moment - _LEAD - _AROUND - _SETTLES + np.arange(_AT_ONCE * round(_LONG * FPS / _AT_ONCE)) / FPS
+    times = period + moment - _LEAD - _AROUND - _SETTLES + np.arange(_AT_ONCE * round(_LONG * FPS / _AT_ONCE)) / FPS
     stylus = stylus_path(curve.point(curve.start + times % lap))
     traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
-    traces[:, TRACE_RIVER] = np.where(times < lap + moment, first, second)
+    traces[:, TRACE_RIVER] = np.where(times < period + moment, first, second)
     traces[:, TRACE_PHASE] = curve.start + times % lap
-    compiled = made.compiled()
+    compiled = made.compiled()._replace(memory=_begun(made, times[0]))
     compiled.memory[RIVER] = first
     reference = make_reference(figure, compiled, 1.0 / FPS, _BANDWIDTH, blend, packed_legs(figure))
     changed, tail = None, round((_TAIL + _AROUND) * FPS)
@@ -177,14 +187,14 @@ def _passage(
             reference_along(reference, stylus[rest], traces[rest], poses[rest])
             rows = np.arange(changed - round((_LEAD + _AROUND) * FPS), rest.stop)
             alone = _alone(made, second, times[rows[::-1]], reference.memory)[::-1]
-            return _Passage(poses[rows], alone, float((times[rows[0]] + _AROUND) % lap))
+            return _Passage(poses[rows], alone, float((times[rows[0]] + _AROUND) % period))
     return None
 
 
 def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
     """The gate [s] as a first row, then the offsets (n, 57) of the transition that begins there; (0, 57) if none."""
     passages = [_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
-    longest = LONGEST * made.curves[first].duration
+    longest = LONGEST * made.round_seconds(first)
     tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not tried:
         return np.zeros((0, 57))

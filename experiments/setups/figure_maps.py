@@ -21,7 +21,6 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
-from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import in_step
 from controllers.state import Array
 from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
@@ -30,7 +29,17 @@ from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.balance import balanced
-from experiments.fitting.blendable import grounded, keeps_pace, longest_flight, not_blendable, off_pace, same
+from experiments.fitting.blendable import (
+    closed_loops,
+    furthest_off,
+    grounded,
+    keep_own_pace,
+    keeps_pace,
+    longest_flight,
+    not_blendable,
+    off_pace,
+    same,
+)
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import carried
 from experiments.fitting.push_trials import followed_map
@@ -49,6 +58,7 @@ from sim.compilation.sources import kept_folder
 
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
+_MOST_LAPS = 4  # in a round: with more, a hand waits long for a change, and there are many changes to compute
 LIFTED_CARRY = 0.3  # factor on the default hand's distances on a lifted map, whose curves are near each other
 
 
@@ -213,9 +223,9 @@ def _river_clips_parts(
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
-    lap = place.curve.duration
+    laps, apart = _round(clips, 3, place.curve.duration)
     made = RiverClipsMap(
-        curves, motions, mode.river_tube, figure_legs(figure), lap, _out_of_step(clips, 3, lap)
+        curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
     parts, names = _about_circle(place, made, clips), [clips[i % len(clips)].name for i in range(3)]
 
@@ -226,7 +236,8 @@ def _river_clips_parts(
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, not_followed(changing, names, config.figure, figure)
 
-    return replace(parts, plays_rivers=True, refined=refined)
+    told = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
+    return replace(parts.said((told,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -261,12 +272,13 @@ MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
 def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> ClipMapParts:
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
+    off = off_pace(played, made.loops, curve.duration, made.laps)
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
-        held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off_pace(played, made.loops, curve.duration)),
+        held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off),
     )  # fmt: skip
 
 
@@ -282,10 +294,26 @@ def _out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
 
     `count` is the number of clips that the map takes; if there are fewer, they are repeated.
     """
-    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    played = [i % len(clips) for i in range(count)]
-    in_time = in_step([loops[i] for i in played], lap)
-    return not same(clips) and not keeps_pace([clips[i] for i in played], in_time, lap)
+    played = [clips[i % len(clips)] for i in range(count)]
+    return not same(clips) and not keeps_pace(played, in_step(closed_loops(played), lap), lap)
+
+
+def _round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
+    """Laps in a round of clips on `count` rivers, and whether strides are apart: the fewest laps that keep their pace.
+
+    If none do, the laps in which the clip furthest from its own pace is nearest to it.
+    """
+    if same(clips):
+        return 1, False
+    played, best = [clips[i % len(clips)] for i in range(count)], (np.inf, 1, True)
+    loops = closed_loops(played)
+    for laps in range(1, _MOST_LAPS + 1):
+        for apart in (False, True):
+            fitted = in_step(loops, laps * lap, apart)
+            if keep_own_pace(played, fitted, laps * lap):
+                return laps, apart
+            best = min(best, (furthest_off(fitted, laps * lap), laps, apart))
+    return best[1:]
 
 
 def _place(part: AnyMap) -> Place:

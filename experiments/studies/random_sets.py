@@ -53,6 +53,7 @@ JUDGING = (
 
 SECONDS = 20.0  # [s] of a run
 MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
+LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a hand is hardly pushed over
 _EVERY = 5  # every fifth frame of the animation is measured: 100 a second
 
 
@@ -101,7 +102,8 @@ def _other(clip: Clip) -> Clip:
 def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure.
 
-    On a lifted map the hand follows the first clip's curve, at that clip's pace.
+    On rivers, a longer one is divided into laps of 6 s at most. On a lifted map the hand follows the first clip's
+    curve, at that clip's pace.
     """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
@@ -114,10 +116,12 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
             lap = natural_lap(led_by(grounded(clips), loops))
+            if kind == "rivers":
+                lap /= np.ceil(lap / LONGEST_LAP)
             words = dict[str, Any](map=kind, clips=names, lap=lap)
         config = run_config(mode=mode, user=user, seconds=SECONDS, seed=seed, **words)
         session = wire(config, tuple(clips))
-    played = getattr(session.haptic_map, "loops", loops)
+    played, laps = getattr(session.haptic_map, "loops", loops), getattr(session.haptic_map, "laps", 1)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
     frames, weight = log.frames, session.weight
@@ -127,11 +131,12 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     force = np.linalg.norm(frames["residual"][:, :3], axis=1)[stands] / weight
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
-        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap,
-        "pace": [1.0 if kind == "lifted" else round(one.duration / lap, 2) for one in played],
+        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "laps": laps,
+        "pace": [1.0 if kind == "lifted" else round(one.duration / (laps * lap), 2) for one in played],
         "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
         "share": getattr(session.parts.maps.haptic_map, "share", None),
-        "remarks": session.remarks, "off_pace": () if kind == "lifted" else off_pace(clips, played, lap), "fell": fell,
+        "remarks": session.remarks, "fell": fell,
+        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps),
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,

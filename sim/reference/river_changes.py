@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
-from controllers.haptic_map.river_clips import (
+from controllers.haptic_map.river_memory import (
     AHEAD,
     PHASE,
     SHOWN,
@@ -129,7 +129,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
         return False
     for k in range(3):
         memory[:] = reference.memory
-        change_clip(memory, river, phase)
+        change_clip(params, memory, river, phase)
         # Evaluated first to get the phase from the hand's position: the field may time the curve unlike the clip.
         evaluate_map(reference.units, reference.kind, reference.params, x, memory, transition.ahead[0])
         ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
@@ -143,7 +143,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Change to another river's clip, at a phase [s], by a transition from what is shown."""
     _show_on(reference)
-    change_clip(reference.memory, river, phase)
+    change_clip(params, reference.memory, river, phase)
     _go_over(reference, params)
 
 

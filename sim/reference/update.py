@@ -7,7 +7,7 @@ figure is shown in (`sim.reference.river_changes`). Only such a map needs that c
 from numba import njit
 
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
-from controllers.haptic_map.river_clips import (
+from controllers.haptic_map.river_memory import (
     COURSE,
     changing,
     gate_passed,

@@ -9,7 +9,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.governor import Governor
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.river_clips import RiverClips, change_clip
+from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import change_clip
 from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts.part_types import ClipMapParts
@@ -21,7 +22,7 @@ _FASTEST = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
 
 
 def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:
-    """The animation h∘φ of one pass of a curve at the pace of the map's clips; on a river, at that of its own clip.
+    """The animation h∘φ of a curve at the pace of the map's clips; on a river, of a round at that of its own clip.
 
     Parameters
     ----------
@@ -32,12 +33,13 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
     river : int
         Which river of the map the curve is, if it is a map of rivers.
     """
-    memory, seconds = haptic_map.compiled().memory, haptic_map.lap_seconds
+    compiled, seconds, laps = haptic_map.compiled(), haptic_map.lap_seconds, 1
+    memory = compiled.memory
     if isinstance(haptic_map, RiverClips):
-        change_clip(memory, float(river), curve.start)
-        seconds = haptic_map.loops[river].duration
+        change_clip(compiled.params, memory, float(river), curve.start)
+        seconds, laps = haptic_map.loops[river].duration, haptic_map.laps
     frames = max(64, round(_FPS * seconds)) + 1
-    stylus = stylus_path(curve.point(np.linspace(curve.start, curve.end, frames)))
+    stylus = stylus_path(curve.point(np.linspace(curve.start, curve.start + laps * curve.duration, frames)))
     return Clip(map_poses(haptic_map, stylus, memory), (frames - 1) / seconds, "along the curve")
 
 
@@ -77,9 +79,13 @@ def speeds_along(maps: ClipMapParts, curve: Trajectory, river: int = 0, course: 
     share = np.clip((phases - curve.start) / curve.duration, 0.0, 1.0)
     # |φ̇| when a pass takes as long as the clips do.
     recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
-    low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration / np.sqrt(maps.size))
+    laps = maps.haptic_map.laps if isinstance(maps.haptic_map, RiverClips) else 1
+    bounds, speed = clip_ballistics(clip).bounds, recorded * laps / clip.duration / np.sqrt(maps.size)
+    # Of several laps, the narrowest interval: a field does not know which of them the hand is in.
+    found = [bounds.stylus_speed((lap + share) / laps, speed) for lap in range(laps)]
+    low, high = np.max([low for low, _ in found], axis=0), np.min([high for _, high in found], axis=0)
     # Where the least speed is infinite, no speed makes the motion ballistic: none is demanded of the hand.
-    low = np.where(np.isfinite(low), low, 0.0)
+    low = np.minimum(np.where(np.isfinite(low), low, 0.0), high)
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 

@@ -8,13 +8,13 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange, gate_behind, known_between, packed_changes
-from controllers.haptic_map.river_clips import (
+from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import (
     AHEAD,
     CHANGE,
     COURSE,
     RIVER,
     SHOWN,
-    RiverClips,
     begin_change,
     change_clip,
     gate_passed,
@@ -48,7 +48,7 @@ def _stylus(curve: int, phase: float) -> np.ndarray:
 
 def _memory(phase: float, changing: bool = True) -> np.ndarray:
     memory = MAP.compiled().memory.copy()
-    change_clip(memory, 1.0, phase)
+    change_clip(MAP.compiled().params, memory, 1.0, phase)
     if changing:
         begin_change(memory, 1.0, 0, GATE)
     return memory
@@ -117,7 +117,7 @@ def test_a_gate_is_passed_once_in_a_lap_and_over_its_seam() -> None:
 def test_a_clip_that_another_river_times_goes_on_without_a_jump_and_comes_to_be_with_the_hand() -> None:
     params, memory = MAP.compiled().params, MAP.compiled().memory.copy()
     times = np.arange(0.3, 3.5, 0.01)
-    change_clip(memory, 1.0, times[0])
+    change_clip(params, memory, 1.0, times[0])
     shown = []
     for t in times:
         # On the level river, below or above the wave whose clip plays.
@@ -138,7 +138,7 @@ def test_a_clip_that_another_river_times_goes_on_without_a_jump_and_comes_to_be_
 
 def test_a_clip_that_stands_still_knows_no_change_and_a_stop_ends_one() -> None:
     params, memory = MAP.compiled().params, MAP.compiled().memory.copy()
-    change_clip(memory, 0.0, 0.5)
+    change_clip(params, memory, 0.0, 0.5)
     assert knows_change(params, memory, 1.0)
     assert knows_change(params, memory, 0.0)
     stop_clip(params, memory, 0.0)
@@ -157,7 +157,7 @@ def test_a_clip_that_stands_still_knows_no_change_and_a_stop_ends_one() -> None:
         (ClipChange(1, 1, np.array([1.0]), OFFSETS), "from river 1 to 1 is not between two of 2 rivers"),
         (ClipChange(0, 1, np.zeros(0), OFFSETS), "has 0 gates"),
         (ClipChange(0, 1, np.array([1.0]), OFFSETS[:, 1:]), "gates and offsets"),
-        (ClipChange(0, 1, np.array([1.0]), np.zeros((400, SIZE))), "lasts 3.2[23] s of a lap of 4.00 s"),
+        (ClipChange(0, 1, np.array([1.0]), np.zeros((400, SIZE))), "lasts 3.2[23] s of a round of 4.00 s"),
         (ClipChange(0, 1, np.array([1.0]), OFFSETS[:5]), "lasts -0.07 s"),
     ],
 )

@@ -7,10 +7,10 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.river_clips import (
+from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import (
     PHASE,
     RIVER,
-    RiverClips,
     change_clip,
     heading_between,
     lets_go,
@@ -43,7 +43,7 @@ def _stylus(p: np.ndarray) -> np.ndarray:
 
 def _memory(river: int, phase: float = np.nan) -> np.ndarray:
     memory = MAP.compiled().memory.copy()
-    change_clip(memory, float(river), phase)
+    change_clip(MAP.compiled().params, memory, float(river), phase)
     return memory
 
 
@@ -53,6 +53,48 @@ def test_a_lap_of_the_river_is_a_lap_of_its_clip() -> None:
         pose = MAP.pose(_stylus(CURVES[0].point(4.0 * k / 120.0) * 1.1), memory)
         expected = CLIPS[0][0][k % 120, 7:]
         np.testing.assert_allclose(matrices(pose[7:].reshape(-1, 4)), matrices(expected.reshape(-1, 4)), atol=1e-6)
+
+
+def test_a_round_of_laps_is_a_lap_of_the_clip_and_back_again() -> None:
+    """A hand that goes round three times, and back, sees what one that goes round once sees; also at a crossing."""
+    rounds = RiverClips(CURVES, CLIPS, 0.02, [LEG], laps=3)
+    for river, curve in enumerate(CURVES):
+        memories = [_memory(river, 0.1), rounds.compiled().memory.copy()]
+        change_clip(rounds.compiled().params, memories[1], float(river), 0.3)
+        way = np.linspace(0.1, 4.3, 253)
+        for t in (*way, *way[::-1]):
+            once = MAP.pose(_stylus(curve.point(t)), memories[0])
+            thrice = rounds.pose(_stylus(curve.point(3.0 * t)), memories[1])
+            np.testing.assert_allclose(difference(thrice, once), 0.0, atol=1e-7)
+        p = curve.point(5.1) + BESIDE
+        away = [
+            rounds.jacobian(_stylus(p), _begun(rounds, river, 5.1))[:, :3],
+            np.stack(
+                [
+                    difference(*(rounds.pose(_stylus(p + s * step), _begun(rounds, river, 5.1)) for s in (1.0, -1.0)))
+                    for step in 1e-6 * np.eye(3)
+                ],
+                axis=1,
+            )
+            / 2e-6,
+        ]
+        np.testing.assert_allclose(*away, atol=2e-5 * np.abs(away[0]).max())
+
+
+def _begun(made: RiverClips, river: int, phase: float) -> np.ndarray:
+    """Memory of a hand that is at a phase of the round."""
+    memory = made.compiled().memory.copy()
+    change_clip(made.compiled().params, memory, float(river), phase)
+    return memory
+
+
+def test_a_clip_begins_in_the_lap_of_the_round_that_the_hand_is_in() -> None:
+    params = RiverClips(CURVES, CLIPS, 0.02, [LEG], laps=3).compiled().params
+    for last, there, expected in ((0.2, 3.9, 11.9), (6.1, 2.2, 6.2), (11.9, 0.1, 0.1), (9.0, 0.5, 8.5)):
+        memory = _memory(0)
+        memory[PHASE] = last
+        change_clip(params, memory, 1.0, there)
+        assert memory[PHASE] == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_river_that_crosses_itself_keeps_its_frame_at_the_crossing() -> None:
@@ -128,7 +170,7 @@ def test_a_hand_outside_the_tube_is_let_go_once_and_has_no_frame_then() -> None:
     assert not _goes(outside, 1.0)
     # Its own river takes it from none.
     assert takes_over(params, memory, 0.0)
-    change_clip(memory, 0.0, 3.0)
+    change_clip(params, memory, 0.0, 3.0)
     assert not takes_over(params, memory, 0.0)
 
 
@@ -175,3 +217,8 @@ def test_the_pace_of_a_hand_is_told_over_the_seam() -> None:
 def test_what_makes_no_map_of_rivers_is_refused(curves, clips, tube, says) -> None:
     with pytest.raises(ParameterError, match=says):
         RiverClips(curves, clips, tube)
+
+
+def test_a_round_without_a_lap_is_refused() -> None:
+    with pytest.raises(ParameterError, match="one lap or more, got 0"):
+        RiverClips(CURVES, CLIPS, 0.02, laps=0)

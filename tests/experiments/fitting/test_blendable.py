@@ -46,12 +46,36 @@ def test_a_lap_is_timed_by_the_first_clip_that_stays_on_the_floor() -> None:
     assert not any("run at" in remark or "walk at" in remark for remark in made.remarks)
 
 
-@pytest.mark.parametrize(("kind", "mode"), [("composite", "follow"), ("rivers", "rivers")])
-def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace(kind: str, mode: str) -> None:
-    config = run_config(map=kind, mode=mode, clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
+def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace() -> None:
+    config = run_config(map="composite", mode="follow", clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
     flies, paced = map_parts(config, figure_model()).remarks
     assert flies.startswith("jump flies for 0.")
     assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its own pace")
+
+
+@pytest.mark.parametrize(
+    ("clips", "lap", "laps", "paces"),
+    [
+        (("walk", "jump", "walk"), 1.2, 2, (0.92, 1.0, 0.92)),
+        (("squat_dance", "cheer", "angry"), 4.0, 1, (0.9, 0.75, 0.9)),
+        (("squat_dance", "squat_dance", "squat_dance"), 0.9, 1, (4.0, 4.0, 4.0)),
+        (("squat_dance", "cheer", "walk"), 1.3, 3, (0.92, 0.77, 0.85)),
+    ],
+)
+def test_clips_of_rivers_are_played_in_the_fewest_laps_that_keep_their_pace(clips, lap, laps, paces) -> None:
+    config = run_config(map="rivers", mode="rivers", clips=clips, lap=lap, seconds=1.0)
+    parts = map_parts(config, figure_model())
+    assert parts.haptic_map.laps == laps
+    played = [loop.duration / (laps * lap) for loop in parts.haptic_map.loops]
+    np.testing.assert_allclose(played, paces, atol=0.01)
+    assert any("a round of the clips takes" in remark for remark in parts.remarks) == (laps > 1)
+
+
+def test_rivers_whose_clips_no_round_keeps_at_their_pace_say_so() -> None:
+    config = run_config(map="rivers", mode="rivers", clips=("spin", "angry", "squat_dance"), lap=0.5, seconds=1.0)
+    parts = map_parts(config, figure_model())
+    assert parts.haptic_map.laps == 4
+    assert any("4 laps of 0.5 s play spin at" in remark for remark in parts.remarks)
 
 
 def test_the_lap_of_a_run_is_not_advised_to_it() -> None:

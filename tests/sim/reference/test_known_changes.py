@@ -10,7 +10,8 @@ import pytest
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.clip_change import ClipChange
-from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
+from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import CHANGE, COURSE, RIVER
 from experiments.config.words import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs
@@ -109,6 +110,24 @@ def test_where_no_change_is_found_the_map_is_as_it_was(
         made = river_changes.with_changes(plain, 0.4, FIGURE)
         assert made.changes == ()
         np.testing.assert_array_equal(made.compiled().params, plain.compiled().params)
+
+
+def test_a_change_found_in_a_round_of_two_laps_is_that_of_a_lap_twice_as_long(
+    plain: RiverClips, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(river_changes, "feasible", lambda clip, *rest, **more: SimpleNamespace(clip=clip, costs=(0.0,)))
+    half = [river.curve for river in river_bundle(Trajectory.circle(0.0477, LAP / 2), 0.025, 0.02, 4.0, 0.015).rivers]
+    clips = [(clip.poses, clip.fps) for clip in load_clips(NAMES)[0]]
+    twice = RiverClips(half, clips, 0.015, figure_legs(FIGURE), LAP, laps=2)
+    moments = LAP * np.array([0.75, 0.85])
+    for first, second in ((0, 1), (2, 0)):
+        once, again = (
+            river_changes._found(made.on_one_river(), 0.4, FIGURE, first, second, moments) for made in (plain, twice)
+        )
+        assert once[0, 0] > 0.5 * LAP
+        assert once.shape == again.shape
+        # The filter of the stylus lags twice as far behind a hand that is twice as fast.
+        np.testing.assert_allclose(again, once, atol=0.02)
 
 
 def test_strides_of_two_clips_are_told(plain: RiverClips) -> None:

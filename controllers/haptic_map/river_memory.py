@@ -1,0 +1,240 @@
+"""Which clip of a bundle of rivers is playing, at which phase, and how it gives way to another: the map's memory.
+
+Clips whose durations have no short lap in common are played in a round of several laps: the map is then a function on
+the covering of the curves by that many laps, and the memory keeps which of them the hand is in.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import END, START, curve_acceleration, curve_point, curve_velocity, wrap_phase
+from controllers.haptic_map.clip_change import gate_behind, known_between
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
+from controllers.rotations import multiply
+from controllers.state import Array, Pose
+from controllers.work_array import work_array
+
+# Memory behind the frame of the lap; phases in s, of the round:
+# RIVER: river of the playing clip. PHASE: last phase of the hand. STILL: 1 while the clip is held at a phase.
+# COURSE: river whose curve times the hand. CAME: phase at which the hand came to it. AHEAD: lead of the clip over the
+# hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate. LOOKED: phase
+# shown when gates were last searched.
+RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(MEMORY, MEMORY + 10)
+# Parameters: header, offsets of the packed curves, of the rest phases and of the changes, then these, then the blend.
+RIVERS, TUBE, LAPS, BLEND, CURVES = range(5)
+_RACES = 2.0  # times the river's pace: a faster hand that no river holds plays no clip
+_SOON = 0.03  # [s] horizon of the prediction in `lets_go`: followed until it races the clip, a root leaps by 3.7 m/s
+_PAST = 0.25  # of a round: a phase up to this before a moment counts as before it, any other as after it
+
+
+@njit
+def lap_of(params: Array, curve: int) -> float:
+    """Duration of a lap of a curve [s]."""
+    return float(params[curve + END] - params[curve + START])
+
+
+@njit
+def round_of(params: Array, curve: int) -> float:
+    """Duration of a round [s]: the laps of a curve in which its clip is played."""
+    return params[LAPS] * lap_of(params, curve)
+
+
+@njit
+def in_round(params: Array, curve: int, phase: float) -> float:
+    """A phase [s] wrapped into the round."""
+    start, period = params[curve + START], round_of(params, curve)
+    phase -= period * np.floor((phase - start) / period)
+    return min(max(phase, start), start + period)
+
+
+@njit
+def _in_lap_of(params: Array, curve: int, phase: float, last: float) -> float:
+    """The phase [s] of the round nearest to `last`, of those at the same place of the curve as `phase`, in any lap."""
+    if np.isnan(last):
+        return phase
+    lap = lap_of(params, curve)
+    return in_round(params, curve, phase + lap * (np.round((last - phase) / lap) % params[LAPS]))
+
+
+@njit
+def phase_near(params: Array, curve: int, x: Array, last: float) -> float:
+    """Phase [s] of the curve's point nearest to the stylus; of several branches, that which continues `last`."""
+    found, lap = work_array((BRANCHES, 2)), lap_of(params, curve)
+    best, nearest = np.nan, SAME_BRANCH * lap
+    for k in range(branches(params, curve, x[0], x[1], x[2], params[TUBE], found)):
+        away = found[k, 0] - last
+        away = abs(away - lap * np.round(away / lap))
+        if away < nearest:
+            best, nearest = found[k, 0], away
+    if np.isnan(best):
+        best, _ = closest_phase(params, curve, x[0], x[1], x[2], last)
+    return _in_lap_of(params, curve, wrap_phase(params, curve, best), last)
+
+
+@njit
+def timing_curve(params: Array, memory: Array) -> int:
+    """Offset in the parameters of the curve that times the hand."""
+    return int(params[CURVES + int(memory[COURSE])])
+
+
+@njit
+def changes_of(params: Array) -> Array:
+    """The precomputed changes of a map (`packed_changes`)."""
+    return params[int(params[CURVES + 2 * int(params[RIVERS])]) :]
+
+
+@njit
+def after(phase: float, moment: float, period: float) -> float:
+    """Time of a phase after a moment of the round [s]; negative up to a quarter of the round before it."""
+    way = phase - moment
+    return way - period * np.floor(way / period + _PAST)
+
+
+@njit
+def takes_over(params: Array, memory: Array, river: float) -> bool:
+    """Whether the active river of the field (−1: none) takes the hand over from another river, or a held clip goes on.
+
+    The clip then begins at the phase of the hand on that river.
+    """
+    other = river != memory[RIVER] or river != memory[COURSE]
+    return 0.0 <= river < params[RIVERS] and (other or memory[STILL] > 0.0)
+
+
+@njit
+def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
+    """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
+    whole, way = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
+    return (way - whole * np.round(way / whole)) / period
+
+
+@njit
+def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
+    """Whether the hand has left the river of the playing clip: no river is active, and it is off the tube or too fast.
+
+    `hand` (3, 3) holds position, velocity and acceleration. So that the clip does not follow a hand that is thrown off,
+    the pace predicted `_SOON` ahead counts too; and so does a predicted place more than half way to the curve's centre
+    of curvature, where the phase is not a useful measure of pace.
+    """
+    if river >= 0.0 or memory[STILL] > 0.0:
+        return False
+    curve = timing_curve(params, memory)
+    found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
+    outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[TUBE], found) == 0
+    if outside or abs(rate) > _RACES:
+        return True
+    for i in range(3):
+        x[i] = hand[0, i] + _SOON * hand[1, i] + 0.5 * _SOON**2 * hand[2, i]
+        v[i] = hand[1, i] + _SOON * hand[2, i]
+    phase = phase_near(params, curve, x, memory[PHASE])
+    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    bend, gain, slope, square = curve_acceleration(params, curve, phase), 0.0, 0.0, 0.0
+    for i in range(3):
+        gain += v[i] * along[i]
+        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
+        square += along[i] ** 2
+    return slope < 0.5 * square or abs(gain) > _RACES * slope
+
+
+@njit
+def change_clip(params: Array, memory: Array, river: float, phase: float) -> None:
+    """Play the clip of another river, from a phase [s] on of the lap that the hand is in, in the frame of the lap."""
+    phase = _in_lap_of(params, int(params[CURVES + int(river)]), phase, memory[PHASE])
+    memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
+    memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
+
+
+@njit
+def knows_change(params: Array, memory: Array, river: float) -> bool:
+    """Whether a precomputed change leads from the playing clip to that of a river, or the river is already playing."""
+    if memory[STILL] > 0.0:
+        return False
+    return river == memory[RIVER] or known_between(changes_of(params), memory[RIVER], river)
+
+
+@njit
+def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]:
+    """Number and gate [s] of a change to a river whose gate was passed since the last call; number −1 if none was."""
+    curve, before = timing_curve(params, memory), memory[LOOKED]
+    memory[LOOKED] = memory[SHOWN]
+    start, period = params[curve + START], round_of(params, curve)
+    return gate_behind(changes_of(params), memory[RIVER], river, before - start, memory[SHOWN] - start, period)
+
+
+@njit
+def changing(memory: Array) -> bool:
+    """Whether a precomputed change is in progress."""
+    return bool(memory[CHANGE] >= 0.0)
+
+
+@njit
+def take_course(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
+    """Time the hand at x by another river's curve, while the playing clip shows the phase `shown` [s]."""
+    memory[COURSE] = river
+    curve = timing_curve(params, memory)
+    phase = phase_near(params, curve, x, shown)
+    period, away = round_of(params, curve), shown - phase
+    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, away - period * np.round(away / period)
+
+
+@njit
+def hold_at_gate(params: Array, memory: Array, gate: float) -> None:
+    """Hold the playing clip at a gate [s]."""
+    memory[PHASE] = params[timing_curve(params, memory) + START] + gate
+    memory[STILL], memory[AHEAD] = 1.0, 0.0
+
+
+@njit
+def begin_change(memory: Array, river: float, change: int, gate: float) -> None:
+    """Play the clip of another river through a precomputed change, from its gate [s] on."""
+    memory[RIVER], memory[LAST_ANGLE], memory[CHANGE], memory[GATE] = river, np.nan, change, gate
+
+
+@njit
+def go_on(memory: Array, phase: float, ahead: float) -> None:
+    """Let a held clip go on with the hand at a phase [s], ahead of the hand by a time [s]."""
+    memory[PHASE], memory[AHEAD], memory[STILL] = phase, ahead, 0.0
+
+
+@njit
+def stop_clip(params: Array, memory: Array, way: float) -> None:
+    """Hold the playing clip at the rest phase nearest to `way` [s] beyond the shown phase; without any, just there."""
+    river, rivers, curve = int(memory[RIVER]), int(params[RIVERS]), timing_curve(params, memory)
+    period = round_of(params, curve)
+    first, last = int(params[CURVES + rivers + river]), int(params[CURVES + rivers + river + 1])
+    wanted = in_round(params, curve, memory[SHOWN] + way)
+    best, nearest = wanted, math.inf
+    for k in range(first, last):
+        away = abs(params[k] - wanted)
+        away = min(away, period - away)
+        if away < nearest:
+            best, nearest = params[k], away
+    memory[PHASE], memory[STILL], memory[LAST_ANGLE] = best, 1.0, np.nan
+    memory[AHEAD], memory[CHANGE] = 0.0, -1.0
+
+
+@njit
+def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
+    """Advance the playing clip by `seconds` at its river's own pace and hold it there; a held clip stays."""
+    if memory[STILL] == 0.0:
+        memory[PHASE], memory[STILL] = in_round(params, timing_curve(params, memory), memory[PHASE] + seconds), 1.0
+
+
+@njit
+def heading_between(pose: Pose, other: Pose) -> float:
+    """Angle about the vertical [rad] from the heading of one pose's root to that of another: the twist of q' q⁻¹."""
+    w, _, _, z = multiply(other[3], other[4], other[5], other[6], pose[3], -pose[4], -pose[5], -pose[6])
+    return 2.0 * np.arctan2(z, w) if w >= 0.0 else 2.0 * np.arctan2(-z, -w)
+
+
+@njit
+def place_clip(memory: Array, pose: Pose, x: float, y: float, turn: float) -> None:
+    """Move the lap's frame such that the figure, now in a pose, stands at (x, y) [m], turned by an angle [rad]."""
+    cosine, sine = np.cos(turn), np.sin(turn)
+    away_x, away_y = memory[LAP_X] - pose[0], memory[LAP_Y] - pose[1]
+    memory[LAP_X] = x + cosine * away_x - sine * away_y
+    memory[LAP_Y] = y + sine * away_x + cosine * away_y
+    memory[LAP_HEADING] += turn
