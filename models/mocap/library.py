@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from models.errors import ModelError
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
@@ -17,7 +18,7 @@ from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget import retarget
-from models.mocap.retargeting.retarget_report import RetargetReport
+from models.mocap.retargeting.retarget_report import RetargetReport, floor_remarks
 from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 
@@ -101,7 +102,9 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
         expected = "the skeleton of a human, or --roles FILE that says which joint is which"
         raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", expected)
-    return Loaded(*retarget(motion, roles, hints), motion.loops)
+    clip, report = retarget(motion, roles, hints)
+    standing = tuple(floor_remarks(contacts(clip).clearance, clip.fps))
+    return Loaded(clip, report._replace(remarks=report.remarks + standing), motion.loops)
 
 
 def read_motion(path: Path) -> SourceMotion:

@@ -9,6 +9,7 @@ the toes are too low, the ankle is rotated about its lateral axis until they tou
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.special import stdtrit
 
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
@@ -23,9 +24,11 @@ _SHARE = 0.25
 # floors by 2 mm.
 _STILL = 0.4
 _SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
-# Least number of stances; least slope in standard errors. Half of each changes none of 17 captures, twice leaves one of
-# them its slope.
-_STEPS, _SURE = 4, 3.0
+# Least number of stances: half of it changes none of 17 captures, twice leaves one of them its slope.
+_STEPS = 4
+# Probability of a slope as large on a level floor, two-sided: twice changes none of the 28 captures of
+# docs/validation/prepared-captures.md, half leaves snu/backflip its slope.
+_CHANCE = 0.02
 # Smaller slopes are none, larger ones are not due to calibration. With 1° two of 17 captures keep theirs; 0.25, 4 or
 # 16° change none.
 _SLOPE = np.deg2rad((0.5, 8.0))
@@ -118,7 +121,10 @@ def _slopes(points: Array, stances: int) -> Array:
     told = np.where(spread > _SPREAD, 1.0, 0.0)
     slopes = told * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
     off = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
-    sure = np.abs(slopes) > _SURE * off / (np.maximum(spread, 1e-9) * np.sqrt(stances))
+    # Through few stances a plane fits well whatever its slope: Student's t with the degrees of freedom that are left.
+    free = stances - 1 - int(told.sum())
+    least = float(stdtrit(free, 1.0 - _CHANCE / 2.0)) * off / np.sqrt(free)
+    sure = np.abs(slopes) * spread > least
     return np.zeros(2) if off > _UNEVEN else directions.T @ (slopes * sure)
 
 

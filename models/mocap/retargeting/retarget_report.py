@@ -8,6 +8,7 @@ import numpy as np
 from models.arrays import Array
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import printable
 from models.mocap.retargeting.body_lines import SIDES, BodyLines
 from models.mocap.retargeting.calibration import Calibration
@@ -17,6 +18,10 @@ _BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its s
 _STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
 _NAMED = 12  # unused joints that are named: rigs with faces and fingers have hundreds
 _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
+# Least height [m] and time [s] in which a body is taken to stand above the floor: a step of stairs is 0.17 m high, and
+# a flight of 1 s rises by 1.2 m. The longest of the 28 captures of docs/validation/prepared-captures.md lasts 0.5 s.
+_ALOFT, _FLIGHT = 0.1, 1.0
+_BENEATH = 0.1  # least depth beneath the floor that is reported [m]: in the same captures nothing is deeper
 COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 _UNITS = (
     ("metres", 1.0),
@@ -139,6 +144,33 @@ def frame_remarks(broken: Sequence[int], jumps: Sequence[int], fps: float, timed
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
+
+
+def floor_remarks(clearance: Array, fps: float) -> Iterator[str]:
+    """Where the body is above the floor for longer than a flight lasts, and where beneath it.
+
+    Parameters
+    ----------
+    clearance : array of shape (n,)
+        Height of the lowest point of the body [m].
+    fps : float
+        Frame rate [1/s].
+    """
+    aloft = [span for span in spans(clearance > _ALOFT) if span[1] - span[0] > _FLIGHT * fps]
+    if aloft:
+        high = max(float(clearance[start:end].max()) for start, end in aloft)
+        how = f"up to {high:.2f} m above the floor, for {_lasting(aloft, fps)}, which no flight lasts"
+        why = "it stands on something that is not in the file, or its place is in another unit than its bones"
+        yield f"the body is {how}: {why}"
+    beneath = spans(clearance < -_BENEATH)
+    if beneath:
+        how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_lasting(beneath, fps)}"
+        yield f"parts of the body are {how}; see whether the file has it so"
+
+
+def _lasting(found: Sequence[tuple[int, int]], fps: float) -> str:
+    """How long spans of frames last together, and when the first one begins."""
+    return f"{sum(end - start for start, end in found) / fps:.2g} s (the first at {found[0][0] / fps:.2f} s)"
 
 
 def axis_name(direction: Array) -> str:

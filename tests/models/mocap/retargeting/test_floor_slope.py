@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from models.mocap.library import embedded
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.retargeting import footing
 from models.mocap.retargeting.footing import levelled
 
 
@@ -44,3 +45,19 @@ def test_a_place_to_stand_tells_no_slope():
     turn = Rotation.from_euler("y", 3, degrees=True)
     tilted = quaternions.product(turn.as_quat(scalar_first=True), global_rotations(cheer.poses))
     assert levelled(turn.apply(cheer.poses[:, :3]), tilted, cheer.fps)[2] == 0.0
+
+
+def test_four_stances_at_heights_that_differ_at_random_tell_no_slope():
+    """A plane fits four stances with one degree of freedom left: its deviation says little of their scatter."""
+    rng, places = np.random.default_rng(1), np.array([[0.0, 0.2], [1.4, -0.2], [2.6, 0.3], [3.6, 1.2]])
+    found = 0
+    for _ in range(400):
+        points = np.column_stack((places, rng.normal(0.0, 0.006, 4)))
+        found += np.any(footing._slopes(points, 4) != 0.0)
+    assert found / 400 < 0.08
+
+
+def test_five_stances_along_a_slope_tell_it():
+    heights = 0.02 * np.arange(5.0) * 0.7 + np.array([2.0, -1.0, -2.0, -1.0, 2.0]) * 1e-3
+    points = np.column_stack((0.7 * np.arange(5.0), np.zeros(5), heights))
+    np.testing.assert_allclose(footing._slopes(points, 5), [0.02, 0.0], atol=1e-4)

@@ -1,0 +1,81 @@
+"""A body that stands on boxes or stairs, of which the file says nothing, or whose place is in another unit."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip, PlanarDisplacement
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.retargeting.retarget_report import floor_remarks
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
+
+
+def climbing(height, first, last):
+    """Laps of a walk around a square, from `first` to `last` of the time over a hill of a height [m]."""
+    clip = embedded("walk")
+    laps, lap = [], clip.poses
+    for _ in range(4):
+        for _ in range(2):
+            laps.append(lap[:-1])
+            lap = clip.displacement.moved(lap)
+        here = lap[0, :2]
+        for degrees in range(6, 96, 6):
+            x, y = here - Rotation.from_euler("z", degrees, degrees=True).as_matrix()[:2, :2] @ here
+            turned = PlanarDisplacement(x, y, np.deg2rad(degrees)).moved(lap)
+            laps.append(turned[:1])
+        lap = turned
+    poses = np.concatenate(laps)
+    at = np.clip((np.linspace(0.0, 1.0, len(poses)) - first) / (last - first), 0.0, 1.0)
+    poses[:, 2] += height * np.sin(np.pi * at) ** 2
+    return Clip(poses, clip.fps, "walk")
+
+
+def report_of(clip, path, zero="upright T"):
+    write_rig(Rig(zero=zero), clip, path)
+    return load(path).report
+
+
+def test_a_body_that_climbs_for_most_of_the_time_tells_what_is_up(tmp_path):
+    """Not even its rig confirms the vertical, but along any other axis it does not stand at all."""
+    report = report_of(climbing(1.5, 0.0, 1.0), tmp_path / "r.bvh", "along X")
+    assert report.up == "+Y"
+    assert report.confidence > 1.0
+
+
+def test_a_body_that_climbs_higher_than_any_studio_does_not_tell_what_is_up(tmp_path):
+    """Its root is in another unit than its bones."""
+    write_rig(Rig(zero="along X"), climbing(150.0, 0.0, 1.0), tmp_path / "r.bvh")
+    with pytest.raises(MotionFileError, match="the motion does not tell what is up"):
+        load(tmp_path / "r.bvh")
+
+
+@pytest.mark.parametrize("height", [0.2, 1.0])
+def test_a_body_above_the_floor_for_longer_than_a_flight_is_said(height, tmp_path):
+    report = report_of(climbing(height, 0.3, 1.0), tmp_path / "r.bvh")
+    (said,) = [remark for remark in report.remarks if "above the floor" in remark]
+    assert abs(float(said.split("up to ")[1].split(" m ")[0]) - height) < 0.05
+    assert "which no flight lasts" in said
+
+
+@pytest.mark.parametrize("name", ["walk", "jump", "backflip", "run"])
+def test_flights_and_steps_are_no_raised_floor(name, tmp_path):
+    report = report_of(embedded(name), tmp_path / "r.bvh")
+    assert not [remark for remark in report.remarks if "the floor" in remark]
+
+
+def test_what_is_beneath_the_floor_is_said_with_its_depth_and_time():
+    clearance = np.zeros(200)
+    clearance[50:60] = -0.28
+    assert list(floor_remarks(clearance, 100.0)) == [
+        "parts of the body are up to 0.28 m beneath the floor, for 0.1 s (the first at 0.50 s); "
+        "see whether the file has it so"
+    ]
+    clearance[50:60] = -0.09
+    assert not list(floor_remarks(clearance, 100.0))
+
+
+def test_hops_that_follow_each_other_are_no_raised_floor():
+    """Each of them lasts less than a second, however many there are."""
+    clearance = np.tile(np.concatenate((np.full(90, 0.3), np.zeros(10))), 5)
+    assert not list(floor_remarks(clearance, 100.0))
