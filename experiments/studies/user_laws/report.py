@@ -24,7 +24,7 @@ STUDIES = {
 TABLE = "laws.json"
 
 
-def user_laws(people: int, seed: int, names: tuple[str, ...] = ()) -> list[Study]:
+def user_laws(people: int, seed: int, names: tuple[str, ...]) -> list[Study]:
     """Run the experiments with a population, given by its number of people and its seed.
 
     Raises
