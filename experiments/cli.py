@@ -23,8 +23,6 @@ import tyro
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
 from experiments.console.welcome import WELCOME, next_step
-from experiments.hardware.run_options import RunHardware
-from experiments.results.folder import RECORDING
 from models.errors import ModelError
 from sim.errors import SimError
 
@@ -75,6 +73,9 @@ def _by_the_system(error: OSError) -> str:
 
 def _kept(command: Any) -> str:
     """What an interrupted command leaves on disk, and how to go on, in words."""
+    from experiments.hardware.run_options import RunHardware  # imported late: they load MuJoCo and numba
+    from experiments.results.folder import RECORDING
+
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
     recorded = command.which if isinstance(command, command_class("hardware")) else command
@@ -159,6 +160,13 @@ def _one_line(said: str, words: Sequence[str]) -> str:
             first = f"{option} is {value!r}; expected {expected or ', '.join(choices)}"
             break
     named = words[0] if words and words[0] in commands.NAMES else "COMMAND"
+    rewordings = (
+        (r"PATH (.+?)\. \(required\)", r"PATH (\1),"),
+        (r"^Missing value for argument '(-\S+)'.*", r"nothing is given behind \1; expected a value"),
+        (r"^Missing value for argument '.*", f"missing from hvf {named}: PATH, or an option is mistyped"),
+    )
+    for pattern, better in rewordings:
+        first = re.sub(pattern, better, first).rstrip(",")
     return f"{first[0].lower()}{first[1:]}; hvf {named} --help lists what there is"
 
 

@@ -23,6 +23,7 @@ __all__ = ["Course", "River", "integrate", "settling_time", "window"]
 
 Flow = Callable[[float, Array], Array]
 """A flow V(t, p): time [s] and p_H [m], shape (3,), to a velocity [m/s], shape (3,)."""
+_LONGEST_STEP = 0.02  # of an integration [s]; a much longer step could pass over a narrow river unnoticed
 
 
 @njit
@@ -115,7 +116,7 @@ class Course(NamedTuple):
     points: Array
 
 
-def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_step: float = 0.02) -> Course:
+def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Course:
     """Integral curve ṗ = V(t, p) of a flow, by scipy's DOP853 with tolerance 1e-10.
 
     Parameters
@@ -126,8 +127,6 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_st
         p at the first time, in H [m].
     times : array_like, shape (n,)
         Output times, increasing [s].
-    longest_step : float
-        Largest integration step [s]; a much longer step could pass over a narrow river unnoticed.
 
     Raises
     ------
@@ -139,7 +138,7 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_st
     wanted = np.asarray(times, dtype=float)
     solution = solve_ivp(
         flow, (wanted[0], wanted[-1]), np.asarray(start, dtype=float), "DOP853", wanted,
-        rtol=1e-10, atol=1e-12, max_step=longest_step,
+        rtol=1e-10, atol=1e-12, max_step=_LONGEST_STEP,
     )  # fmt: skip
     if not solution.success:
         raise ControllerError(f"the flow could not be integrated from {start}: {solution.message}")

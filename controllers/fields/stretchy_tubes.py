@@ -291,7 +291,7 @@ class StretchyTubes(Law):
         return Program.of(self, stretchy_wrench, gains, memory)
 
     @staticmethod
-    def record_at(slot: int = TRACE_SIZE) -> int:
+    def record_at(slot: int) -> int:
         """Offset of the curve's record in the memory of a run, behind the state of the law."""
         return slot + _RECORD
 
@@ -313,6 +313,6 @@ class StretchyTubes(Law):
         table, count = int(record[TABLE]), int(record[COUNT])
         return record[table : table + EDIT * count].reshape(count, EDIT).copy()
 
-    def held_off(self, memory: Array, slot: int = TRACE_SIZE) -> float:
+    def held_off(self, memory: Array) -> float:
         """Largest distance [m] of a held point from the stylus in a run."""
-        return float(memory[slot + _OFF])
+        return float(memory[TRACE_SIZE + _OFF])

@@ -66,11 +66,3 @@ def next_state(state: int, event: int) -> int:
 def pushes(state: int) -> bool:
     """Whether the motors are on."""
     return state in (RAMPING, ACTIVE)
-
-
-def mermaid() -> str:
-    """The table as a Mermaid state diagram, for the documentation."""
-    lines = [
-        f"    {a.name.lower()} --> {b.name.lower()}: {event.name.lower()}" for (a, event), b in TRANSITIONS.items()
-    ]
-    return "\n".join(["stateDiagram-v2", "    [*] --> disarmed", *lines])

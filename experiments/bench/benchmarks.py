@@ -51,7 +51,7 @@ _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
 
 
-def bench(as_json: bool = False, check: bool = False) -> int:
+def bench(as_json: bool, check: bool) -> int:
     """Measure and print all figures; see `experiments.bench.figures.tell` for the arguments and the result."""
     return tell(figures(), as_json, check)
 

@@ -136,7 +136,7 @@ def certify_into(
     return certificate
 
 
-def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certificate:
+def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
     """Certify flights and turns of a clip, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters

@@ -20,7 +20,7 @@ SUBSTEPS = 8
 
 
 def simulated_course(
-    field: HigherOrder, sampling: Sampling, start: Array, velocity: Array, seconds: float, push: Push | None = None
+    field: HigherOrder, sampling: Sampling, start: Array, velocity: Array, seconds: float, push: Push | None
 ) -> Course:
     """`switching_search.course` with the full linkage in MuJoCo, including Coulomb friction, weight and encoders.
 

@@ -22,7 +22,7 @@ NEAR = 0.2  # share of the map's reach: as far off the curve as pushes bring a h
 FAST = 2.0  # ratio to the curve's own speed, of a hand that pushes forwards at the edge of the map
 
 
-def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
+def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
     """The parts of a run, as `wire` makes them.
 
     Raises

@@ -5,7 +5,8 @@ import numpy as np
 
 from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
-from experiments.fitting.balance import SHARE, measured_laps, nearest_supported, sway_of
+from experiments.fitting.balance import CUTOFF, measured_laps
+from models.mocap.dynamics.zero_moment_point import sway_of
 from sim.body.figure import FigureGains
 from sim.reference.reference import map_poses
 
@@ -36,11 +37,11 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
     walker[:, 1] = walker[:, 3] = 1.0
     for _ in range(_ROUNDS):
         laps = measured_laps(map_poses(result, walker)[None], seconds / _ROWS, figure)
-        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, SHARE) - laps.zmp)
+        outside = laps.outside()
         # The flights have the clip's own mean root position: a constant offset would have to be undone and throw the
         # figure.
         mean = outside[0].mean(axis=0) if gait.flies else 0.0
-        sway += sway_of(outside[0] - mean, laps.height, seconds)
+        sway += sway_of(outside[0] - mean, laps.height, seconds, CUTOFF)
         swaying = led.with_sway(sway)
         if not swaying.sways:
             # Here the sway would need too low a root, so the last one is kept.

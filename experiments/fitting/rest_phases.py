@@ -7,9 +7,9 @@ import numpy.typing as npt
 from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import RIVER
-from controllers.legs.sole_heights import STANDS
-from experiments.fitting.balance import nearest_supported
+from controllers.legs.sole_heights import STANDS, SWINGS
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
+from models.mocap.dynamics.zero_moment_point import nearest_supported
 from sim.reference.reference import map_poses
 
 _ROWS = 96  # samples of a lap of the hand
@@ -45,7 +45,8 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
             centre[i], contacts[i] = data.subtree_com[1, :2], data.geom_xpos[feet]
         contacts[..., 2] -= CONTACT_RADIUS
         touch = contacts[..., 2] < STANDS
-        missing = np.linalg.norm(nearest_supported(centre, contacts, _SHARE) - centre, axis=1)
+        nearest = nearest_supported(centre, contacts[..., :2], contacts[..., 2] < SWINGS, _SHARE)
+        missing = np.linalg.norm(nearest - centre, axis=1)
         missing[~touch.any(axis=1)] = _UNSUPPORTED
         # FOOT_CONTACTS begins with the four points of the left foot.
         good = (missing == 0.0) & touch[:, :4].any(axis=1) & touch[:, 4:].any(axis=1)

@@ -157,7 +157,7 @@ def _text(path: str) -> str:
         return ""
 
 
-def measured_lateness(seconds: float = 1.0) -> Lateness:
+def measured_lateness(seconds: float) -> Lateness:
     """Lateness of a 1 kHz loop with absolute deadlines in this process; missed deadlines are skipped and counted."""
     late: list[float] = []
     deadlines = math.ceil(seconds / PERIOD)

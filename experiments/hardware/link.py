@@ -77,7 +77,7 @@ def link_now(row: Mapping[str, Array]) -> str:
     )
 
 
-def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
+def measured_link(driver: Driver, seconds: float) -> Link:
     """Measure the link for `seconds` [s] with commands that leave the motors off."""
     reading, telemetry = np.zeros(READING_SIZE), driver.telemetry
     times: list[Array] = []

@@ -25,7 +25,7 @@ class RunHardware:
     certificate: Path | None = None
     """Folder or certificate.json of `hvf certify` for this very field; only the emulated device runs without."""
     delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
-    """Of the motors' torques, as it was certified [s]."""
+    """Delay of the motors' torques, as it was certified [s]."""
     out: Path = Path("runs/hardware")
     """Folder to write."""
     overwrite: bool = False
@@ -41,11 +41,11 @@ class RunHardware:
     small: Annotated[float, above(0.0, unit="N")] = 1.0
     """No force before the one that is asked for has been at most so small [N]."""
     ramp: Annotated[float, above(0.0, unit="s")] = 1.0
-    """In which the force is brought in [s]."""
+    """Time in which the force is brought in [s]."""
     late: Annotated[float, above(0.0, unit="s")] = 0.04
     """Lateness of the servo that is a fault [s]."""
     silence: Annotated[float, at_least(2.0, unit="periods")] = 5.0
-    """Without a new reading that is a fault; the emulated device may have more than five [periods of the servo]."""
+    """Time without a new reading that is a fault; more than five only of the emulated device [periods of the servo]."""
     realtime: bool = True
     """Ask the system to run the servo before everything else."""
     view: bool = False

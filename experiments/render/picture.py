@@ -27,7 +27,7 @@ GHOST_AT = np.array([-0.95, 0.45])  # position of the ghost relative to the figu
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
 
-def draw_picture(folder: Path, target: Path, overwrite: bool = False) -> None:
+def draw_picture(folder: Path, target: Path, overwrite: bool) -> None:
     """Render the picture of a run into a PNG file.
 
     Raises

@@ -38,7 +38,27 @@ class FigureMap(Protocol):
 
 
 @dataclass(frozen=True)
-class Cylindrical:
+class _AboutCurve:
+    """What maps about a curve are made of; see `Cylindrical`."""
+
+    clips: Sequence[Clip]
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    expressive: bool = False
+
+    def __post_init__(self) -> None:
+        check_kinds(self)
+        if not 0.0 < self.reach < np.inf:
+            raise ParameterError(f"reach is {self.reach:g}; expected more than 0 m, and finite")
+
+    def _place(self) -> Place:
+        curve = reached(self.around)
+        points = curve.point(np.linspace(curve.start, curve.end, 65))
+        return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), self.reach, self.expressive)
+
+
+@dataclass(frozen=True)
+class Cylindrical(_AboutCurve):
     """Cylindrical map: the angle sets the frame, radius and height blend four clips (the paper's Fig. 3).
 
     Parameters
@@ -53,21 +73,13 @@ class Cylindrical:
         Whether the figure's gaze and lean follow the orientation of the stylus.
     """
 
-    clips: Sequence[Clip]
-    around: Trajectory = field(repr=False)
-    reach: float = 0.025
-    expressive: bool = False
-
-    def __post_init__(self) -> None:
-        _check_map(self)
-
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), _place(self), model))
+        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
 
 
 @dataclass(frozen=True)
-class Composite:
+class Composite(_AboutCurve):
     """Composite map: the lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
 
     Parameters
@@ -78,17 +90,9 @@ class Composite:
         As in `Cylindrical`.
     """
 
-    clips: Sequence[Clip]
-    around: Trajectory = field(repr=False)
-    reach: float = 0.025
-    expressive: bool = False
-
-    def __post_init__(self) -> None:
-        _check_map(self)
-
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), _place(self), model))
+        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), self._place(), model))
 
 
 @dataclass(frozen=True)
@@ -147,15 +151,3 @@ class Lifted:
         """What the map gives a run."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
         return for_size_of(world.figure, lambda _: lifted_parts(*self._made, part))
-
-
-def _check_map(part: Cylindrical | Composite) -> None:
-    check_kinds(part)
-    if not 0.0 < part.reach < np.inf:
-        raise ParameterError(f"reach is {part.reach:g}; expected more than 0 m, and finite")
-
-
-def _place(part: Cylindrical | Composite) -> Place:
-    curve = reached(part.around)
-    points = curve.point(np.linspace(curve.start, curve.end, 65))
-    return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), part.reach, part.expressive)

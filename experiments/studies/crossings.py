@@ -82,7 +82,7 @@ def _pass(
         advance(plant, port, hand, t, False, applied)
 
 
-def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...] = ()) -> Passage:
+def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...]) -> Passage:
     """Release the simulated Phantom from rest in a field, in the hand of a relaxed user who pushes.
 
     Parameters
@@ -120,7 +120,7 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     return Passage(p, force, river)
 
 
-def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
+def crossing_field(second: River, form: Form, alone: bool) -> Program:
     """Field of the river along x and of a second one, or of the first alone, with the gains of the mode of rivers."""
     mode = Rivers()
     rivers = tuple(

@@ -93,6 +93,7 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
     while data.time < _SETTLING:
         push(-_of_all(data.qpos), -_of_all(data.qvel), np.zeros(3))
     data.time, stood, began = 0.0, data.qpos[:2].copy(), _of_all(data.qpos)
+    # The mass alone is set in motion, by as much as the centre of both needs.
     data.qvel[3:] += (velocity - _of_all(data.qvel)) / _of_all(np.repeat([0.0, 1.0], 3))
     miss, slid = 0.0, 0.0
     for k in range(len(way)):

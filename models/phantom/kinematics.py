@@ -73,6 +73,7 @@ def jacobian(theta: Vec3) -> Matrix3:
     s2, c2 = np.sin(theta[1]), np.cos(theta[1])
     s3, c3 = np.sin(theta[2]), np.cos(theta[2])
     reach = L1 * c2 + L2 * s3
+    # 0.0 * reach, not 0.0, so that on symbols every entry is one.
     return (
         (c1 * reach, -L1 * s1 * s2, L2 * s1 * c3),
         (0.0 * reach, L1 * c2, L2 * s3),

@@ -13,7 +13,6 @@ from numba import njit
 
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
 from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
-from sim.errors import SimError
 from sim.world.encoders import MEMORY_SIZE, SILENT_PERIODS, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
 from sim.world.plant import Plant, step
@@ -65,13 +64,7 @@ class Exchange(NamedTuple):
         return 3
 
 
-def exchange(
-    world: World,
-    cutoff: float,
-    reading: Array | None = None,
-    command: Array | None = None,
-    silent: float = SILENT_PERIODS,
-) -> Exchange:
+def exchange(world: World, cutoff: float, silent: float = SILENT_PERIODS) -> Exchange:
     """A device as two shared arrays; its force is ramped in from zero.
 
     Parameters
@@ -80,27 +73,21 @@ def exchange(
         Must outlive the device. Its figure follows the hand.
     cutoff : float
         Corner frequency of the velocity filter [Hz].
-    reading, command : Array, optional
-        Memory to share, such as a view of a mapped file; by default new arrays.
     silent : float
         Servo periods without a reading or a command after which the motors are switched off.
 
     Raises
     ------
     SimError
-        If the cutoff is not positive and finite, or an array is not (9,) of float64.
+        If the cutoff is not positive and finite.
     """
-    reading = np.zeros(READING_SIZE) if reading is None else reading
-    command = np.zeros(COMMAND_SIZE) if command is None else command
-    for name, array, size in (("reading", reading, READING_SIZE), ("command", command, COMMAND_SIZE)):
-        if array.shape != (size,) or array.dtype != np.float64 or not array.flags.c_contiguous:
-            raise SimError(f"the {name} is {array.dtype} of shape {array.shape}; expected ({size},) of float64")
     period = world.config.servo_period
     limits, hand = plausibility(period, silent), np.zeros(HAND_SIZE)
     hand[HAND_QUATERNION] = 1.0
     return Exchange(
-        reading, command, velocity_smoothing(cutoff, period), limits.silence, np.zeros(MEMORY_SIZE), np.zeros(3),
-        shown_phantom(world.model, world.data), hand, np.zeros(3), limits.fresh(ramp=0.0), np.zeros(3),
+        np.zeros(READING_SIZE), np.zeros(COMMAND_SIZE), velocity_smoothing(cutoff, period), limits.silence,
+        np.zeros(MEMORY_SIZE), np.zeros(3), shown_phantom(world.model, world.data), hand, np.zeros(3),
+        limits.fresh(ramp=0.0), np.zeros(3),
     )  # fmt: skip
 
 

@@ -64,7 +64,7 @@ def steps_late(scene: SceneConfig, delay: float) -> float:
 
 
 class EmulatedPhantom:
-    """Driver of a linkage simulated in MuJoCo; every command advances it by one servo period.
+    """Driver of a linkage simulated in MuJoCo, switch pressed; every command advances it by one servo period.
 
     Parameters
     ----------
@@ -79,8 +79,6 @@ class EmulatedPhantom:
         The user once the holding hand has let go; relaxed by default.
     holds : float
         How long the hand still holds the stylus after the motors came on [s].
-    presses : bool
-        Whether the switch is pressed.
 
     Raises
     ------
@@ -90,14 +88,14 @@ class EmulatedPhantom:
 
     def __init__(
         self, scene: SceneConfig, start: Array, linkage: Linkage | None = None, arm: Arm | None = None,
-        holds: float = 1.5, presses: bool = True,
+        holds: float = 1.5,
     ):  # fmt: skip
         linkage = linkage or Linkage()
         self.world = World(scene, "none")
         self.world.reset(start, rest_pose())
         linkage.into(self.world)
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
-        self._plant, self._switch, self._offset = make_plant(self.world), float(presses), np.array(linkage.offset)
+        self._plant, self._offset = make_plant(self.world), np.array(linkage.offset)
         steps, late = self._plant.substeps, steps_late(scene, linkage.delay)
         whole, part = int(late), late % 1.0
         spans = (whole, 0.0), (1 if part > 0.0 else 0, 1.0 - part), (steps - math.ceil(late), 1.0)
@@ -123,7 +121,7 @@ class EmulatedPhantom:
         reading[READING_THETA : READING_THETA + 3] = encoder_reading((theta[0], theta[1], theta[2]))
         g = port.gimbal_q
         reading[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
-        reading[READING_SWITCH], reading[READING_CLOCK] = self._switch, self.clock
+        reading[READING_SWITCH], reading[READING_CLOCK] = 1.0, self.clock
         reading[READING_SEQUENCE] = self._told = self._steps + 1
         self.telemetry[READ] += new
         return new

@@ -209,8 +209,3 @@ def test_an_exchange_answers_each_reading_and_leaves_fault_and_torque() -> None:
     made.ticks(2)
     assert device.command[COMMAND_FAULT] == Fault.LIMITER_NOT_FINITE
     assert not device.command[COMMAND_TORQUE : COMMAND_TORQUE + 3].any()
-
-
-def test_an_exchange_needs_arrays_of_its_layout() -> None:
-    with pytest.raises(SimError, match=r"expected \(9,\) of float64"):
-        exchange(device_world(), CUTOFF, reading=np.zeros(7))

@@ -57,8 +57,8 @@ def stylus(r, angle, z):
     return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
 
 
-def check_compiled(h_map, x):
-    """Whether the compiled entries give a map's pose and derivative at a stylus pose to the last bit."""
+def assert_same_compiled(h_map, x):
+    """Assert that the kernels found by the map's kind give its pose and derivative at a stylus pose to the last bit."""
     (kind, params, memory), pose, other = h_map.compiled(), *np.empty((2, h_map.nq))
     units, jacobian = map_units([(kind, params)]), np.empty((h_map.nv, 6))
     evaluate_map(units, kind, params, x, memory, pose)

@@ -3,6 +3,7 @@
 ``python tests/golden/test_golden_orientation.py`` writes the file anew, after a change that is meant.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,13 @@ def _rows():
     """Every 50 ms of three laps: time, quaternions of abdomen, chest and head, moment of the field."""
     clips = [(embedded(name).poses, embedded(name).fps) for name in ("walk", "cheer", "angry")]
     figure = expressive_figure(Composite(*clips, [BODIES.index(joint) for joint in JOINTS], (0.02, 0.07)))
-    turns = turn_table([turn for lap in range(3) for turn in lap_turns(4.0 * lap, 4.0, lap, 1.2)])
+    turns = [turn for lap in range(3) for turn in lap_turns(4.0 * lap, 4.0, lap)]
+    table = turn_table([replace(turn, angle=np.copysign(1.2, turn.angle)) for turn in turns])
     field, memory = Orientation(CURVE, 0.2, 3e-3), figure.compiled().memory
     rows, turn, rate = [], np.empty(3), np.empty(3)
     # Not from the lap's seam, where rounding would decide which lap it is.
     for t in np.arange(0.025, 12.0, 0.05):
-        wanted_turn(turns, t, turn, rate)
+        wanted_turn(table, t, turn, rate)
         q = np.roll(Rotation.from_rotvec(turn).as_quat(), 1)
         pose = figure.pose(np.concatenate([CURVE.point(t), q]), memory)
         hand = HandState(t, CURVE.point(t), q, CURVE.velocity(t), rate)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
+from controllers.fields.algebra.law import TRACE_SIZE
 from experiments.config.words import run_config
 from experiments.live.session.engine import STRONGEST, Drag, Engine
 from experiments.live.session.engine_process import slice_points
@@ -118,7 +119,7 @@ def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
 def test_a_curve_that_can_be_bent_keeps_its_pace_while_a_gain_that_paced_it_moves(gain, value):
     it, same = engine("stretch-then-follow"), engine("stretch-then-follow")
     other = engine("stretch-then-follow", **{gain: value})
-    record = it.tubes.record_at()
+    record = it.tubes.record_at(TRACE_SIZE)
     assert len(other.memory) != len(it.memory) or np.any(other.memory[record:] != it.memory[record:])
     it.set_gains(with_gain(it.config, gain, value))
     np.testing.assert_array_equal(it.memory[record:], same.memory[record:])

@@ -10,7 +10,7 @@ Played at the rate σ, all accelerations are multiplied by σ², so a flight rec
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
@@ -120,7 +120,7 @@ def fit_flight(
     missed = c - np.column_stack([level[0] + np.outer(middle, level[1]), np.vander(middle, 3, True) @ height])
     spread = max(float(np.sqrt(np.sum(missed[:, 2] ** 2) / (len(t) - 3))), NOISE)
     covariance = np.linalg.inv(np.vander(middle, 3).T @ np.vander(middle, 3))
-    uncertainty = 2.0 * spread * np.sqrt(covariance[0, 0]) * float(student.ppf(0.975, len(t) - 3))
+    uncertainty = 2.0 * spread * np.sqrt(covariance[0, 0]) * float(stdtrit(len(t) - 3, 0.975))
     air = slice(a + 1, b)
     mean = angular[air].mean(axis=0)
     excess = np.linalg.solve(inertia[air], (angular[air] - mean)[:, :, None])[:, :, 0]

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement
 from controllers.certificates.report import Verdict
@@ -120,6 +119,8 @@ def _frames_of_window(fps: float) -> int:
 
 def _mean_acceleration(motion: BodyMotion) -> Array:
     """Acceleration of the least-squares parabola about each frame, (n, 3); the first and last windows are extended."""
+    from scipy.signal import savgol_filter  # imported late: loads scipy.stats
+
     window = _frames_of_window(motion.fps)
     return np.asarray(savgol_filter(motion.com, window, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
 
@@ -152,6 +153,8 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
 
 
 def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str, Any]:
+    from scipy.signal import savgol_coeffs, savgol_filter
+
     window, delta = _frames_of_window(motion.fps), 1.0 / motion.fps
     start = int(np.clip(frame - window // 2, 0, len(motion.com) - window))
     a = _mean_acceleration(motion)[frame]

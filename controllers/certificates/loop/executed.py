@@ -19,9 +19,9 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
 from controllers.state import Array, HandState
 
-STEP = 1e-6  # [rad], [rad/s] of the differences
-SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
-DIRECTIONS = 4  # transverse directions in which states off the curve are examined
+_STEP = 1e-6  # [rad], [rad/s] of the differences
+_SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
+_DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
 
 class Seen(NamedTuple):
@@ -80,9 +80,9 @@ def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v:
             at, jacobian = numbers(theta)
             return jacobian.T @ force_at(program, memory, at, jacobian @ omega, phase)
 
-        for k, step in enumerate(STEP * np.eye(3)):
-            by_theta[0, i, :, k] = (torque(theta + step, omega) - torque(theta - step, omega)) / (2.0 * STEP)
-            by_omega[0, i, :, k] = (torque(theta, omega + step) - torque(theta, omega - step)) / (2.0 * STEP)
+        for k, step in enumerate(_STEP * np.eye(3)):
+            by_theta[0, i, :, k] = (torque(theta + step, omega) - torque(theta - step, omega)) / (2.0 * _STEP)
+            by_omega[0, i, :, k] = (torque(theta, omega + step) - torque(theta, omega - step)) / (2.0 * _STEP)
     return replace(linear, unit_theta=by_theta, unit_omega=by_omega)
 
 
@@ -94,7 +94,7 @@ def looked_at(
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     tangent = velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
-    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     away = [reach * (np.cos(a) * plane[:, 0] + np.sin(a) * plane[:, 1]) for a in angles]
     states = [(points, 0.0 * velocity), *((points + off, pace * velocity) for off in (0.0 * points, *away))]
     plants = [(hand, river.still_at(phases, hand)) for hand in hands]
@@ -107,7 +107,7 @@ def looked_at(
         for hand, plant in plants:
             loop = SampledLoop(replace(plant, unit_theta=law.unit_theta, unit_omega=law.unit_omega), river.sampling)
             values = np.linalg.eigvals(loop.frozen(1.0, 0.0))
-            radius = np.where(np.abs(np.angle(values)) > SWINGS, np.abs(values), 0.0).max(axis=1)
+            radius = np.where(np.abs(np.angle(values)) > _SWINGS, np.abs(values), 0.0).max(axis=1)
             at = int(radius.argmax())
             if radius[at] > worst.radius:
                 worst = Seen(float(radius[at]), float(phases[at]), p[at], v[at], hand, n * len(states), 0.0)

@@ -39,6 +39,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
     """
     z = ca.SX.sym("z", PARAMETERS + 1)
     a, p = axis.matrix(z), form.matrix(z)
+    # The mass μ, which comes first, is divided in equal ratios.
     edges = [
         (np.geomspace if i == 0 else np.linspace)(cell.low[i], cell.high[i], counts[i] + 1)
         if cell.high[i] > cell.low[i] else np.array([cell.low[i]] * 2)

@@ -57,7 +57,7 @@ class Desk:
         Called with each line of text that the person should read.
     """
 
-    def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None):
+    def __init__(self, folder: Path, say: Callable[[str], None]):
         self.folder, self._say = folder, say
         self.engine = EngineProcess()
         self.built: Built | None = None

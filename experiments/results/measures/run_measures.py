@@ -222,7 +222,7 @@ def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
 class AnimationMeasure:
     """`AnimationSummary` of frames that are given in blocks, from the time `since` [s] on."""
 
-    def __init__(self, recording: Recording, since: float = 0.0) -> None:
+    def __init__(self, recording: Recording, since: float) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
         self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
         self._pushed, self._unpushed = 0.0, 0.0

@@ -19,7 +19,7 @@ _HELD = 1e-9  # [m] distance from the stylus below which a point of the curve co
 
 def editing_summary(
     recording: Recording, tubes: StretchyTubes, default_poses: Callable[[Array, Array, Array], Array],
-    handled: tuple[Span, ...] = (),
+    handled: tuple[Span, ...],
 ) -> EditingSummary:  # fmt: skip
     """Measure the part of a run before the curve is performed; arguments as for `results.measures.summarise`."""
     span = (0.0, tubes.until)
@@ -32,7 +32,7 @@ def editing_summary(
 
 def performance_summary(
     recording: Recording, tubes: StretchyTubes, default_poses: Callable[[Array, Array, Array], Array],
-    handled: tuple[Span, ...] = (),
+    handled: tuple[Span, ...],
 ) -> PerformanceSummary | None:  # fmt: skip
     """Measure the part in which the curve is performed; None if the run has no such part or ended before it."""
     last = float(recording.channel("ticks", "t")[-1])

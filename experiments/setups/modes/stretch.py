@@ -37,6 +37,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.spans import spans
 from sim.users.hand.actions import Grab
+from sim.world.world import FigureKind
 
 # [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
 # it.
@@ -129,12 +130,14 @@ def _parts(
         gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
         # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
-        remarks=flight_remarks(maps.clips) + remarks + turning_remark(user, maps.expressive),
+        remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.expressive),
     )  # fmt: skip
 
 
-def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
+def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ...]:
     """Remarks on clips with flights where a hand may hold the figure: a body in the air cannot be held."""
+    if figure == "none":
+        return ()
     flying: list[str] = []
     over: list[str] = []
     for clip in clips:
@@ -146,12 +149,13 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
         if np.any(clip.poses[air, 4] ** 2 + clip.poses[air, 5] ** 2 > 0.5):
             over.append(clip.name)
     remarks: list[str] = []
+    physical = figure == "physical"
     if flying:
         remarks.append(
-            f"where the hand is slower than the clips, the flights of {', '.join(flying)} are lowered to the floor, "
-            "and the figure may fall there"
+            f"where the hand is slower than the clips, the flights of {', '.join(flying)} are lowered to the floor"
+            + (", and the figure may fall there" if physical else "")
         )
-    if over:
+    if over and physical:
         remarks.append(f"a figure that is held upside down in the air, as in {', '.join(over)}, falls")
     return tuple(remarks)
 

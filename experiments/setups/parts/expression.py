@@ -29,10 +29,10 @@ def expressive_figure(base: HapticMap) -> Expressive:
     return Expressive(base, joints)
 
 
-def lap_turns(start: float, lap: float, way: int, angle: float = LAP_ANGLE) -> tuple[Turn, Turn]:
-    """A turn by `angle` [rad] and one by its negative, in the lap that begins at `start` [s].
+def lap_turns(start: float, lap: float, way: int) -> tuple[Turn, Turn]:
+    """A turn by `LAP_ANGLE` and one by its negative, in the lap that begins at `start` [s].
 
     `way` chooses the axis: 0 yaws left and right, 1 pitches down and up, 2 rolls right and left.
     """
     axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))[way % 3]
-    return Turn(start, 0.5 * lap, angle, axis), Turn(start + 0.5 * lap, 0.5 * lap, -angle, axis)
+    return Turn(start, 0.5 * lap, LAP_ANGLE, axis), Turn(start + 0.5 * lap, 0.5 * lap, -LAP_ANGLE, axis)

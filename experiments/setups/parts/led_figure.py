@@ -24,6 +24,7 @@ from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.motion.clip import CLOSES, Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import lap_of
+from sim.world.world import FigureKind
 
 _PHASES = 256  # samples of a lap that tell which feet stand: of a lap of a second, one in 4 ms
 _UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
@@ -51,7 +52,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
         refined=lambda: (balanced_on_ground(made, gait, figure), ()),
-        remarks=lap_remark(clips[0]) + gait_remark(clips[0].name, made),
+        remarks=lap_remark(clips[0], config.figure.kind) + gait_remark(clips[0].name, made, config.figure.kind),
     )  # fmt: skip
 
 
@@ -116,7 +117,7 @@ def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | No
     return led, Gait(led.stride, speed, np.roll(support, -first), led.reach, grounded)
 
 
-def lap_remark(clip: Clip) -> tuple[str, ...]:
+def lap_remark(clip: Clip, figure: FigureKind) -> tuple[str, ...]:
     """Remarks, if only a part of a clip is led, or if the clip does not repeat itself."""
     lap, remarks = lap_of(clip), list[str]()
     if lap.clip.n_frames < clip.n_frames:
@@ -126,7 +127,7 @@ def lap_remark(clip: Clip) -> tuple[str, ...]:
     if lap.gap > _UNLIKE:
         remarks.append(
             f"the clip {clip.name!r} does not repeat itself (its ends are {np.degrees(lap.gap):.0f}° apart): it is "
-            "closed over its ends, and the physical figure may fall there"
+            "closed over its ends" + (", and the physical figure may fall there" if figure == "physical" else "")
         )
     return tuple(remarks)
 
@@ -155,7 +156,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
     return stands
 
 
-def gait_remark(name: str, led: Led) -> tuple[str, ...]:
+def gait_remark(name: str, led: Led, figure: FigureKind) -> tuple[str, ...]:
     """Remark on a clip with flights: a body in the air falls with g, whatever the pace at which it is led."""
     if led.flies and led.grounds:
         return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
@@ -164,7 +165,7 @@ def gait_remark(name: str, led: Led) -> tuple[str, ...]:
             f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
             f"{led.pace * led.stride / led.duration:.1f} m/s",
         )
-    if led.flies:
+    if led.flies and figure == "physical":
         return (
             f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any "
             "pace, the physical figure may fall where it is slow",

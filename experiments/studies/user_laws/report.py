@@ -22,9 +22,10 @@ STUDIES = {
     "step-response": step_response, "grip": grip, "practice": practice, "endurance": endurance,
 }  # fmt: skip
 TABLE = "laws.json"
+_OLDEST = 40.0  # [years] of the published panels, which are of young adults
 
 
-def user_laws(people: int, seed: int, names: tuple[str, ...] = ()) -> list[Study]:
+def user_laws(people: int, seed: int, names: tuple[str, ...]) -> list[Study]:
     """Run the experiments with a population, given by its number of people and its seed.
 
     Raises
@@ -49,16 +50,13 @@ def young_adults(people: int, seed: int) -> tuple[Person, ...]:
     SimError
         If there are no people.
     """
-    population(people, seed)
+    population(people, seed)  # refuses a number of people that is none
     everybody = itertools.count(2 * people, 2 * people)
     return next(young[:people] for n in everybody if len(young := _young(n, seed)) >= people)
 
 
 def _young(number: int, seed: int) -> tuple[Person, ...]:
     return tuple(person for person in population(number, seed) if person.age <= _OLDEST)
-
-
-_OLDEST = 40.0  # [years]
 
 
 def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwrite: bool) -> list[Law]:

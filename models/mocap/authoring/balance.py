@@ -1,23 +1,15 @@
-"""Balance of a cyclic motion: its zero-moment point, and the sway of the pelvis that brings it under the feet.
-
-The zero-moment point (Vukobratović & Borovac 2004) is the centre of pressure that the motion needs: with mass m, centre
-of mass c, angular momentum L about it and F = m (c̈ + g e_z),
-
-    p_x = c_x − (c_z F_x + L̇_y) / F_z,    p_y = c_y − (c_z F_y − L̇_x) / F_z.
-
-Feet can only give it inside the support polygon, the convex hull of their contacts.
-"""
+"""Balance of an authored cyclic motion: the sway of the pelvis that brings its zero-moment point under the feet."""
 
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
+from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from models.mocap.motion.clip import Clip
 
 # Height below which a contact sphere is support [m], at any speed, unlike in `contacts`: authored soles are exact.
@@ -48,6 +40,11 @@ class Dynamics(NamedTuple):
     torque: Array
     zmp: Array
     contacts: Array
+
+    @property
+    def touching(self) -> Mask:
+        """Which contact spheres are support, shape (n, 8)."""
+        return self.contacts[..., 2] < CONTACT_RADIUS + _SUPPORT_HEIGHT
 
 
 def dynamics(clip: Clip) -> Dynamics:
@@ -80,53 +77,13 @@ def dynamics(clip: Clip) -> Dynamics:
     acceleration = (np.roll(com, -1, axis=0) - 2 * com + np.roll(com, 1, axis=0)) * clip.fps**2
     force = model.body_subtreemass[pelvis] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
     torque = (np.roll(spin, -1, axis=0) - np.roll(spin, 1, axis=0)) * clip.fps / 2
-    lever = np.stack([com[:, 2] * force[:, 0] + torque[:, 1], com[:, 2] * force[:, 1] - torque[:, 0]], axis=1)
-    return Dynamics(com, force, torque, com[:, :2] - lever / force[:, 2:], contacts)
-
-
-def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
-    """The point of the support polygon nearest to a point on the floor.
-
-    Parameters
-    ----------
-    point : array, shape (2,)
-        The point [m].
-    contacts : array, shape (k, 3)
-        Centres of the contact spheres [m]; those that touch the floor span the polygon.
-    share : float
-        Factor by which the polygon is scaled about its middle.
-
-    Returns
-    -------
-    array, shape (2,)
-        The point itself when it lies inside or when nothing touches the floor.
-    """
-    touching = contacts[contacts[:, 2] < CONTACT_RADIUS + _SUPPORT_HEIGHT, :2]
-    if len(touching) == 0:
-        return point
-    middle = touching.mean(axis=0)
-    corners = middle + share * (touching - middle)
-    if len(corners) > 2:
-        try:
-            hull = ConvexHull(corners)
-        except QhullError:  # the corners lie on a line
-            corners = corners[np.argsort(corners @ np.ptp(corners, axis=0))]
-        else:
-            if np.all(hull.equations[:, :2] @ point + hull.equations[:, 2] <= 0):
-                return point
-            corners = corners[hull.vertices]
-    along = np.roll(corners, -1, axis=0) - corners
-    length = np.maximum(np.sum(along * along, axis=1), 1e-12)
-    where = np.clip(np.sum((point - corners) * along, axis=1) / length, 0.0, 1.0)
-    nearest = corners + where[:, None] * along
-    return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
+    return Dynamics(com, force, torque, zero_moment_point(com, force, torque), contacts)
 
 
 def balanced_clip(choreography: Choreography, fps: float) -> Clip:
     """Sample a cyclic in-place choreography with a sway of the pelvis that keeps the zero-moment point under the feet.
 
-    A sway δ of the pelvis moves the zero-moment point by about δ − (h/g) δ̈ (cart-table model, Kajita et al. 2003). For
-    a periodic error e this is solved harmonic by harmonic, δ̂ = ê / (1 + h ω²/g), and iterated with the exact dynamics.
+    The sway of the cart-table model (`sway_of`) is iterated with the exact dynamics.
 
     Parameters
     ----------
@@ -143,17 +100,12 @@ def balanced_clip(choreography: Choreography, fps: float) -> Clip:
     n = round(choreography.duration * fps)
     t = np.linspace(0.0, choreography.duration, n + 1)
     sway = np.zeros((n + 1, 2))
-    frequency = np.arange(n // 2 + 1) / choreography.duration
     for _ in range(_ROUNDS):
         motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
-        wanted = [
-            supported(point, contacts, _WITHIN) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
-        ]
+        wanted = nearest_supported(motion.zmp, motion.contacts[..., :2], motion.touching, _WITHIN)
         # A sway adds a moment, which moves the zero-moment point further where the vertical force is smaller.
         load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
-        error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)
-        error[frequency > _CUTOFF] = 0.0
-        error /= (1 + motion.com[:, 2].mean() / GRAVITY * (2 * np.pi * frequency) ** 2)[:, None]
-        change = np.fft.irfft(error, n, axis=0)
+        error = load * (wanted - motion.zmp)
+        change = sway_of(error, motion.com[:, 2].mean(), choreography.duration, _CUTOFF)
         sway += np.vstack([change, change[:1]])
     return Clip(poses_at(choreography, t, sway), fps, choreography.name)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import Array
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
+from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, figure_model
 from models.mocap.dynamics.floor_forces import Demand, carriers
 from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
@@ -42,7 +42,7 @@ class InverseDynamics:
         Derivatives by position of the contact spheres' centres and of the centre of mass.
     """
 
-    def __init__(self, state: State, with_jacobian: bool, contacts: tuple[str, ...] = FOOT_CONTACTS) -> None:
+    def __init__(self, state: State, with_jacobian: bool, contacts: tuple[str, ...]) -> None:
         model = figure_model()
         d = mujoco.MjData(model)
         geoms = [int(model.geom(name).id) for name in contacts]

@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
-from tests.controllers.clips_for_maps import LEG, check_compiled, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging
 
 R = (0.03, 0.07)
 LOWER, RED, BLUE = (
@@ -68,7 +68,7 @@ def test_the_derivative_agrees_with_differences_on_the_manifold():
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    check_compiled(MAP, stylus(0.05, 2.0, 0.01))
+    assert_same_compiled(MAP, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(

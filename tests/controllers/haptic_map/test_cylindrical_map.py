@@ -12,7 +12,15 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
 from controllers.motion.mean import mean_rotation
-from tests.controllers.clips_for_maps import JOINTS, LEG, check_compiled, difference, matrices, stylus, swinging
+from tests.controllers.clips_for_maps import (
+    JOINTS,
+    LEG,
+    assert_same_compiled,
+    difference,
+    matrices,
+    stylus,
+    swinging,
+)
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]
@@ -198,7 +206,7 @@ def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    check_compiled(MOVING, stylus(0.05, 2.0, 0.01))
+    assert_same_compiled(MOVING, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(

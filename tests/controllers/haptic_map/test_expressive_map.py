@@ -9,10 +9,8 @@ from scipy.spatial.transform import Rotation
 from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
-from sim.compilation.kernel_units import map_units
-from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging, wxyz
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging, wxyz
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
 BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))
@@ -138,14 +136,7 @@ def test_a_half_turn_one_way_is_the_half_turn_the_other_way():
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     rng = np.random.default_rng(5)
     for _ in range(20):
-        compiled, x = MAP.compiled(), anywhere(rng)
-        pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-        units = map_units([(compiled.kind, compiled.params)])
-        evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
-        evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
-        np.testing.assert_array_equal(pose, MAP.pose(x))
-        np.testing.assert_array_equal(other, pose)
-        np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+        assert_same_compiled(MAP, anywhere(rng))
 
 
 def test_what_is_wrapped_can_be_asked_for_what_it_does_apart_from_poses():

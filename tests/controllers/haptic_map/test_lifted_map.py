@@ -6,7 +6,7 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
-from tests.controllers.clips_for_maps import LEG, check_compiled, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging
 
 ROWS = 48
 TURN = 2.0 * np.pi
@@ -65,7 +65,7 @@ def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
-    check_compiled(MAP, stylus(0.05, 2.0, 0.004))
+    assert_same_compiled(MAP, stylus(0.05, 2.0, 0.004))
 
 
 def test_a_clip_is_moved_over_the_ground_as_a_whole():

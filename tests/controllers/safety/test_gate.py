@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.errors import ParameterError
-from controllers.safety.arming import ARM, CLEAR, DISARM, NO_REQUEST, TRANSITIONS, Event, State, mermaid, next_state
+from controllers.safety.arming import ARM, CLEAR, DISARM, NO_REQUEST, TRANSITIONS, Event, State, next_state
 from controllers.safety.faults import FAULT_CODE, Fault, Plausibility, latch, rearm
 from controllers.safety.gate import GATE_FORCE, GATE_GAIN, GATE_STATE, Gate, pass_gate
 from controllers.state import HAND_SIZE
@@ -106,7 +106,6 @@ def test_the_compiled_table_is_the_table() -> None:
     for state in State:
         for event in Event:
             assert next_state(int(state), int(event)) == TRANSITIONS.get((state, event), state)
-    assert mermaid().count("-->") == len(TRANSITIONS) + 1
 
 
 def test_no_force_until_the_one_asked_for_has_been_small_and_then_it_is_ramped_in() -> None:

@@ -8,11 +8,9 @@ import pytest
 
 from experiments.config.maps import Cylindrical
 from experiments.config.words import run_config
-from experiments.fitting.balance import nearest_supported
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.authoring.balance import supported
 from models.mocap.dynamics.floor_forces import Floor, residual
 from models.mocap.motion.clip import pose_difference
 from sim.reference.reference import map_poses
@@ -111,15 +109,3 @@ def test_the_floor_gives_in_betweens_what_they_ask_for(clips, most, usual):
     # Hicks et al. 2015: good below 5 %; where a walk has just begun to fade, a little more.
     assert max(shares) < most
     assert np.mean(shares) < usual
-
-
-def test_the_nearest_supported_point_is_that_of_the_convex_hull():
-    rng = np.random.default_rng(0)
-    for touching in range(9):
-        contacts = rng.uniform(-0.2, 0.2, (40, 8, 3))
-        contacts[..., 2] = np.where(np.arange(8) < touching, 0.0, 0.1)
-        points = rng.uniform(-0.4, 0.4, (40, 2))
-        found = nearest_supported(points, contacts, 0.8)
-        raised = np.add(contacts, [0.0, 0.0, CONTACT_RADIUS])
-        expected = [supported(point, feet, 0.8) for point, feet in zip(points, raised, strict=True)]
-        np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -10,7 +10,7 @@ from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from experiments.fitting.balance import nearest_supported
+from controllers.legs.sole_heights import SWINGS
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.setups.modes.rivers import river_bundle
@@ -25,6 +25,7 @@ from experiments.studies.change_trials import (
     rivers_that_play,
 )
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.mocap.dynamics.zero_moment_point import nearest_supported
 from models.mocap.motion.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
 from sim.reference.transition import DWELL
@@ -221,7 +222,7 @@ def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
             mujoco.mj_kinematics(FIGURE, data)
             mujoco.mj_comPos(FIGURE, data)
             centre, soles = data.subtree_com[1, :2], data.geom_xpos[feet] - [0.0, 0.0, CONTACT_RADIUS]
-            missing.append(np.linalg.norm(nearest_supported(centre, soles, 0.9) - centre))
+            missing.append(np.linalg.norm(nearest_supported(centre, soles[:, :2], soles[:, 2] < SWINGS, 0.9) - centre))
         assert (max(missing) < 1e-3) == balanced
 
 

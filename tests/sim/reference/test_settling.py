@@ -125,11 +125,18 @@ def test_a_jump_that_is_held_comes_down_and_without_it_hovers() -> None:
 
 
 def test_what_nobody_can_do_is_said_beforehand() -> None:
-    assert flight_remarks(load_clips(("walk", "cheer"))[0]) == ()
-    (remark,) = flight_remarks(load_clips(("jump", "run", "walk"))[0])
+    assert flight_remarks(load_clips(("walk", "cheer"))[0], "physical") == ()
+    (remark,) = flight_remarks(load_clips(("jump", "run", "walk"))[0], "physical")
     assert "jump, run" in remark
-    assert "lowered to the floor" in remark
-    assert "upside down" in flight_remarks(load_clips(("backflip",))[0])[-1]
+    assert "lowered to the floor, and the figure may fall there" in remark
+    assert "upside down" in flight_remarks(load_clips(("backflip",))[0], "physical")[-1]
+
+
+def test_only_a_physical_figure_is_said_to_fall() -> None:
+    flying = load_clips(("backflip", "jump"))[0]
+    (remark,) = flight_remarks(flying, "kinematic")
+    assert remark.endswith("the flights of backflip, jump are lowered to the floor")
+    assert flight_remarks(flying, "none") == ()
 
 
 @pytest.mark.slow

@@ -139,13 +139,14 @@ def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     jerked = embedded("run").poses.copy()
     jerked[-20:, 7:11] = jerked[-21, 7:11]
     capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), figure)
-    assert gait_remark("walk", walk) == ()
-    assert "led slowly it goes without flights" in gait_remark("run", run)[0]
-    assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture)[0]
+    assert gait_remark("walk", walk, "physical") == ()
+    assert "led slowly it goes without flights" in gait_remark("run", run, "kinematic")[0]
+    assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture, "kinematic")[0]
     standing = np.zeros((8, 2), dtype=bool)
     standing[:4, 0] = True
     hop = Led((embedded("run").poses, embedded("run").fps), figure_legs(figure), 0.0, standing)
-    assert "may fall where it is slow" in gait_remark("hop", hop)[0]
+    assert "may fall where it is slow" in gait_remark("hop", hop, "physical")[0]
+    assert gait_remark("hop", hop, "kinematic") == ()
 
 
 def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,20 +1,16 @@
-"""Balance: the zero-moment point against inverse dynamics, the support against brute force, the sway that finds it."""
+"""Balance: the zero-moment point against inverse dynamics, the sway that finds it."""
 
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
+from models.humanoid.skeleton import figure_model
 from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at
-from models.mocap.authoring.balance import balanced_clip, dynamics, supported
+from models.mocap.authoring.balance import balanced_clip, dynamics
 from models.mocap.motion.clip import Clip
 from tests.models.mocap.authoring.support import outside_support
-
-FLOOR = [[x, y, CONTACT_RADIUS] for x, y in ((-0.05, 0.1), (0.16, 0.1), (-0.05, -0.1), (0.16, -0.1))]
 
 
 def lunge():
@@ -50,34 +46,6 @@ def test_a_figure_that_stands_still_pushes_its_weight_below_its_centre_of_mass()
     motion = dynamics(Clip(poses_at(still, np.arange(97) / 60), 60.0, "still"))
     np.testing.assert_allclose(motion.force, np.tile([0.0, 0.0, 75.0 * 9.81], (96, 1)), atol=1e-6)
     np.testing.assert_allclose(motion.zmp, motion.com[:, :2], atol=1e-9)
-
-
-@settings(deadline=None, max_examples=50, derandomize=True)
-@given(
-    corners=st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=8),
-    point=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
-)
-def test_the_supported_point_is_the_nearest_convex_combination_of_the_contacts(corners, point):
-    contacts = np.array([[x, y, CONTACT_RADIUS] for x, y in corners])
-    nearest = supported(np.array(point), contacts)
-    # Of a convex set, n is the point nearest to p exactly if no corner lies beyond the line through n across p − n ...
-    assert np.max((contacts[:, :2] - nearest) @ (np.array(point) - nearest)) <= 1e-7
-    # ... and n belongs to the set: no direction has it beyond every corner.
-    directions = np.stack([np.cos(a := np.linspace(0, 2 * np.pi, 73)), np.sin(a)])
-    assert np.all(nearest @ directions <= (contacts[:, :2] @ directions).max(axis=0) + 1e-7)
-
-
-def test_only_spheres_on_the_floor_support():
-    contacts = np.array(FLOOR)
-    np.testing.assert_allclose(supported(np.array([0.0, 0.3]), contacts), [0.0, 0.1])
-    contacts[:2, 2] += 0.05
-    np.testing.assert_allclose(supported(np.array([0.0, 0.3]), contacts), [0.0, -0.1])
-    contacts[:, 2] += 0.05
-    np.testing.assert_array_equal(supported(np.array([0.0, 0.3]), contacts), [0.0, 0.3])
-
-
-def test_a_shrunk_support_holds_less():
-    np.testing.assert_allclose(supported(np.array([0.055, 0.3]), np.array(FLOOR), share=0.5), [0.055, 0.05])
 
 
 def test_swaying_brings_an_unbalanced_motion_over_its_feet_without_moving_them():
