@@ -135,6 +135,11 @@ class Lifted(ClipMap):
         """q_i = (r, z) [m] of curve i at angles (...), shape (..., 2)."""
         return round_lap(self.sites[:, i], angles)
 
+    def curve_point(self, i: int, angle: float) -> Array:
+        """Point [m] of curve i at an angle of the lap, shape (3,)."""
+        r, z = self.site(i, np.array(angle))
+        return np.array([r * np.cos(angle), r * np.sin(angle), z])
+
     def curve(self, i: int) -> Trajectory:
         """α̃_i with the timing of the clip, periodic if the clip is closed; exact at the frames."""
         angles = self.angles[i]

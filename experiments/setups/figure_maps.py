@@ -47,7 +47,15 @@ from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
 from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
-from experiments.setups.modes.lifted_runs import HELD_GAINS, curve_number, default_pushes, lifted_choice, lifted_curve
+from experiments.fitting.transition_places import carried_over
+from experiments.setups.modes.lifted_runs import (
+    HELD_GAINS,
+    best_transition,
+    curve_number,
+    default_pushes,
+    lifted_choice,
+    lifted_curve,
+)
 from experiments.setups.modes.rivers import default_choice, river_bundle
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of, reached
@@ -247,7 +255,10 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
         if part.around != Circle():
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = lifted_parts(made, clips, part)
-        if config.user.does == "push" and config.figure.kind == "physical" and not isinstance(config.mode, Rivers):
+        pushed = config.user.does == "push" and config.figure.kind == "physical"
+        if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
+            parts = replace(parts, refined=partial(carried_over, made, best_transition(made, part.curve)))
+        elif pushed and not isinstance(config.mode, Rivers):
             keeps_pace = isinstance(config.mode, Follow) and config.mode.flow == "parallel"
             number = curve_number(made, part.curve)
             followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), keeps_pace)

@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array
+from controllers.haptic_map.lifting.transitions import MapTransition
 from experiments.config.modes import Rivers
 from experiments.setups.modes.rivers import BESIDE, river_time
 from experiments.setups.parts.budget import fastest
@@ -87,6 +87,25 @@ def lifted_river(course: Trajectory, mode: Rivers) -> River:
     return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEEDS))
 
 
+def best_transition(haptic_map: Lifted, curve: str) -> MapTransition:
+    """The best transition of a curve.
+
+    Raises
+    ------
+    ParameterError
+        If the curve has none.
+    """
+    first = curve_number(haptic_map, curve)
+    own = [at for at in haptic_map.transitions if first in (at.first, at.second)]
+    if not own:
+        pairs = [f"{haptic_map.names[at.first]} – {haptic_map.names[at.second]}" for at in haptic_map.transitions]
+        raise ParameterError(
+            f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
+            f"{', '.join(pairs) or 'none'}; leave out --user push{', or begin on another --curve' * bool(pairs)}"
+        )
+    return own[0]
+
+
 def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:
     """Default pushes on rivers: over at the curve's best transition in the second lap, and back three laps later.
 
@@ -96,14 +115,7 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
         If the curve has no transition.
     """
     first, damping = curve_number(haptic_map, curve), river_gains(mode)[1]
-    own = [at for at in haptic_map.transitions if first in (at.first, at.second)]
-    if not own:
-        pairs = [f"{haptic_map.names[at.first]} – {haptic_map.names[at.second]}" for at in haptic_map.transitions]
-        raise ParameterError(
-            f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
-            f"{', '.join(pairs) or 'none'}; leave out --user push{', or begin on another --curve' * bool(pairs)}"
-        )
-    best = own[0]
+    best = best_transition(haptic_map, curve)
     second = best.second if best.first == first else best.first
     laps = [haptic_map.curve(i).duration for i in (first, second)]
     begin = laps[0]
@@ -137,13 +149,8 @@ def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start
     frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
     at = frame / haptic_map.clips[first][1] - _LEAD
     place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))
-    way = _point(haptic_map, second, angle) - _point(haptic_map, first, angle)
+    way = haptic_map.curve_point(second, angle) - haptic_map.curve_point(first, angle)
     distance = float(np.linalg.norm(way))
     x, y, z = (float(value) for value in way)
     p, q, r = (float(value) for value in place)
     return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), NEAR)
-
-
-def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:
-    r, z = haptic_map.site(curve, np.array(angle))
-    return np.array([r * np.cos(angle), r * np.sin(angle), z])

@@ -1,0 +1,39 @@
+"""Places over the floor of two motions at a transition of a lifted map: how far a change between them carries a figure.
+
+Transitions are found where poses, velocities and standing feet agree, regardless of the place over the floor. Motions
+that go there and back within a lap, such as a run from one end of a room to the other, may be anywhere at that moment.
+"""
+
+import numpy as np
+
+from controllers.curves.stylus import stylus_path
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.transitions import MapTransition
+from sim.reference.reference import map_poses
+
+# [m]; a hand changes over within about 0.25 s, so that a figure is carried by 1 m/s. Transitions of the embedded clips
+# have 3 mm; of captures, one has 1.6 m, and there the figure falls.
+_FAR = 0.25
+
+
+def places_apart(made: Lifted, transition: MapTransition) -> float:
+    """Distance over the floor between the places of two motions at their transition [m]; needs compiled code.
+
+    With q_i the point of curve i at the transition's θ, it is that of the roots of h(q_first) and h(q_second) in one
+    frame of the lap.
+    """
+    points = np.array([made.curve_point(i, transition.angle) for i in (transition.first, transition.second)])
+    first, second = map_poses(made, stylus_path(points), made.compiled().memory)[:, :2]
+    return float(np.linalg.norm(second - first))
+
+
+def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple[str, ...]]:
+    """The map, and a remark if a push over at a transition carries the figure too far to be followed."""
+    apart = places_apart(made, transition)
+    if apart < _FAR:
+        return made, ()
+    names = f"{made.names[transition.first]} and {made.names[transition.second]}"
+    return made, (
+        f"where {names} agree, their places over the floor are {apart:.1f} m apart: a push over carries the figure "
+        "there within a quarter of a second, and it may fall; a clip that stays or goes on in one place suits better",
+    )

@@ -1,0 +1,66 @@
+"""How far a push over to another curve of a lifted map carries the figure, and that it is said before the run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.room import Room
+from controllers.haptic_map.lifting.transitions import MapTransition
+from experiments.config.words import run_config
+from experiments.files.map_files import load_figure_map, save_map
+from experiments.fitting.transition_places import carried_over, places_apart
+from experiments.lifting.lift import lift_clips
+from experiments.setups.setups import map_parts
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
+from models.mocap.readers.own_bvh import write_bvh
+
+WAY = 1.5  # [m] to which the cheering figure goes and from which it comes back in a lap
+
+
+@pytest.fixture(scope="module")
+def wandering(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A lifted map of a dance on the spot, and of a cheer that goes to a place and back in a lap."""
+    folder, cheer = tmp_path_factory.mktemp("wandering"), embedded("cheer")
+    poses = cheer.poses.copy()
+    poses[:, 0] += WAY * np.sin(np.pi * np.linspace(0.0, 1.0, len(poses))) ** 2
+    write_bvh(Clip(poses, cheer.fps, "to_and_fro"), folder / "to_and_fro.bvh")
+    made = lift_clips(["squat_dance", str(folder / "to_and_fro.bvh")], Room(), raw=True).haptic_map
+    save_map(made, folder / "map.npz")
+    return folder / "map.npz"
+
+
+def _with(made: Lifted, angle: float) -> Lifted:
+    made.transitions = (MapTransition(0, 1, angle, 0.1, 0.1),)
+    return made
+
+
+def test_places_are_as_far_apart_as_one_motion_goes_and_a_change_where_they_are_is_said(wandering: Path) -> None:
+    made, _ = load_figure_map(wandering)
+    assert isinstance(made, Lifted)
+    angles = np.arange(0.0, 2.0 * np.pi, 0.2)
+    apart = np.array([places_apart(made, MapTransition(0, 1, angle, 0.1, 0.1)) for angle in angles])
+    assert apart.min() < 0.15
+    # A lap's mean place is that of the other: it goes from half its way on one side to half on the other.
+    assert apart.max() == pytest.approx(WAY / 2.0, abs=0.1)
+    near, far = (MapTransition(0, 1, float(angles[k]), 0.1, 0.1) for k in (apart.argmin(), apart.argmax()))
+    assert carried_over(made, near)[1] == ()
+    (said,) = carried_over(made, far)[1]
+    assert said.startswith("where squat_dance and to_and_fro agree, their places over the floor are 0.")
+
+
+@pytest.mark.parametrize(("user", "figure", "said"), [("push", "physical", 1), ("relaxed", "physical", 0)])
+def test_a_hand_that_pushes_over_where_places_are_apart_is_warned(
+    wandering: Path, tmp_path: Path, user: str, figure: str, said: int
+) -> None:
+    made, _ = load_figure_map(wandering)
+    assert isinstance(made, Lifted)
+    angles = np.arange(0.0, 2.0 * np.pi, 0.2)
+    far = max(angles, key=lambda angle: places_apart(made, MapTransition(0, 1, angle, 0.1, 0.1)))
+    save_map(_with(made, float(far)), tmp_path / "map.npz")
+    config = run_config(map=str(tmp_path / "map.npz"), mode="rivers", user=user, figure=figure, seconds=1.0)
+    remarks = map_parts(config, figure_model()).refine().remarks
+    assert sum("a push over carries the figure" in remark for remark in remarks) == said
