@@ -35,5 +35,5 @@ def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple
     names = f"{made.names[transition.first]} and {made.names[transition.second]}"
     return made, (
         f"where {names} agree, their places over the floor are {apart:.1f} m apart: a push over carries the figure "
-        "there within a quarter of a second, and it may fall; a clip that stays or goes on in one place suits better",
+        "there within a quarter of a second, and it may fall; clips that stay in place, or keep going, suit better",
     )
