@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.river_clips import RiverClips
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import in_step, natural_lap
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace
+from experiments.setups.parts.governor import speeds_along
 from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
@@ -100,3 +102,21 @@ def test_a_lifted_map_names_what_lies_next_to_no_motion(tmp_path: Path) -> None:
     remarks = map_parts(run_config(map=str(tmp_path / "map.npz"), seconds=1.0), figure_model()).remarks
     assert any(remark.startswith("backflip turns over") for remark in remarks)
     assert not any("walk" in remark and "flies" in remark for remark in remarks)
+
+
+def test_a_round_of_two_laps_bounds_the_hand_as_one_does_in_half_of_the_lap_each() -> None:
+    shares = []
+    for lap in (2.4, 1.2):
+        config = run_config(map="rivers", mode="rivers", clips=("walk", "jump", "walk"), lap=lap, seconds=1.0)
+        parts = map_parts(config, figure_model())
+        made = parts.haptic_map
+        assert isinstance(made, RiverClips)
+        assert made.laps == round(2.4 / lap)
+        speeds = speeds_along(parts, made.curves[1], 1)
+        # At the clip's own pace the hand is admitted; a flight bounds it from below.
+        assert (speeds[:, 0].max() * lap, speeds[:, 1].min() * lap) == pytest.approx(
+            (1.03 * made.curves[1].length, 1.04 * made.curves[1].length), rel=0.02
+        )
+        shares.append(np.mean(speeds[:, 0] > 0.0))
+    # The flight lasts as long, of a lap half as long.
+    assert shares[1] == pytest.approx(2.0 * shares[0], rel=0.05)
