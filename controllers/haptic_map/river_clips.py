@@ -9,7 +9,6 @@ from numba import njit
 from controllers.blending.blend import blend
 from controllers.blending.combination import fresh_lap
 from controllers.curves.trajectory import START, Trajectory, curve_acceleration, curve_point, curve_velocity
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.base import CompiledMap
@@ -17,7 +16,6 @@ from controllers.haptic_map.clip_change import ClipChange, add_change, change_la
 from controllers.haptic_map.river_memory import (
     AHEAD,
     BLEND,
-    CAME,
     CHANGE,
     CURVES,
     GATE,
@@ -29,6 +27,7 @@ from controllers.haptic_map.river_memory import (
     after,
     changes_of,
     in_round,
+    lead_of,
     phase_near,
     round_of,
     timing_curve,
@@ -40,7 +39,6 @@ from controllers.work_array import work_array
 RIVER_CLIPS = 5
 LONGEST = 0.7  # of a round: longest duration of a change
 _ALIKE = 1e-6  # [s] largest difference of the laps of two rivers with a change between them
-_CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand decays to zero
 
 
 @njit
@@ -53,10 +51,9 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     pace, rate, shown = 2.0 * np.pi / period, 1.0, phase
     memory[PHASE] = phase
     if memory[AHEAD] != 0.0:
-        went = min(max(after(phase, memory[CAME], period) / _CATCHES_UP, 0.0), 1.0)
-        shown = in_round(params, curve, phase + memory[AHEAD] * (1.0 - smooth_step(went)))
-        rate -= memory[AHEAD] * 30.0 * (went * (1.0 - went)) ** 2 / _CATCHES_UP
-        memory[AHEAD] = memory[AHEAD] if went < 1.0 else 0.0
+        lead, decay = lead_of(params, memory, phase)
+        shown, rate = in_round(params, curve, phase + lead), rate + decay
+        memory[AHEAD] = memory[AHEAD] if abs(lead) > 0.0 else 0.0
     memory[SHOWN] = shown
     known, change, since = changes_of(params), int(memory[CHANGE]), 0.0
     if change >= 0:

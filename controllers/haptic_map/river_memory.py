@@ -12,6 +12,7 @@ from numba import njit
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, curve_acceleration, curve_point, curve_velocity, wrap_phase
+from controllers.easing import smooth_step
 from controllers.haptic_map.clip_change import gate_behind, known_between
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
@@ -28,6 +29,10 @@ RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(ME
 RIVERS, TUBE, LAPS, BLEND, CURVES = range(5)
 _RACES = 2.0  # times the river's pace: a faster hand that no river holds plays no clip
 _SOON = 0.03  # [s] horizon of the prediction in `lets_go`: followed until it races the clip, a root leaps by 3.7 m/s
+_EVEN = 0.02  # of the river's pace: a hand that is off it by no more is followed at once; encoder noise is 1 %
+_SLACK = 0.25  # [s] largest lag of a clip behind a hand that goes faster than its river
+_CAUGHT = 0.025  # [s] lag above which a clip does not slow down with the hand
+_CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand decays to zero
 _PAST = 0.25  # of a round: a phase up to this before a moment counts as before it, any other as after it
 
 
@@ -92,6 +97,56 @@ def after(phase: float, moment: float, period: float) -> float:
     """Time of a phase after a moment of the round [s]; negative up to a quarter of the round before it."""
     way = phase - moment
     return way - period * np.floor(way / period + _PAST)
+
+
+@njit
+def lead_of(params: Array, memory: Array, phase: float) -> tuple[float, float]:
+    """Lead [s] of the clip over a hand at a phase [s], which decays with the phase, and its derivative by the phase."""
+    went = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCHES_UP
+    went = min(max(went, 0.0), 1.0)
+    return memory[AHEAD] * (1.0 - smooth_step(went)), -memory[AHEAD] * 30.0 * (went * (1.0 - went)) ** 2 / _CATCHES_UP
+
+
+@njit
+def _share(lead: float, faster: bool) -> float:
+    """Share c of the excess of the hand's pace that the lead [s] takes up, of a hand that is faster or slower."""
+    if faster:
+        return float(1.0 - smooth_step(min(abs(lead) / _SLACK, 1.0)))
+    return float(smooth_step(min(max(-lead / _CAUGHT, 0.0), 1.0)))
+
+
+@njit
+def even_pace(params: Array, memory: Array, x: Array, way: float, changed: Array) -> None:
+    r"""Let the clip's lead take up the excess of the hand's pace over the river's, so that a push makes no clip race.
+
+    .. math:: \dot e = -c\,(r - \operatorname{sat}(r, 1 \pm 0.02)), \qquad
+              c = \begin{cases} 1 - S(|e| / L) & r > 1 \\ S(-e / l) & r < 1 \end{cases}
+
+    r is the pace of the hand, 1 for the river's; e the lead of the clip over the hand [s], negative if it lags; S the
+    smooth step, L = 0.25 s and l = 0.025 s. So a clip lags behind a hand that goes faster by at most L, and then goes
+    at its pace; it does not slow down with the hand while it lags, and stops with it if it does not.
+
+    Parameters
+    ----------
+    params, memory : Array
+        The map's, with the hand at the phase of the memory.
+    x : Array
+        Position of the hand a time |way| after, or, if way < 0, before that [m], shape (3,).
+    way : float
+        That time [s].
+    changed : Array
+        A copy of the memory, or the memory itself, for the hand at x. Updated.
+    """
+    curve = timing_curve(params, memory)
+    phase, whole = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
+    step = phase - memory[PHASE]
+    step -= whole * np.round(step / whole)
+    off = step - min(max(step, way - _EVEN * abs(way)), way + _EVEN * abs(way))
+    # Not of a clip that is held, or of a hand whose phase is not known yet.
+    if memory[STILL] == 0.0 and abs(off) > 0.0:
+        lead, _ = lead_of(params, memory, memory[PHASE])
+        half = lead - 0.5 * _share(lead, off * way > 0.0) * off
+        changed[AHEAD], changed[CAME] = lead - _share(half, off * way > 0.0) * off, phase
 
 
 @njit

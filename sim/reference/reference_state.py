@@ -5,6 +5,7 @@ from typing import NamedTuple
 from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.river_memory import even_pace
 from controllers.state import Array, IntArray
 from sim.reference.stylus_filter import turned_on
 from sim.reference.transition import Transition, carry_on
@@ -80,15 +81,42 @@ class CompiledReference(NamedTuple):
 @njit
 def look_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, one period before and after; `memory` is that of now."""
-    period, x = reference.period, reference.scratch_x
+    _look_now(reference, hand)
+    for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
+        _go(reference, hand, sign)
+        evaluate_map(
+            reference.units, reference.kind, reference.params, reference.scratch_x, reference.scratch_memory, pose
+        )
+
+
+@njit
+def look_around_in_river(reference: CompiledReference, params: Array, hand: Array) -> None:
+    """As `look_around`, of a map whose rivers play a clip each, at an even pace (`even_pace`)."""
+    _look_now(reference, hand)
+    for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
+        _go(reference, hand, sign)
+        even_pace(params, reference.memory, reference.scratch_x, sign * reference.period, reference.scratch_memory)
+        evaluate_map(
+            reference.units, reference.kind, reference.params, reference.scratch_x, reference.scratch_memory, pose
+        )
+
+
+@njit
+def _look_now(reference: CompiledReference, hand: Array) -> None:
+    """Pose of the map at the hand's position."""
+    x = reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
     evaluate_map(reference.units, reference.kind, reference.params, x, reference.memory, reference.pose)
-    for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
-        for i in range(3):
-            x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
-        x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
-        reference.scratch_memory[:] = reference.memory
-        evaluate_map(reference.units, reference.kind, reference.params, x, reference.scratch_memory, pose)
+
+
+@njit
+def _go(reference: CompiledReference, hand: Array, sign: float) -> None:
+    """Stylus pose one period before or after now, with a copy of the memory, into the scratch."""
+    period, x = reference.period, reference.scratch_x
+    for i in range(3):
+        x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+    x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
+    reference.scratch_memory[:] = reference.memory
 
 
 @njit

@@ -30,7 +30,7 @@ from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_way
 from controllers.rotations import rotate
 from controllers.state import Array
-from sim.reference.reference_state import CompiledReference, carry, look_around
+from sim.reference.reference_state import CompiledReference, carry, look_around_in_river
 from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
 from sim.reference.waiting import leaps, stands, waits_no_longer
 
@@ -52,9 +52,9 @@ def _place(reference: CompiledReference, pose: Array, x: float, y: float, turn: 
 
 
 @njit
-def _show_on(reference: CompiledReference) -> None:
+def _show_on(reference: CompiledReference, params: Array) -> None:
     """Store the poses that are shown now, one period before and one period after."""
-    look_around(reference, reference.going)
+    look_around_in_river(reference, params, reference.going)
     carry(reference)
     shown = reference.transition.shown
     shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
@@ -90,10 +90,10 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     """
     transition, period = reference.transition, reference.period
     shown, change = transition.shown, transition.change
-    look_around(reference, reference.going)
+    look_around_in_river(reference, params, reference.going)
     pose = reference.pose
     _place(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
-    look_around(reference, reference.going)
+    look_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
     set_duration(transition, 0.0, period)
     way, seconds = np.zeros(3), transition.lasts[0]
@@ -107,7 +107,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     set_duration(transition, moved, period)
     # A longer change ends at another pose: place the motion again by where it stands then.
     foot, _ = _stand_on_pivot(reference, params)
-    look_around(reference, reference.going)
+    look_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
     _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
     plan_depth(transition)
@@ -142,7 +142,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
 @njit
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Change to another river's clip, at a phase [s], by a transition from what is shown."""
-    _show_on(reference)
+    _show_on(reference, params)
     change_clip(params, reference.memory, river, phase)
     _go_over(reference, params)
 
@@ -176,7 +176,7 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
 def stop(reference: CompiledReference, params: Array) -> None:
     """Bring the playing clip to rest, at the rest phase nearest to where it would come to a stop."""
     memory, period = reference.memory, reference.period
-    _show_on(reference)
+    _show_on(reference, params)
     # Clamped to the clip's own pace: a hand that is thrown along the curve, or against it, would overshoot.
     pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
     stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))

@@ -10,6 +10,7 @@ from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.river_memory import (
     COURSE,
     changing,
+    even_pace,
     gate_passed,
     knows_change,
     lets_go,
@@ -19,7 +20,7 @@ from controllers.haptic_map.river_memory import (
 from controllers.haptic_map.sized import innermost, size_of
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
-from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
+from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around, look_around_in_river
 from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
 from sim.reference.settling import approach, lower_to_floor, lowering_goal
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
@@ -55,8 +56,10 @@ def update_river_reference(reference: CompiledReference, stylus: Array, trace: A
     _smooth(reference, stylus)
     reference.transition.since[0] += reference.period
     follow_trail(reference)
-    _play(reference, trace)
-    look_around(reference, reference.hand)
+    _, params = innermost(reference.kind, reference.params)
+    even_pace(params, reference.memory, reference.hand[0], reference.period, reference.memory)
+    _play(reference, params, trace)
+    look_around_in_river(reference, params, reference.hand)
     carry(reference)
     _differentiate(reference)
 
@@ -79,10 +82,9 @@ def _smooth(reference: CompiledReference, stylus: Array) -> None:
 
 
 @njit
-def _play(reference: CompiledReference, trace: Array) -> None:
+def _play(reference: CompiledReference, params: Array, trace: Array) -> None:
     """Begin a change to the clip of the active river, or to rest, where one is due."""
     period, river = reference.period, trace[TRACE_RIVER]
-    _, params = innermost(reference.kind, reference.params)
     # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
     over = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
