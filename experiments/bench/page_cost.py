@@ -9,7 +9,6 @@ import viser
 
 from experiments.live.session.messages import SLICE_SIDE
 from experiments.setups.session import Session
-from models.world.scene import P_WH
 from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Shown
@@ -23,7 +22,7 @@ def picture_microseconds(session: Session) -> float:
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        stage = LiveStage(server.scene, model, courses(session.static()), 0.01, P_WH)
+        stage = LiveStage(server.scene, model, courses(session.static()), 0.01)
         rng = np.random.default_rng(1)
         qpos = data.qpos[: model.nq] + 0.05 * rng.normal(size=(2, model.nq))
         pose, forces = qpos[:, -75:], rng.normal(size=(2, SLICE_SIDE**2, 3))

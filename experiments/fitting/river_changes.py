@@ -23,7 +23,7 @@ from experiments.files.array_cache import is_kept, kept_array
 from experiments.fitting.figure_legs import packed_legs
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.feasible import Feasible, contact_residual, feasible
+from models.mocap.preparation.feasible import Feasible, borne, feasible
 from models.mocap.preparation.stances import Stances, stances
 from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
@@ -198,7 +198,7 @@ def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, s
     tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not tried:
         return np.zeros((0, 57))
-    tried.sort(key=lambda passage: contact_residual(passage.clip(), passage.stances(), passage=True))
+    tried.sort(key=lambda passage: borne(passage.clip(), passage.stances(), passage=True).residual)
     made_so: list[tuple[_Passage, Feasible]] = []
     for passage in tried[:_TRIES]:
         made_so.append((passage, feasible(passage.clip(), passage.stances(), _ITERATIONS, FPS, passage=True)))

@@ -16,7 +16,6 @@ from experiments.hardware.link import link_now
 from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from models.world.scene import P_WH
 from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
@@ -46,7 +45,7 @@ def show_status(config: RunConfig, status: SharedNumbers, recorder_status: Share
     led, session = config.leads, page_session(config)
     world = session.world
     static = session.static()
-    page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH, world.kind)
+    page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), world.kind)
     linkage, parent = shown_phantom(world.model, world.data), os.getppid()
     row, twin = np.zeros(ROW_SIZE), np.zeros(RECORDER_SIZE)
     while os.getppid() == parent:

@@ -29,7 +29,7 @@ from experiments.live.panels.uploads_panel import UploadsPanel
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
 from models.errors import ModelError
-from models.world.scene import P_WH, SceneConfig
+from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from sim.viewer.courses import courses
@@ -190,7 +190,7 @@ class Page:
         kinematic = built.config.figure.kind == "kinematic"
         self.stage = LiveStage(
             self.server.scene, world.full_model(), courses(built.drawn), float(np.asarray(built.drawn["tube_radius"])),
-            P_WH, "animation h(p)" if kinematic else "physical figure",
+            "animation h(p)" if kinematic else "physical figure",
             "animation h(p)" if isinstance(built.config.map, RiverClips) else "default animation",
         )  # fmt: skip
         self._ball = HandBall(self.server.scene)

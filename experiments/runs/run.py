@@ -39,7 +39,6 @@ from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
-from models.world.scene import P_WH
 from sim.loop.clock import RealTime
 from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into, shown_configuration
 from sim.loop.memory import peak_memory_mb
@@ -181,7 +180,7 @@ def _live_page(session: Session) -> Page:
 
     static = session.static()
     radius = float(np.asarray(static["tube_radius"]))
-    return LivePage(session.world.full_model(), courses(static), radius, P_WH, session.world.kind)
+    return LivePage(session.world.full_model(), courses(static), radius, session.world.kind)
 
 
 def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:

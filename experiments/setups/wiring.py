@@ -132,7 +132,7 @@ def assemble(
         reached(curve)
     ready(_units(draft, _servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
-    refined = maps.refine() if world.has_figure else maps
+    refined = maps.refine(world.kind == "physical") if world.has_figure else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
     if isinstance(parts.user, Participant) and world.has_figure and parts.walking is None:

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 import viser
 
-from controllers.state import Array
 from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
@@ -28,8 +27,6 @@ class LivePage:
         The curves.
     radius : float
         Radius of the tube around each curve [m], 0 for none.
-    p_WH : array (3,)
-        Origin of the hand frame in the world [m].
     figure : {"physical", "kinematic", "none"}
         Kind of figure; beside a physical one the animation is shown as a ghost.
     port : int
@@ -37,7 +34,7 @@ class LivePage:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, p_WH: Array, figure: str = "physical",
+        self, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, figure: str = "physical",
         port: int = 8080,
     ):  # fmt: skip
         self._server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields")
@@ -46,7 +43,7 @@ class LivePage:
         add_view_buttons(self._server.gui)
         ghost = "animation h(p)" if figure == "physical" else ""
         name = "physical figure" if figure == "physical" else "animation h(p)"
-        self._stage = LiveStage(self._server.scene, model, drawn, radius, p_WH, name, ghost)
+        self._stage = LiveStage(self._server.scene, model, drawn, radius, name, ghost)
         self._stage.draw_slice(np.zeros((0, 3)), np.zeros((0, 3)))
         light(self._server.scene)
         open_with(self._server, lambda client: VIEWS["both"])

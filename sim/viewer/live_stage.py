@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from controllers.state import Array
+from models.world.scene import P_WH
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.framing import TRAVEL
@@ -53,17 +54,15 @@ class LiveStage:
         The curves.
     radius : float
         Radius of the tube around each curve [m], 0 for none.
-    p_WH : array (3,)
-        Origin of the hand frame in the world [m].
     figure, ghost : str
         Labels of the two; empty if there is no ghost.
     """
 
     def __init__(
-        self, scene: viser.SceneApi, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, p_WH: Array,
+        self, scene: viser.SceneApi, model: mujoco.MjModel, drawn: Sequence[Course], radius: float,
         figure: str = "physical figure", ghost: str = "default animation",
     ):  # fmt: skip
-        self._scene, self._model, self._data, self._p_WH = scene, model, mujoco.MjData(model), p_WH
+        self._scene, self._model, self._data = scene, model, mujoco.MjData(model)
         shapes = body_shapes(model, "figure/")
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "figure/root")
         self._root = int(model.jnt_qposadr[joint]) if joint >= 0 else -1
@@ -133,7 +132,7 @@ class LiveStage:
         data, shift = self._data, self._follow(shown.t, shown.qpos)
         data.qpos[:] = shown.qpos
         mujoco.mj_kinematics(self._model, data)
-        self._phantom.pose(data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
+        self._phantom.pose(data, P_WH, MAGNIFICATION, PHANTOM_AT)
         self._figure.pose(data, shift, 1.0, np.zeros(3))
         if len(shown.ghost) and self._root >= 0:
             data.qpos[self._root : self._root + len(shown.ghost)] = shown.ghost

@@ -28,6 +28,7 @@ from controllers.errors import ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array
 
+_BORNE = 0.12  # of g, as at 2.9 times its own pace: what falls more slowly is hardly a slow recording of a flight
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
@@ -118,7 +119,9 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
         verdict = "unknown"
         why = f"{falls} and rises only {100 * fit.clearance:.0f} cm: it may stand on a floor that the recording misses"
     elif not low <= likely <= high:
-        natural = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g" if fit.gravity > 0.0 else ""
+        natural = "; something bears it that the recording misses, such as a box, or the frame rate is wrong"
+        if fit.gravity > _BORNE * GRAVITY:
+            natural = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g"
         why = f"{falls}, not within {low:g} to {high:g}{natural}"
     elif fit.misfit > tolerance.misfit:
         why = f"strays {100 * fit.misfit:.1f} cm (RMS) from a parabola, more than {100 * tolerance.misfit:g}"

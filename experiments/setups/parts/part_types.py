@@ -95,7 +95,7 @@ class MapParts(Generic[Map]):
     curve : Trajectory
         φ, with the timing that the hand is to have.
     refined : callable, optional
-        Returns the map improved by what only compiled code can find, and remarks about that.
+        Returns the map improved by what only compiled code can find, and remarks on how the physical figure follows it.
     gains : FigureGains
         Gains of the physical figure.
     lap_seconds : float, optional
@@ -137,12 +137,12 @@ class MapParts(Generic[Map]):
         """The same parts with more remarks, put before the present ones."""
         return replace(self, remarks=remarks + self.remarks)
 
-    def refine(self) -> Self:
-        """The same parts with the improved map; needs compiled code."""
+    def refine(self, physical: bool) -> Self:
+        """The same parts with the improved map, and what is said of it for a physical figure; needs compiled code."""
         if self.refined is None:
             return self
         made, told = self.refined()
-        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks + told)
+        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks + (told if physical else ()))
 
 
 @dataclass(frozen=True, kw_only=True)

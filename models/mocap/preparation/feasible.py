@@ -355,8 +355,3 @@ def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     shares = np.abs(errors.share).max(axis=0)
     residual = _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
     return Borne(residual, loads, float(shares.max()), JOINTS[int(shares.argmax()) // 3])
-
-
-def contact_residual(clip: Clip, schedule: Stances, passage: bool = False) -> float:
-    """RMS residual force of a clip as it is, for a contact schedule [body weights]; `passage` as in `feasible`."""
-    return borne(clip, schedule, passage).residual

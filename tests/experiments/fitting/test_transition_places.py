@@ -62,5 +62,5 @@ def test_a_hand_that_pushes_over_where_places_are_apart_is_warned(
     far = max(angles, key=lambda angle: places_apart(made, MapTransition(0, 1, angle, 0.1, 0.1)))
     save_map(_with(made, float(far)), tmp_path / "map.npz")
     config = run_config(map=str(tmp_path / "map.npz"), mode="rivers", user=user, figure=figure, seconds=1.0)
-    remarks = map_parts(config, figure_model()).refine().remarks
+    remarks = map_parts(config, figure_model()).refine(physical=True).remarks
     assert sum("a push over carries the figure" in remark for remark in remarks) == said

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from models.world.scene import P_WH, SceneConfig, world_model
+from models.world.scene import SceneConfig, world_model
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
 from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, taken_at
@@ -20,7 +20,7 @@ NOWHERE = np.full(3, np.nan)
 
 @pytest.fixture
 def page():
-    page = LivePage(world_model(SceneConfig()), DRAWN, 0.02, P_WH, port=0)
+    page = LivePage(world_model(SceneConfig()), DRAWN, 0.02, port=0)
     yield page
     page.close()
 
@@ -97,7 +97,7 @@ def test_showing_a_state_does_not_touch_the_model_that_runs():
     before = model.qpos0.copy(), model.body_pos.copy(), model.geom_rgba.copy()
     data = mujoco.MjData(model)
     NullPage().show(moment(model))
-    page = LivePage(model, DRAWN, 0.02, P_WH, port=0)
+    page = LivePage(model, DRAWN, 0.02, port=0)
     page.show(moment(model)._replace(qpos=data.qpos + 0.1))
     page.close()
     for array, kept in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):

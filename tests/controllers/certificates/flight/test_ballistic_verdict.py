@@ -49,6 +49,15 @@ def test_what_does_not_is_refuted_with_a_take_off_that_shows_it(gravity):
     assert distance == pytest.approx(found.counterexample["distance"], abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("gravity", "said"), [(-0.5, "such as a box"), (0.4, "such as a box"), (2.0, "at 2.21 of its")]
+)
+def test_what_hardly_falls_is_said_to_be_borne_and_not_to_be_played_faster(gravity, said):
+    (flight,) = judge_flights(jump(gravity), BallisticTolerance())
+    assert flight.verdict == "refuted"
+    assert said in flight.reason
+
+
 def test_the_admissible_rates_are_those_at_which_it_would_be_certified():
     (flight,) = judge_flights(jump(11.0), BallisticTolerance())
     for rate, expected in (
