@@ -45,6 +45,7 @@ _LONGEST_WAIT = 4.0  # [s]: in clips with few strides, gates are as many as this
 _MOST = 8  # strides in a round at most
 _LONG = 8.0  # [s] after which a change that has not happened is given up
 _ROWS = 840  # samples of a round: divisible by any number of strides up to `_MOST`
+_LEAPS = 1.0  # [rad] from row to row, five times the largest of captures: a rotation vector that no spline can follow
 _REPEATS = 0.02  # [rad], [m] by which strides of one clip may differ
 
 
@@ -212,6 +213,8 @@ def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, s
     # Offsets at the end are only the lag of the stylus filter: fade them out.
     left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)
     offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
+    if np.abs(np.diff(offsets, axis=0)).max() > _LEAPS:
+        return np.zeros((0, 57))
     return np.vstack([np.full((1, 57), best.gate), offsets])
 
 
@@ -220,5 +223,5 @@ def _way(second: Array, shown: Array) -> Array:
     n = len(second)
     turns = [poses[:, 3:].reshape(n, -1, 4) for poses in (second, shown)]
     away = quaternions.rotated(quaternions.conjugate(turns[0][:, 0]), shown[:, :3] - second[:, :3])
-    between = quaternions.logarithm(quaternions.product(quaternions.conjugate(turns[0]), turns[1]))
+    between = quaternions.continuous_logarithm(quaternions.product(quaternions.conjugate(turns[0]), turns[1]))
     return np.hstack([away, between.reshape(n, -1)])

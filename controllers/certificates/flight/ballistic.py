@@ -30,6 +30,7 @@ from controllers.state import Array
 
 _BORNE = 0.12  # of g, as at 2.9 times its own pace: what falls more slowly is hardly a slow recording of a flight
 
+
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
     """Data of a motion of n frames for the certificate.

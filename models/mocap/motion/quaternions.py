@@ -64,7 +64,19 @@ def arcs(u: Array, v: Array) -> Array:
 
 def logarithm(q: Array) -> Array:
     """Rotation vectors [rad] of the shortest rotation, shape (..., 3)."""
-    q = np.where(q[..., :1] < 0.0, -q, q)
+    return _vectors(np.where(q[..., :1] < 0.0, -q, q))
+
+
+def continuous_logarithm(q: Array) -> Array:
+    """Rotation vectors [rad] of rotations over time (axis 0), continuous where they pass π; the last is the shortest.
+
+    Where they pass 2π, about changing axes, no rotation vector is continuous.
+    """
+    return _vectors(sign_continuous(q[::-1])[::-1])
+
+
+def _vectors(q: Array) -> Array:
+    """Rotation vectors [rad], of angles from 0 to 2π."""
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     # Near zero, s is half the angle to first order, so the ratio of angle to s is 2.
     scale = np.where(s > 1e-12, 2.0 * np.arctan2(s, q[..., :1]) / np.maximum(s, 1e-12), 2.0)

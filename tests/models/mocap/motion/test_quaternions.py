@@ -20,3 +20,12 @@ def _turned(v, by):
     shortest = (Rotation.from_rotvec(v) * Rotation.from_rotvec(by)).as_rotvec()
     longer = (1.0 - 2.0 * np.pi / np.linalg.norm(shortest)) * shortest
     return min(shortest, longer, key=lambda vector: np.linalg.norm(vector - v))
+
+
+def test_rotation_vectors_of_a_turn_that_passes_half_a_turn_do_not_leap() -> None:
+    axis = np.array([0.48, -0.6, 0.64])
+    angles = np.linspace(1.8 * np.pi, 0.0, 90)
+    # As quaternions of either sign.
+    turn = quaternions.exponential(angles[:, None] * axis) * np.where(np.arange(90) % 7 < 3, -1.0, 1.0)[:, None]
+    np.testing.assert_allclose(quaternions.continuous_logarithm(turn), angles[:, None] * axis, atol=1e-12)
+    assert np.abs(np.diff(quaternions.logarithm(turn), axis=0)).max() > 3.0
