@@ -89,7 +89,8 @@ class RiverClips(AnimationMap):
     (of several branches, of the one that continues). A round of m laps of the river is a lap of its clip, and k the lap
     of the round that the hand is in: it is told by continuity, and k = 0 at first. A hand without an active
     river that is outside the tube of the last one, or too fast in it, plays no frame: the reference stops at a phase at
-    which the clip can stand (`stop_clip`).
+    which the clip can stand (`stop_clip`). The phase that is shown leads or lags behind the hand's after a change of
+    river, and while a hand goes faster than its river (`river_memory.even_pace`).
 
     Clips are aligned in time to the first (`alignment`), so that a change keeps about the same phase of motion. A ∈
     SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h jumps, and the reference goes
