@@ -3,6 +3,7 @@
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -64,6 +65,11 @@ def embedded(name: str) -> Clip:
     """
     if name not in embedded_names():
         raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}")
+    return replace(_read_once(name))
+
+
+@lru_cache
+def _read_once(name: str) -> Clip:
     with as_file(_CLIPS / f"{name}.bvh") as path:
         return load_clip(path)
 
