@@ -103,7 +103,13 @@ class Demand(NamedTuple):
 
     def torque_on(self, grip: Array) -> Array:
         """τ − Jᵀ f: joint torques under contact forces `grip` (m, 4k) [N], shape (m, 51) [N m]."""
-        return self.torque - np.einsum("mte,me->mt", self.levers(), grip)
+        m, k = self.spheres.shape[:2]
+        soles, forces = self.spheres - (0.0, 0.0, CONTACT_RADIUS), grip.reshape(m, k, 4) @ EDGES
+        torque = self.torque.copy()
+        for joint, (body, mine) in enumerate(carriers(k)):
+            moment = np.cross(soles[:, mine] - self.anchors[:, joint, None], forces[:, mine]).sum(axis=1)
+            torque[:, 3 * (body - 1) : 3 * body] -= np.einsum("mij,mi->mj", self.frames[:, joint], moment)
+        return torque
 
 
 class Floor:
@@ -130,8 +136,14 @@ class Floor:
         m, k, c, d = len(q), len(self._geoms), len(self._bodies), self._data
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, k, 3)), np.empty((m, 3))
         anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 9))
+        moves = np.any(q[1:] != q[:-1], axis=1)  # states of one pose in a row share what depends on it alone
         for i in range(m):
             d.qpos[:], d.qvel[:], d.qacc[:] = q[i], v[i], a[i]
+            if i > 0 and not moves[i - 1]:
+                mujoco.mj_inverseSkip(self._model, d, mujoco.mjtStage.mjSTAGE_POS, 1)
+                force[i], spheres[i], com[i] = d.qfrc_inverse, spheres[i - 1], com[i - 1]
+                anchors[i], frames[i], root[i] = anchors[i - 1], frames[i - 1], root[i - 1]
+                continue
             mujoco.mj_inverse(self._model, d)
             force[i], spheres[i], com[i] = d.qfrc_inverse, d.geom_xpos[self._geoms], d.subtree_com[1]
             anchors[i], frames[i], root[i] = d.xpos[self._bodies], d.xmat[self._bodies], d.xmat[1]
