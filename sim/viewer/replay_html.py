@@ -84,7 +84,8 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
     with contextlib.redirect_stdout(quiet):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        page = _Stage(server.scene, recording, model, target).play(server)
+        with server.atomic():  # no browser is connected: waking the server for each message takes as long as the rest
+            page = _Stage(server.scene, recording, model, target).play(server)
     finally:
         with contextlib.redirect_stdout(quiet):
             server.stop()
