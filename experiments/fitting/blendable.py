@@ -84,16 +84,17 @@ def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
-def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int = 1) -> tuple[str, ...]:
+def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int, timing: int) -> tuple[str, ...]:
     """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `in_step`.
 
-    `laps` is the number of laps in a round, in which each loop is played once.
+    `laps` is the number of laps in a round, in which each loop is played once; `timing` the index of the clip whose
+    pace an advised lap keeps.
     """
     paces = {clip.name: loop.duration / (laps * lap) for clip, loop in zip(clips, loops, strict=True)}
     off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
     if not off:
         return ()
-    best = natural_lap(led_by(grounded(clips), closed_loops(clips)))
+    best = natural_lap(led_by(timing, closed_loops(clips)))
     better = f"--lap {best:.1f} suits them best" if abs(best / lap - 1.0) > _SAME else "no lap suits them all better"
     played = f"a lap of {lap:.1f} s plays" if laps == 1 else f"{laps} laps of {lap:.1f} s play"
     return (f"{played} {', '.join(off)} times its own pace; {better}",)

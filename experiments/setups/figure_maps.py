@@ -166,7 +166,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
         return carried(lambda _: only, [clips[0].name], lap)
 
-    return replace(_about_circle(place, made, clips), refined=refined)
+    return replace(_about_circle(place, made, clips, timing=0), refined=refined)
 
 
 def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:
@@ -280,10 +280,12 @@ MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
 """Functions that make the map's parts, by kind of map."""
 
 
-def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> ClipMapParts:
+def _about_circle(
+    place: Place, made: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None
+) -> ClipMapParts:  # fmt: skip
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
-    off = off_pace(played, made.loops, curve.duration, made.laps)
+    off = off_pace(played, made.loops, curve.duration, made.laps, grounded(clips) if timing is None else timing)
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),

@@ -107,6 +107,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    timing = 0 if kind == "composite" else grounded(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
     with TemporaryDirectory() as made:
@@ -115,7 +116,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
-            lap = natural_lap(led_by(grounded(clips), loops))
+            lap = natural_lap(led_by(timing, loops))
             if kind == "rivers":
                 lap /= np.ceil(lap / LONGEST_LAP)
             words = dict[str, Any](map=kind, clips=names, lap=lap)
@@ -136,7 +137,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
         "share": getattr(session.parts.maps.haptic_map, "share", None),
         "remarks": session.remarks, "fell": fell,
-        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps),
+        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing),
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,

@@ -84,8 +84,8 @@ def test_the_lap_of_a_run_is_not_advised_to_it() -> None:
     clips = embedded("angry"), embedded("jump")
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
     lap = natural_lap(loops)
-    assert off_pace(clips, in_step(loops, 1.1 * lap), 1.1 * lap)[0].endswith(f"; --lap {lap:.1f} suits them best")
-    assert off_pace(clips, in_step(loops, lap), lap)[0].endswith("; no lap suits them all better")
+    assert off_pace(clips, in_step(loops, 1.1 * lap), 1.1 * lap, 1, 0)[0].endswith(f"; --lap {lap:.1f} suits them best")
+    assert off_pace(clips, in_step(loops, lap), lap, 1, 0)[0].endswith("; no lap suits them all better")
 
 
 def test_one_lap_is_advised_to_a_run() -> None:
@@ -120,3 +120,10 @@ def test_a_round_of_two_laps_bounds_the_hand_as_one_does_in_half_of_the_lap_each
         shares.append(np.mean(speeds[:, 0] > 0.0))
     # The flight lasts as long, of a lap half as long.
     assert shares[1] == pytest.approx(2.0 * shares[0], rel=0.05)
+
+
+@pytest.mark.parametrize(("kind", "lap"), [("composite", 4.8), ("cylindrical", 4.0)])
+def test_the_advised_lap_keeps_the_pace_of_the_clip_whose_legs_play(kind: str, lap: float) -> None:
+    """Two jumps of 2.4 s: a composite has the legs of its first clip, a cylinder those of one that does not fly."""
+    config = run_config(map=kind, figure="none", clips=("jump", "ginga", "angry"), lap=1.4, seconds=1.0)
+    assert any(f"--lap {lap:.1f} suits them best" in remark for remark in map_parts(config, figure_model()).remarks)
