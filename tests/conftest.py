@@ -12,6 +12,7 @@ from typing import Any
 from experiments.console import startup  # noqa: F401 - before NumPy is imported
 
 # isort: split
+import pytest
 from hypothesis import settings
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
@@ -64,3 +65,9 @@ def _compile_or_load(self: Any, signature: Any) -> Any:
 
 
 Dispatcher.compile = _compile_or_load
+
+
+@pytest.fixture
+def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run writes neither figures nor a page, which take longer than the run: for tests of what it does."""
+    monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)

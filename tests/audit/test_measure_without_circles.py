@@ -61,6 +61,7 @@ def test_a_figure_that_lost_the_floor_is_not_in_flight_unless_its_reference_is()
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_page")
 def test_grounded_of_a_run_is_what_an_independent_count_of_stance_and_contact_gives(tmp_path: Path) -> None:
     summary = run(run_config(clips=("run",), lap=2.2, seconds=4.0), tmp_path / "run", False, 0.0)
     with Recording(tmp_path / "run" / "run.h5") as recording:

@@ -65,6 +65,7 @@ def test_a_force_made_of_rounded_readings_is_felt_and_no_oscillation():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(
     ("gains", "said"),  # 8217 N/m and 61 N s/m are critical
     [

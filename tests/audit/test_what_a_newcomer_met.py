@@ -180,6 +180,7 @@ def _words(chance: random.Random, command: str, n: int) -> list[str]:
     return words
 
 
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(
     ("seed", "lines"), [(0, 40), *(pytest.param(seed, 60, marks=pytest.mark.slow) for seed in (1, 2, 3))]
 )
@@ -188,7 +189,6 @@ def test_no_command_line_ends_in_a_traceback(
 ) -> None:
     """Random options with random values: what runs is of one tick, without a figure and a page."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)
     for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify", "arm"):
         monkeypatch.setattr(command_class(name), "__call__", lambda self: 0)  # what is typed is read, and no more
     chance = random.Random(seed)

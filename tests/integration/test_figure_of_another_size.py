@@ -50,6 +50,7 @@ def test_a_led_figure_has_strides_of_its_size() -> None:
     assert small.pose(start)[2] == pytest.approx(SIZE * default.pose(start)[2], abs=1e-3)
 
 
+@pytest.mark.usefixtures("without_page")
 def test_files_have_the_bones_of_the_figure_and_are_read_as_the_same_motion(tmp_path: Path) -> None:
     poses = []
     for stature in (1.75, SMALL):

@@ -79,6 +79,7 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
 
 # What is prepared rounds by the kernels of OpenBLAS: xia has 0.138 with Zen's and 0.142 with Nehalem's; with these
 # 02_01 has 0.043, 02_03 0.089 and snu's run 0.086.
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(
     ("file", "residual"),
     [
@@ -99,6 +100,7 @@ def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, 
     assert summary["figure"]["residual_force_rms"] < residual
 
 
+@pytest.mark.usefixtures("without_page")
 def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")

@@ -32,6 +32,7 @@ def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
     assert main(["lift", *CLIPS, "--out", str(map_file)]) == 2
 
 
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("curve", "seconds"), [("walk", 2.2), ("run", 2.2), ("jump", 2.4)])
 def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
@@ -49,6 +50,7 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
     assert summary["figure"]["residual_in_flight_max"] == 0.0
 
 
+@pytest.mark.usefixtures("without_page")
 def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
     residuals, furthest = [], []
     for seed in (1, 2, 3):
@@ -74,6 +76,7 @@ def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file
         assert recording.channel("ticks", "distance")[:].max() < 1e-3
 
 
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("first", "second"), [("walk", "run"), ("run", "walk")])
 def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_run_or_falls_into_a_walk(
     map_file: Path, tmp_path: Path, first: str, second: str
