@@ -17,6 +17,7 @@ from hypothesis import settings
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
+from sim.compilation import kept_call
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache
 from sim.compilation.unit_key import UnknownIngredient, UnknownName
@@ -35,14 +36,19 @@ class _BesideUnits(UnitCache):
 
 
 class _Kept(NullCache):
-    """Keeps a kernel where a key can be made of it; no `UnitCache` itself, so nobody takes the kernel for a unit."""
+    """Keeps a kernel where a key can be made of it; no `UnitCache` itself, so nobody takes the kernel for a unit.
+
+    One that a run has compiled as a unit is loaded as such.
+    """
 
     def __init__(self, kernel: Dispatcher):
+        self._units = UnitCache(kernel.py_func, kernel.targetoptions)
         self._kernels = _BesideUnits(kernel.py_func, kernel.targetoptions)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return self._kernels.load_overload(sig, target_context)
+            found = self._units.load_overload(sig, target_context)
+            return self._kernels.load_overload(sig, target_context) if found is None else found
         except (UnknownIngredient, UnknownName):
             return None
 
@@ -59,7 +65,7 @@ _compile = Dispatcher.compile
 
 
 def _compile_or_load(self: Any, signature: Any) -> Any:
-    if type(self._cache) is NullCache and not is_nested():
+    if type(self._cache) is NullCache and not is_nested() and self.py_func.__module__ != kept_call.__name__:
         self._cache = _Kept(self)
     return _compile(self, signature)
 

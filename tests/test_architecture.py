@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("models", "controllers", "sim", "experiments")
 
 
+@cache
 def imports() -> dict[str, set[str]]:
     """Files of the packages by path, and what each imports of them, also within functions."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")] + [ROOT / "hvf.py"]

@@ -52,6 +52,7 @@ def test_every_mode_that_is_benched_steps_once_a_tick_and_has_its_figure_at_500_
     assert config.figure.kind == "physical"
 
 
+@pytest.mark.slow
 def test_what_draws_is_not_imported_before_the_first_tick() -> None:
     late = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
     code = (

@@ -158,6 +158,7 @@ def test_an_axis_that_points_down_is_the_value_of_its_option(command: str) -> No
     assert parsed([command, "--up=-Z", "in.bvh", "out.bvh"]).up == "-Z"
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None:
     from models.mocap.library import embedded
     from models.mocap.readers.own_bvh import write_bvh

@@ -38,6 +38,7 @@ def test_what_is_unstable_is_red_at_once_and_says_why():
     assert "#c02020" in shown
 
 
+@pytest.mark.slow
 def test_what_there_is_no_certificate_for_is_unknown_and_says_why():
     for words, said in (
         ({"mode": "lead"}, "led"),

@@ -77,6 +77,7 @@ def test_between_two_passes_of_a_curve_it_leaps_to_the_nearer_one_at_the_middle(
     assert curve.point(guess)[1] == pytest.approx(0.01, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_all_three_extrema_of_one_piece_are_considered():
     # One hairpin piece: near its axis the distance has two minima with a maximum between.
     curve = Trajectory([0.0, 1.0, 2.0], [[-0.01, 0.0, 0.0], [0.0, 0.05, 0.0], [0.01, 0.0, 0.0]])

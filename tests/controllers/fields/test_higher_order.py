@@ -90,6 +90,7 @@ def _reference(rivers, p, v, admission, sigma):
     return force / (null + total)
 
 
+@pytest.mark.slow
 def test_the_smooth_field_is_its_formula():
     rng = np.random.default_rng(1)
     rivers = (straight_river(0.0), straight_river(40.0), River(Trajectory.circle(0.05, 4.0), 0.03, 0.02, 3.0))

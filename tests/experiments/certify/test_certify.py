@@ -36,6 +36,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_the_demos_river_is_certified_and_told(folder):
     held = json.loads((folder / CERTIFICATE).read_text())
     assert held["stability"]["verdict"] == "certified"
@@ -47,6 +48,7 @@ def test_the_demos_river_is_certified_and_told(folder):
     assert (folder / PLOT).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
     before, begin = (folder / CERTIFICATE).stat().st_mtime_ns, time.perf_counter()
     again = certify_into(run_config(seconds=3.0, seed=9), folder, hands=HANDS)
@@ -55,6 +57,7 @@ def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
     assert again.verdicts["stability"].verdict == "certified"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -75,6 +78,7 @@ def test_a_certificate_is_of_one_field_only(folder, change, said):
         verify_certificate(file, certificate_inputs(run_config(**change), 0.0, HANDS, 1.0))
 
 
+@pytest.mark.slow
 def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
     file = folder / CERTIFICATE
     with pytest.raises(CertificateError, match="changed: delay;"):
@@ -83,6 +87,7 @@ def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
         verify_certificate(file, certificate_inputs(run_config(), 0.0, HandRange(), 2.0))
 
 
+@pytest.mark.slow
 def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
     file = folder / CERTIFICATE
     heavier = replace(certified_field.PREMIUM_1_5, m_a=0.021)
@@ -95,6 +100,7 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
         verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
 
 
+@pytest.mark.slow
 def test_the_command_verifies_without_casadi_or_splines_and_says_what_changed(folder, capsys):
     file = str(folder / CERTIFICATE)
     hands = ["--hand.mass", "0.1", "0.1", "--hand.damping", "2", "2", "--hand.stiffness", "0", "0"]

@@ -68,6 +68,7 @@ def test_only_what_is_missing_is_compiled(toys):
     assert done == [toys[1]]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compiled_is_left_to_the_run(toys):
     done: list[Unit] = []
     wrong = Unit(toys[0].module, "other", (types.float64, types.float64))

@@ -23,6 +23,7 @@ print(*(name for name in {HEAVY} if name in sys.modules))
 _COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
 
 
+@pytest.mark.slow
 def test_what_a_run_does_not_need_is_not_imported_before_it() -> None:
     assert not process(_IMPORTS).stdout.split()
 

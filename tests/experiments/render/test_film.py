@@ -94,7 +94,9 @@ def write_run(folder: Path, told: Told) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("kind", [pytest.param("physical", marks=pytest.mark.slow), "kinematic", "none"])
+@pytest.mark.parametrize(
+    "kind", [*(pytest.param(kind, marks=pytest.mark.slow) for kind in ("physical", "kinematic")), "none"]
+)
 def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, backend: str) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"

@@ -115,6 +115,7 @@ def test_a_loaded_capture_is_prepared_as_on_the_way_into_a_run(
         hvf.load(capture)
 
 
+@pytest.mark.slow
 def test_a_prepared_file_is_its_clip_its_measures_and_a_line(capture: Path, tmp_path: Path) -> None:
     made = hvf.prepare(capture, tmp_path / "ready.bvh")
     assert "well-formed" in str(made)

@@ -86,6 +86,7 @@ def test_who_resists_stays_and_then_goes_on() -> None:
     assert angle_gone(found, 4.0, 6.0) > 0.25
 
 
+@pytest.mark.slow
 def test_who_gets_lost_leaves_the_curve_and_comes_back() -> None:
     found = [done(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0, seed=seed) for seed in (3, 4, 5)]
     assert min(np.max(within(one, "distance", 1.5, 3.5)) for one in found) > 8e-3

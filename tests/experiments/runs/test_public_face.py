@@ -39,6 +39,7 @@ def test_every_name_that_is_promised_is_there() -> None:
     assert hvf.__version__
 
 
+@pytest.mark.slow
 def test_importing_the_face_starts_no_viewer_and_no_plots() -> None:
     script = "import sys, hvf; sys.exit(any(name in sys.modules for name in ('viser', 'matplotlib.pyplot')))"
     root = Path(__file__).resolve().parents[3]

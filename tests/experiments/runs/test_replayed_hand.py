@@ -112,6 +112,7 @@ def test_a_refused_run_leaves_its_folder_as_it_was(recorded: hvf.Run, tmp_path: 
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_configured_replay_is_reproduced_while_the_recorded_hand_is_found_as_it_was(
     recorded: hvf.Run, tmp_path: Path
 ) -> None:

@@ -20,6 +20,7 @@ def _angle(out: Path, flow: Literal["curve", "parallel"], user: Literal["push", 
     return np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_page")
 def test_a_hand_that_is_pushed_off_keeps_its_angle_in_a_parallel_flow_and_falls_behind_in_the_papers(
     tmp_path: Path,

@@ -13,7 +13,7 @@ from experiments.studies.user_laws.report import STUDIES, TABLE, user_laws
 PANELS = (1001, 1002, 1003)
 """Seeds of populations; numbers of people were chosen on those of seeds 1 to 6, 101, 201 and 202."""
 PEOPLE = 6
-HARDLY_VARY = ("tremor", "step-response", "grip", "practice", "endurance")
+HARDLY_VARY = ("power-law", "tremor", "step-response", "grip", "practice", "endurance")
 """Laws of which one panel of three tells as much as three of six, that take four times as long."""
 
 

@@ -58,6 +58,7 @@ def test_another_version_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch):
     assert not install()
 
 
+@pytest.mark.slow
 def test_a_unit_has_no_undefined_symbol_and_its_parts_are_not_emitted():
     result = njit(_all_of_it.py_func).get_compile_result(types.void(VECTOR, VECTOR))
     assert isinstance(result.library, UnitLibrary)

@@ -77,6 +77,7 @@ def test_velocity_and_acceleration_are_those_of_the_motion_that_is_shown(walk: R
     assert np.abs(away[pushed]).max() < 0.3  # [m/s²]
 
 
+@pytest.mark.slow
 def test_a_hand_that_goes_on_faster_is_followed_with_a_lag_and_one_that_stops_at_once(walk: RiverClips) -> None:
     t = np.arange(round(6.0 / PERIOD)) * PERIOD
     fast = _played(walk, np.where(t < 1.0, t, 1.0 + 1.3 * (t - 1.0)))

@@ -264,6 +264,7 @@ def test_the_faster_a_curve_is_gone_round_the_less_it_bends():
     assert bends[2] < 0.1 * bends[0]
 
 
+@pytest.mark.slow
 def test_many_clips_are_kept_apart():
     many = [motion(swinging(k, amplitude=0.2 + 0.05 * k), f"{k}") for k in range(12)]
     found = lifted_at(many)

@@ -246,6 +246,7 @@ def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
         assert full.get_legend() is None
 
 
+@pytest.mark.slow
 def test_no_display_is_needed(tmp_path):
     record(tmp_path / "run.h5").close()
     script = (

@@ -29,6 +29,7 @@ def frame(effect: float, users: int = 16, seed: int = 1, between: bool = False):
     return pd.DataFrame(rows)
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_there_is_found_with_its_size_and_one_that_is_not_is_not() -> None:
     found = statistics(frame(-1.0), FACTORS, (), ["tracking_error", "effort"], seed=3)
     (river,) = found.of("tracking_error", "guidance")

@@ -339,6 +339,7 @@ def long_walk(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_part_of_a_long_file_can_be_prepared(long_walk):
     made = prepared(long_walk, "10:12.2")
     assert made.captured.duration > 120.0
@@ -352,6 +353,7 @@ def test_the_whole_of_a_long_file_is_refused(long_walk):
         prepared(long_walk, "open")
 
 
+@pytest.mark.slow
 def test_what_a_file_lacks_is_said_in_the_terminal(tmp_path, capsys):
     walk = embedded("walk")
     write_rig(Rig(without=("clavicle",), leading=1), Clip(walk.poses[::4], walk.fps / 4, "walk"), tmp_path / "r.bvh")

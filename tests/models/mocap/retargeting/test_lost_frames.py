@@ -45,18 +45,20 @@ def largest_angle(ours, theirs):
                                      axis=2).max())  # fmt: skip
 
 
-@pytest.mark.parametrize("held", [1, 2])
 @pytest.mark.parametrize("fps", RATES)
 @pytest.mark.parametrize("name", LIVELY)
-def test_a_rest_pose_before_a_fast_motion_is_left_out(name, fps, held, tmp_path):
+def test_a_rest_pose_before_a_fast_motion_is_left_out(name, fps, tmp_path):
     """Zero rotations, whatever the pose is."""
     clip = at_rate(name, fps)
     for zero in ("T", "A", "random", "legs up"):
         write_rig(Rig(zero=zero), clip, tmp_path / "plain.bvh")
-        write_rig(Rig(zero=zero, leading=held), clip, tmp_path / "led.bvh")
-        plain, (led, report, _) = load(tmp_path / "plain.bvh", UP), load(tmp_path / "led.bvh", UP)
-        assert (plain.report.dropped, report.dropped) == (0, held)
-        np.testing.assert_allclose(led.poses, plain.clip.poses, atol=1e-9)
+        plain = load(tmp_path / "plain.bvh", UP)
+        assert plain.report.dropped == 0
+        for held in (1, 2):
+            write_rig(Rig(zero=zero, leading=held), clip, tmp_path / "led.bvh")
+            led, report, _ = load(tmp_path / "led.bvh", UP)
+            assert report.dropped == held
+            np.testing.assert_allclose(led.poses, plain.clip.poses, atol=1e-9)
 
 
 @pytest.mark.parametrize("drop", [0.0, 45.0], ids=["T", "A"])
@@ -118,6 +120,7 @@ def test_a_motion_that_goes_out_from_its_rest_pose_keeps_it(tmp_path):
     assert load(tmp_path / "r.bvh").report.dropped == 0
 
 
+@pytest.mark.slow
 def test_only_the_rest_poses_of_captures_are_left_out(mocap):
     dropped = {}
     for path in sorted((*mocap.rglob("*.bvh"), *mocap.glob("cmu_amc/*.amc"), *mocap.glob("deepmimic/*_[a-z]*.txt"))):
