@@ -1,4 +1,7 @@
-"""Repair of frames that a capture has lost: where a joint jumps away and, within a tenth of a second, jumps back."""
+"""Repair of frames that a capture has lost: where a joint jumps away and, within a tenth of a second, jumps back.
+
+At the end of a file, where nothing comes back, one frame that jumps away is left out.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -42,22 +45,27 @@ class Repaired(NamedTuple):
     jumps : tuple of int
         Frames after which the whole pose or its place jumps nevertheless: a calibration pose in front, a longer gap, or
         a cut between two takes.
+    shortened : bool
+        Whether the last frame is left out.
     """
 
     motion: SourceMotion
     frames: tuple[int, ...]
     jumps: tuple[int, ...]
+    shortened: bool
 
 
-def repaired(motion: SourceMotion, roles: Roles) -> Repaired:
+def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
     """Interpolate short gaps whose neighbours agree with each other but not with the frames between.
 
     Both jumps of a gap are large beside the usual steps of a joint, and the step across it is a small part of them: no
     joint turns so far in a frame and back within `_LONGEST`. Joints that no segment of the figure follows do not count.
+    The last step of a motion is large beside the usual ones only where the last frame is broken; it stays if it is
+    `rest`, a frame that is stated to show the rest pose.
     """
     broken = np.zeros(motion.n_frames, dtype=bool)
     if motion.n_frames < FEWEST:
-        return Repaired(motion, (), ())
+        return Repaired(motion, (), (), False)
     used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
     pelvis = ancestry(roles.segments["pelvis"], motion.parents)
     thigh = float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
@@ -68,24 +76,30 @@ def repaired(motion: SourceMotion, roles: Roles) -> Repaired:
         # Programs write zeros for a frame without data.
         broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
     motion = _interpolated(motion, broken)
+
+    def tracked() -> tuple[_Track, ...]:
+        root = motion.translations[:, pelvis].sum(axis=1, keepdims=True)
+        return (_Track(motion.rotations[:, used], _TURN, _angles, _turned_off),
+                _Track(root, _WAY * thigh, _ways, _moved_off))  # fmt: skip
+
     # Shorter gaps first: between two of them, the frames that are right would look like a gap.
     tracks: tuple[_Track, ...] = ()
     for length in range(1, longest + 1):
-        if not tracks:
-            root = motion.translations[:, pelvis].sum(axis=1, keepdims=True)
-            tracks = (_Track(motion.rotations[:, used], _TURN, _angles, _turned_off),
-                      _Track(root, _WAY * thigh, _ways, _moved_off))  # fmt: skip
+        tracks = tracks or tracked()
         found = np.concatenate([track.gaps(length) for track in tracks])
         for k in found:
             broken[k + 1 : k + 1 + length] = True
         if len(found):
             motion, tracks = _interpolated(motion, broken), ()
+    shortened = rest != motion.n_frames - 1 and any(track.ends_off() for track in tracks or tracked())
+    if shortened:
+        motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
     steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
     left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
     lost = motion.at_rest(used)
     left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
     left |= _cuts(motion.translations[:, pelvis].sum(axis=1), _WAY * thigh)
-    return Repaired(motion, _indices(broken), _indices(left))
+    return Repaired(motion, _indices(broken), _indices(left), shortened)
 
 
 class _Track:
@@ -107,6 +121,11 @@ class _Track:
         self.values, self.least, self.apart, self.off = values, least, apart, off
         self.steps = apart(values[:-1], values[1:])
         self.limits = _limits(self.steps, 2)
+
+    def ends_off(self) -> bool:
+        """Whether the last step is large beside the usual ones and the one before it, which a fast start is not."""
+        least = np.maximum(np.maximum(self.limits, self.least), _TIMES * self.steps[-2])
+        return bool(np.any(self.steps[-1] > least))
 
     def gaps(self, length: int) -> npt.NDArray[np.intp]:
         """Frames before the gaps of a length."""

@@ -66,7 +66,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     """
     rest = hints.rest_frame
     _check_channels(motion, rest)
-    motion, broken, jumps = repaired(motion, roles)
+    motion, broken, jumps, shortened = repaired(motion, roles, rest)
     frames = _frames(motion, roles, rest)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
@@ -89,6 +89,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
     remarks = (
         *frame_remarks(broken, jumps, motion.fps, motion.timed),
+        *(["the last frame did not belong to the motion before it: left out"] if shortened else ()),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, roles),

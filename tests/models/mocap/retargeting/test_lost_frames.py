@@ -106,7 +106,19 @@ def test_a_motion_that_begins_anywhere_keeps_its_frames(name, tmp_path):
             part = replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept])
             assert leading(part, roles) == 0, (every, first)
             found = repaired(replace(part, fps=motion.fps / every), roles)
-            assert (found.frames, found.jumps) == ((), ()), (every, first)
+            assert found[1:] == ((), (), False), (every, first)
+
+
+@pytest.mark.parametrize("name", embedded_names())
+def test_a_motion_that_ends_anywhere_keeps_its_last_frame(name, tmp_path):
+    write_rig(Rig(), embedded(name), tmp_path / "r.bvh")
+    motion = read_motion(tmp_path / "r.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    for every in {1, round(motion.fps / 30), round(motion.fps / 20)}:
+        for last in range(12 * every, motion.n_frames, max(1, motion.n_frames // 40)):
+            kept = slice(None, last, every)
+            part = replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept])
+            assert not repaired(replace(part, fps=motion.fps / every), roles).shortened, (every, last)
 
 
 def test_a_motion_that_goes_out_from_its_rest_pose_keeps_it(tmp_path):
@@ -176,6 +188,21 @@ def test_a_joint_that_flips_for_a_frame_is_interpolated(walked, degrees):
     clip, report, _ = loaded(popped)
     assert largest_angle(clip, loaded(table).clip) < 5.0
     assert any(line.startswith("frame 17 (0.57 s) did not belong") for line in report.remarks)
+
+
+@pytest.mark.parametrize("columns", [slice(30, 33), slice(0, 3), slice(0, None)], ids=["joint", "root", "all"])
+def test_a_last_frame_that_jumps_away_is_left_out(walked, columns):
+    table, loaded = walked
+    popped = table.copy()
+    popped[-1, columns] += 120.0
+    clip, report, _ = loaded(popped)
+    whole = loaded(table).clip
+    assert clip.n_frames == whole.n_frames - 1
+    assert largest_angle(clip, Clip(whole.poses[:-1], whole.fps, "walk")) < 1.0
+    assert [line for line in report.remarks if "frame" in line] == [
+        "the last frame did not belong to the motion before it: left out"
+    ]
+    assert not any("last frame" in line for line in loaded(table).report.remarks)
 
 
 def test_a_root_that_is_elsewhere_for_a_frame_is_interpolated(walked):
