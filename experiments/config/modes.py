@@ -70,7 +70,7 @@ class Follow:
         ε, beyond which the field ends [m].
     flow : {"curve", "parallel"}
         Off the curve, the curve's velocity; or that of its parallel, with which a hand that is pushed off keeps the
-        curve's pace.
+        curve's pace, by default on composites and maps from a file.
     orientation, governor, walls
         What is added, if anything.
     """

@@ -6,7 +6,7 @@ Imports only configurations, since certificates import it too.
 from collections.abc import Mapping
 from dataclasses import replace
 
-from experiments.config.maps import MapFile
+from experiments.config.maps import Composite, MapFile
 from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 
@@ -17,7 +17,8 @@ _RIVERS, _FILE_RIVERS = {"stiffness": 150.0, "damping": 16.0}, {"stiffness": 50.
 # file the seeking spring is as soft as the rivers there: the figure follows every movement of the hand, and
 # neighbouring curves hold different motions.
 _TUBE, _FILE_TUBE = {"seek": 150.0, "tube_damping": 14.0}, {"seek": 50.0, "tube_damping": 20.0}
-# On a map from a file a hand that is pushed is among other clips, and flights bear no change of pace as well.
+# On a map from a file a hand that is pushed is among other clips, and flights bear no change of pace as well. On a
+# composite a push is to change the upper body alone: its legs bear no other pace either.
 _CURVE, _PARALLEL = {"flow": "curve"}, {"flow": "parallel"}
 
 _Values = Mapping[type, Mapping[str, float | str]]
@@ -28,6 +29,8 @@ _ON_A_FILE: _Values = {Follow: _PARALLEL, Rivers: _FILE_RIVERS, Stretch: _FILE_T
 def resolved(config: RunConfig) -> RunConfig:
     """A configuration with the gains and the flow that it leaves open filled in."""
     values = (_ON_A_FILE if isinstance(config.map, MapFile) else _ABOUT_A_CIRCLE).get(type(config.mode), {})
+    if isinstance(config.map, Composite) and isinstance(config.mode, Follow):
+        values = _PARALLEL
     left = {name: value for name, value in values.items() if getattr(config.mode, name) is None}
     return replace(config, mode=replace(config.mode, **left))
 

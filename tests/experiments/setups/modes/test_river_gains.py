@@ -68,10 +68,12 @@ def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
         assert river_time(mode) == pytest.approx(expected[1] / expected[0])
 
 
-def test_follow_keeps_a_pushed_hand_s_pace_on_a_map_from_a_file_and_else_flows_as_in_the_paper() -> None:
+def test_follow_keeps_a_pushed_hand_s_pace_on_composites_and_maps_from_a_file_and_else_flows_as_in_the_paper() -> None:
     assert resolved(run_config("follow", "any.npz")).mode == FollowMode(flow="parallel")
     assert resolved(run_config("follow", "any.npz", flow="curve")).mode == FollowMode(flow="curve")
     assert resolved(run_config("follow")).mode == FollowMode(flow="curve")
+    assert resolved(run_config("follow", "composite")).mode == FollowMode(flow="parallel")
+    assert resolved(run_config("follow", "composite", flow="curve")).mode == FollowMode(flow="curve")
 
 
 def test_the_default_push_takes_the_hand_from_the_level_river_into_another_which_keeps_it() -> None:
