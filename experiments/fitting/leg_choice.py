@@ -38,10 +38,10 @@ EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
-def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
+def verdict_on(made: Cylindrical | Composite, lap: float, parallel: bool) -> Verdict:
     """How the physical figure follows a map about a circle for 20 s; cached, and needs compiled code."""
-    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
-    return tried(__name__, lambda: toured(made, lap), SECONDS, made_of)
+    made_of = (made.compiled().params, np.array([lap, parallel, *_domain(made).ravel()]))
+    return tried(__name__, lambda: toured(made, lap, parallel), SECONDS, made_of)
 
 
 def _domain(made: Cylindrical | Composite) -> Array:
@@ -49,11 +49,12 @@ def _domain(made: Cylindrical | Composite) -> Array:
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
 
 
-def toured(made: Cylindrical | Composite, lap: float) -> Clip:
+def toured(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
-    so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW.
+    so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
+    (`Follow.parallel`) at its angular speed.
     """
     times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
     turn, pushed = 2.0 * np.pi * times / SECONDS, _PUSHED * push_profile(times)
@@ -62,7 +63,8 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
-    angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    since = times if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    angle = 2.0 * np.pi / lap * since
     stylus = np.zeros((len(times), 7))
     stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
     return Clip(map_poses(made, stylus), FPS, "blend")
@@ -75,10 +77,10 @@ def push_profile(times: Array) -> Array:
     return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
-def sound(made: Cylindrical | Composite, lap: float) -> bool:
+def sound(made: Cylindrical | Composite, lap: float, parallel: bool) -> bool:
     """Whether the animation of `toured` is sound (`is_sound`)."""
-    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
-    return is_sound(__name__, lambda: toured(made, lap), made_of)
+    made_of = (made.compiled().params, np.array([lap, parallel, *_domain(made).ravel()]))
+    return is_sound(__name__, lambda: toured(made, lap, parallel), made_of)
 
 
 def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArray[np.generic]]) -> bool:
@@ -96,7 +98,9 @@ def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArra
     return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
 
 
-def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
+def carried(
+    make: Callable[[int], Carrying], names: Sequence[str], lap: float, parallel: bool
+) -> tuple[Carrying, tuple[str, ...]]:
     """The map with the legs that best carry the other clips' arms, and remarks; needs compiled code.
 
     Parameters
@@ -107,19 +111,21 @@ def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -
         Names of the clips whose legs it may have.
     lap : float
         Duration of a lap [s].
+    parallel : bool
+        Whether the field keeps the pace of a hand that is pushed off (`Follow.parallel`).
     """
     owned = cache(make)  # made on demand: most often the first clip will do
 
     @cache
     def fit(i: int) -> bool:
-        return sound(owned(i).with_share(0.0), lap)
+        return sound(owned(i).with_share(0.0), lap, parallel)
 
     best, name, found = owned(0), names[0], Verdict(np.inf, 0.0)
     for wanted in (True, False):
         for share in SHARES:
             for i in (i for i in range(len(names)) if fit(i) is wanted):
                 made = owned(i).with_share(share)
-                verdict = verdict_on(made, lap)
+                verdict = verdict_on(made, lap, parallel)
                 if verdict.bearable and verdict.residual <= WELL:
                     return made, ()
                 if verdict.worse() < found.worse():

@@ -119,8 +119,12 @@ def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMap
     return replace(parts, size=size, remarks=parts.remarks + ((falls,) if flying else ()))
 
 
-def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+def cylindrical_parts(
+    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
+
+    `parallel` says whether the field keeps the pace of a hand that is pushed off its curve.
 
     Raises
     ------
@@ -134,7 +138,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
 
     def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
-        return carried(with_legs_of, [clip.name for clip in clips], lap)
+        return carried(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
     if _out_of_step(clips, len(motions), lap):
         return replace(_about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
@@ -146,8 +150,12 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     return replace(_about_circle(place, made, clips), refined=refined)
 
 
-def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+def composite_parts(
+    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+) -> ClipMapParts:
     """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
+
+    `parallel` is as for a cylinder.
 
     Raises
     ------
@@ -164,7 +172,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         if carries_alike(made, lap):
             return made, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
-        return carried(lambda _: only, [clips[0].name], lap)
+        return carried(lambda _: only, [clips[0].name], lap, parallel)
 
     return replace(_about_circle(place, made, clips, timing=0), refined=refined)
 
@@ -215,12 +223,16 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
     )  # fmt: skip
 
 
+def _flows_parallel(config: RunConfig) -> bool:
+    return isinstance(config.mode, Follow) and config.mode.flow == "parallel"
+
+
 def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
-    return cylindrical_parts(clips, _place(part), figure)
+    return cylindrical_parts(clips, _place(part), figure, _flows_parallel(config))
 
 
 def _composite(config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
-    return composite_parts(clips, _place(part), figure)
+    return composite_parts(clips, _place(part), figure, _flows_parallel(config))
 
 
 def _river_clips_parts(
@@ -259,9 +271,8 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
         if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
             parts = replace(parts, refined=partial(carried_over, made, best_transition(made, part.curve)))
         elif pushed and not isinstance(config.mode, Rivers):
-            keeps_pace = isinstance(config.mode, Follow) and config.mode.flow == "parallel"
             number = curve_number(made, part.curve)
-            followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), keeps_pace)
+            followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), _flows_parallel(config))
             parts = replace(parts, refined=followed)
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
