@@ -24,13 +24,12 @@ _CURVE, _PARALLEL = {"flow": "curve"}, {"flow": "parallel"}
 _Values = Mapping[type, Mapping[str, float | str]]
 _ABOUT_A_CIRCLE: _Values = {Follow: _CURVE, Rivers: _RIVERS, Stretch: _TUBE, StretchThenFollow: _TUBE}
 _ON_A_FILE: _Values = {Follow: _PARALLEL, Rivers: _FILE_RIVERS, Stretch: _FILE_TUBE, StretchThenFollow: _FILE_TUBE}
+_BY_MAP: Mapping[type, _Values] = {MapFile: _ON_A_FILE, Composite: {**_ABOUT_A_CIRCLE, Follow: _PARALLEL}}
 
 
 def resolved(config: RunConfig) -> RunConfig:
     """A configuration with the gains and the flow that it leaves open filled in."""
-    values = (_ON_A_FILE if isinstance(config.map, MapFile) else _ABOUT_A_CIRCLE).get(type(config.mode), {})
-    if isinstance(config.map, Composite) and isinstance(config.mode, Follow):
-        values = _PARALLEL
+    values = _BY_MAP.get(type(config.map), _ABOUT_A_CIRCLE).get(type(config.mode), {})
     left = {name: value for name, value in values.items() if getattr(config.mode, name) is None}
     return replace(config, mode=replace(config.mode, **left))
 

@@ -88,8 +88,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
     remarks = (
-        *frame_remarks(broken, jumps, motion.fps, motion.timed),
-        *(["the last frame did not belong to the motion before it: left out"] if shortened else ()),
+        *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, roles),

@@ -130,8 +130,10 @@ def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
         yield f"nothing tells where {', '.join(without)} end: how they point is a guess"
 
 
-def frame_remarks(broken: Sequence[int], jumps: Sequence[int], fps: float, timed: bool) -> Iterator[str]:
-    """Frames whose time is not stated or long, those that were lost, and jumps that are left."""
+def frame_remarks(
+    broken: Sequence[int], jumps: Sequence[int], shortened: bool, fps: float, timed: bool
+) -> Iterator[str]:  # fmt: skip
+    """Frames whose time is not stated or long, those that were lost, a last one left out, and jumps that are left."""
     if not timed:
         told = f"the file states no frame rate: {fps:g} a second are assumed"
         yield f"{told}; if it is another, state it with --frame-rate"
@@ -141,6 +143,8 @@ def frame_remarks(broken: Sequence[int], jumps: Sequence[int], fps: float, timed
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
         yield f"{which} ({broken[0] / fps:.2f} s) did not belong to the motion around: interpolated"
+    if shortened:
+        yield "the last frame did not belong to the motion before it: left out"
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"

@@ -33,6 +33,12 @@ def at_rate(name, fps):
     return Clip(clip.poses[::every], clip.fps / every, name)
 
 
+def reduced(motion, kept):
+    """Frames of a motion, at the rate that this makes."""
+    fps = motion.fps / (kept.step or 1)
+    return replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept], fps=fps)
+
+
 def leading(motion, roles):
     rotations = motion.global_rotations()
     return leading_frames(motion, roles, body_lines(motion, roles, motion.global_positions(rotations), rotations))
@@ -102,11 +108,9 @@ def test_a_motion_that_begins_anywhere_keeps_its_frames(name, tmp_path):
     roles = roles_of(motion.joints, motion.parents)
     for every in {1, round(motion.fps / 30), round(motion.fps / 20)}:
         for first in range(0, motion.n_frames - 12 * every, max(1, motion.n_frames // 12)):
-            kept = slice(first, None, every)
-            part = replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept])
+            part = reduced(motion, slice(first, None, every))
             assert leading(part, roles) == 0, (every, first)
-            found = repaired(replace(part, fps=motion.fps / every), roles)
-            assert found[1:] == ((), (), False), (every, first)
+            assert repaired(part, roles)[1:] == ((), (), False), (every, first)
 
 
 @pytest.mark.parametrize("name", embedded_names())
@@ -116,9 +120,7 @@ def test_a_motion_that_ends_anywhere_keeps_its_last_frame(name, tmp_path):
     roles = roles_of(motion.joints, motion.parents)
     for every in {1, round(motion.fps / 30), round(motion.fps / 20)}:
         for last in range(12 * every, motion.n_frames, max(1, motion.n_frames // 40)):
-            kept = slice(None, last, every)
-            part = replace(motion, rotations=motion.rotations[kept], translations=motion.translations[kept])
-            assert not repaired(replace(part, fps=motion.fps / every), roles).shortened, (every, last)
+            assert not repaired(reduced(motion, slice(None, last, every)), roles).shortened, (every, last)
 
 
 def test_a_motion_that_goes_out_from_its_rest_pose_keeps_it(tmp_path):
@@ -143,10 +145,10 @@ def test_only_the_rest_poses_of_captures_are_left_out(mocap):
         if isinstance(roles, str):
             continue
         for every in {1, max(1, round(motion.fps / 30)), max(1, round(motion.fps / 20))}:
-            part = replace(motion, rotations=motion.rotations[::every], translations=motion.translations[::every])
+            part = reduced(motion, slice(None, None, every))
             if part.n_frames >= 10 and (n := leading(part, roles)):
                 dropped[path.name, every] = n
-            assert repaired(replace(part, fps=motion.fps / every), roles).frames == () or "16_09" in path.name
+            assert repaired(part, roles).frames == () or "16_09" in path.name
     assert {name for name, _ in dropped} == {"01_01.bvh", "dme_example.bvh"}
     assert set(dropped.values()) == {1}
 
