@@ -158,3 +158,10 @@ def test_the_whole_body_meets_the_floor_and_nothing_else_and_who_stands_touches_
     data.qpos[2] -= 1e-3
     mujoco.mj_forward(model, data)
     assert {int(max(contact.geom)) for contact in data.contact} == {model.geom(name).id for name in FOOT_CONTACTS}
+
+
+def test_a_model_is_ones_own_and_as_it_is_compiled() -> None:
+    mine, compiled = figure_model(1.6, 60.0), figure_spec(1.6, 60.0).compile()
+    mine.opt.gravity[2] = 0.0
+    np.testing.assert_array_equal(figure_model(1.6, 60.0).opt.gravity, compiled.opt.gravity)
+    np.testing.assert_array_equal(figure_model(1.6, 60.0).body_mass, compiled.body_mass)

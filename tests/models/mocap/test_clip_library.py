@@ -87,3 +87,9 @@ def test_what_an_own_file_leaves_nothing_to_state_of_is_refused(own_file, tmp_pa
 
 def test_the_frame_rate_of_an_own_file_can_be_stated(own_file):
     assert load(own_file, Hints(frame_rate=50.0)).clip.fps == 50.0
+
+
+def test_an_embedded_clip_is_ones_own() -> None:
+    kept = embedded("walk").poses.copy()
+    embedded("walk").poses[:] = 0.0
+    np.testing.assert_array_equal(embedded("walk").poses, kept)
