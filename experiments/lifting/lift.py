@@ -27,6 +27,7 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import around
+from models.one_blas_thread import on_one_blas_thread
 from sim.errors import SimError
 from sim.world.world import phantom_angles
 
@@ -94,6 +95,7 @@ def check_workspace(room: Room) -> None:
                     ) from None
 
 
+@on_one_blas_thread
 def lift_clips(
     names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
 ) -> LiftedClips:

@@ -27,6 +27,7 @@ from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
+from models.one_blas_thread import on_one_blas_thread
 from models.phantom.kinematics import Quat
 from models.world.scene import FIGURE
 from sim.body.drive import BodyState
@@ -61,6 +62,7 @@ MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts
 """Maps configuration, figure and clips to the map's parts."""
 
 
+@on_one_blas_thread
 def wire(
     config: RunConfig,
     clips: tuple[Clip, ...] | None = None,

@@ -23,6 +23,7 @@ from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import Stances, rested, stances
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget_report import COARSE, RetargetReport
+from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 # RMS change of joints [rad] and of the root's height [m] beyond which the result counts as another motion. Of nine
@@ -91,6 +92,7 @@ class Prepared(NamedTuple):
     near: bool
 
 
+@on_one_blas_thread
 def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints | None = None) -> Prepared:
     """Make a well-formed clip of the motion in a file.
 
