@@ -10,15 +10,15 @@ from typing import ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-P = ParamSpec("P")
-R = TypeVar("R")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
-def on_one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
+def on_one_blas_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Let a function run with one BLAS thread; the caller's number is restored after it."""
 
     @wraps(function)
-    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+    def limited(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         with threadpool_limits(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
