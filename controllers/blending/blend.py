@@ -6,7 +6,15 @@ import numpy as np
 from numba import njit
 
 from controllers.blending.alignment import aligned_channels
-from controllers.blending.combination import combine, figure_channels, figure_size, packed_figure
+from controllers.blending.combination import (
+    ClipsAt,
+    Ground,
+    Mixture,
+    combine,
+    figure_channels,
+    figure_size,
+    packed_figure,
+)
 from controllers.borrowed import borrowed
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.legs.limb_ends import with_ends
@@ -53,14 +61,11 @@ def blend(
     angle, weights, changes, chain, memory, pose, jacobian
         As in `combine`.
     """
-    blend_corrected(params, angle, weights, changes, work_array((4, 0)), chain, memory, pose, jacobian)
+    blend_corrected(params, angle, Mixture(weights, changes, chain, work_array((4, 0))), memory, pose, jacobian)
 
 
 @njit(forceinline=True)
-def blend_corrected(
-    params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
-    pose: Array, jacobian: Array,
-) -> None:  # fmt: skip
+def blend_corrected(params: Array, angle: float, mixture: Mixture, memory: Array, pose: Array, jacobian: Array) -> None:
     """`blend` with a correction, see `combine`."""
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
@@ -69,10 +74,8 @@ def blend_corrected(
     value, slope = work_array((clips, channels)), work_array((clips, channels))
     rows = figure[figure_size(figure) :]
     _interpolate(borrowed(rows), samples, clips, angle, value, slope)
-    combine(
-        figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
-        work_array((0, 0, 3)), 0.0, 0.0, pose, jacobian,
-    )  # fmt: skip
+    ground = Ground(memory[:0], work_array((0, 0, 3)), 0.0, 0.0)
+    combine(figure, ClipsAt(value, slope, drifts), angle, mixture, memory, ground, pose, jacobian)
 
 
 def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Sequence[Limb]) -> Array:

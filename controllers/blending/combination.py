@@ -8,6 +8,7 @@ kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, kept in the memory (`
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -135,11 +136,66 @@ def _chain_rule(root: Array, rates: Array, chain: Array, jacobian: Array) -> Non
                 jacobian[3 + 3 * joint + i, j] = total
 
 
+class ClipsAt(NamedTuple):
+    """Clips at one phase of the lap.
+
+    Attributes
+    ----------
+    value, slope : Array, shape (clips, channels)
+        Channels of each clip at θ, and their derivatives by θ; λ of a limb is read from the first clip's.
+    drifts : Array, shape (clips, 3)
+        ξ of each clip.
+    """
+
+    value: Array
+    slope: Array
+    drifts: Array
+
+
+class Mixture(NamedTuple):
+    """How clips are mixed.
+
+    Attributes
+    ----------
+    weights : Array, shape (groups, clips)
+        Sum 1; group 0 is that of the root. Slightly negative weights are allowed (see `mean`).
+    changes : Array, shape (groups, 3, clips)
+        Derivatives of the weights by θ and two other parameters.
+    chain : Array, shape (3, 6)
+        Derivatives of the three parameters by the stylus.
+    correction : Array, shape (4, 2 + 4 limbs)
+        Displacements of root and ends (see `inbetween`), and the derivatives by the three parameters; (4, 0) for none.
+    """
+
+    weights: Array
+    changes: Array
+    chain: Array
+    correction: Array
+
+
+class Ground(NamedTuple):
+    """The ground under the ends of limbs.
+
+    Attributes
+    ----------
+    footing : Array
+        Memory of the ends' footing (see `footing`); updated. If empty, ends are not held.
+    soles : Array, shape (limbs, k, 3)
+        Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
+    contact, floor : float
+        Height of ground contact, and the height below which no sole point is allowed [m].
+    """
+
+    footing: Array
+    soles: Array
+    contact: float
+    floor: float
+
+
 @njit
 def combine(
-    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
-    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
-    floor: float, pose: Array, jacobian: Array,
+    figure: Array, clips: ClipsAt, angle: float, mixture: Mixture, memory: Array, ground: Ground, pose: Array,
+    jacobian: Array,
 ) -> None:  # fmt: skip
     """Mean of poses, and its derivative unless `jacobian` has no rows.
 
@@ -147,44 +203,33 @@ def combine(
     ----------
     figure : Array
         `packed_figure`, at the start of the array.
-    value, slope : Array, shape (clips, channels)
-        Channels of each clip at θ, and their derivatives by θ; λ of a limb is read from the first clip's.
-    drifts : Array, shape (clips, 3)
-        ξ of each clip.
+    clips : ClipsAt
+        The clips at θ.
     angle : float
         θ in [0, 2π].
-    weights : Array, shape (groups, clips)
-        Sum 1; group 0 is that of the root. Slightly negative weights are allowed (see `mean`).
-    changes : Array, shape (groups, 3, clips)
-        Derivatives of the weights by θ and two other parameters.
-    correction : Array, shape (4, 2 + 4 limbs)
-        Displacements of root and ends (see `inbetween`), and the derivatives by the three parameters; (4, 0) for none.
-    chain : Array, shape (3, 6)
-        Derivatives of the three parameters by the stylus.
+    mixture : Mixture
+        Their weights.
     memory : Array
         The frame of the lap; updated.
-    footing : Array
-        Memory of the ends' footing (see `footing`); updated. If empty, ends are not held.
-    soles : Array, shape (limbs, k, 3)
-        Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
-    ground, floor : float
-        Height of ground contact, and the height below which no sole point is allowed [m].
+    ground : Ground
+        What holds the ends.
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
     _combine(
-        borrowed(figure), borrowed(value), borrowed(slope), borrowed(drifts), angle, borrowed(weights),
-        borrowed(changes), borrowed(correction), borrowed(chain), borrowed(memory), borrowed(footing), borrowed(soles),
-        ground, floor, borrowed(pose), borrowed(jacobian),
+        borrowed(figure), borrowed(clips), angle, borrowed(mixture), borrowed(memory), borrowed(ground), borrowed(pose),
+        borrowed(jacobian),
     )  # fmt: skip
 
 
 @njit(forceinline=True)
 def _combine(
-    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
-    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
-    floor: float, pose: Array, jacobian: Array,
+    figure: Array, clips: ClipsAt, angle: float, mixture: Mixture, memory: Array, ground: Ground, pose: Array,
+    jacobian: Array,
 ) -> None:  # fmt: skip
+    value, slope, drifts = clips
+    weights, changes, chain, correction = mixture
+    footing, soles, contact, floor = ground
     rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
@@ -195,13 +240,13 @@ def _combine(
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead, mixture = work_array(3), 0.0, 0.0
+    frame, ahead, mixing = work_array(3), 0.0, 0.0
     if footing.shape[0] > 0:
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
         frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
         frame[2] = s * drift[0, 2] + lap
-        ahead, mixture = go_on(footing, angle), mixed(weights[0])
+        ahead, mixing = go_on(footing, angle), mixed(weights[0])
 
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
@@ -229,7 +274,7 @@ def _combine(
         if soles.shape[0] > 0:
             keep_above(floor, soles[n], end, q[last], rates[last], tangents)
         if footing.shape[0] > 0:
-            keep_footing(footing, n, ahead, mixture, soles[n], ground, frame, end[0], q[last])
+            keep_footing(footing, n, ahead, mixing, soles[n], contact, frame, end[0], q[last])
         place_limb(limb, q, rates, root, end, tangents)
 
     x, y = drift_motion(drift, s, 1.0, shift, turn)

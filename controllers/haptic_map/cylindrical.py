@@ -9,6 +9,7 @@ from numba import njit
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.blend import blend_corrected
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
+from controllers.blending.combination import Mixture
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, kept_lap
@@ -62,7 +63,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         for k in range(d.shape[1]):
             d[2, k] *= i_slope
             d[3, k] *= j_slope
-    blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
+    blend_corrected(params[_TABLE + size :], angle, Mixture(weights, changes, chain, d), memory, pose, jacobian)
 
 
 def _mixtures() -> tuple[Array, Array]:

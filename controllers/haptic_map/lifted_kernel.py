@@ -5,7 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.blending.combination import combine, figure_channels, figure_limbs, packed_figure, weight_groups
+from controllers.blending.combination import (
+    ClipsAt,
+    Ground,
+    Mixture,
+    combine,
+    figure_channels,
+    figure_limbs,
+    packed_figure,
+    weight_groups,
+)
 from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.curves.cylinder import cylinder
 from controllers.curves.splines import basis, basis_slope, control_points, round_lap
@@ -124,14 +133,13 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
     d = work_array((4, pair_channels(pairs)))
     if d.shape[1] > 0:
         pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
-    ground, at = 0.0, int(params[_SOLES_AT])
+    contact, at = 0.0, int(params[_SOLES_AT])
     for i in range(count):
-        ground += w[0, i] * params[at + 1 + near[i]]
+        contact += w[0, i] * params[at + 1 + near[i]]
     soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else work_array((0, 0, 3))
-    combine(
-        figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory[:MEMORY],
-        memory[MEMORY:], soles, ground, params[at], pose, jacobian,
-    )  # fmt: skip
+    mixture = Mixture(w[:, :count], changes[:, :, :count], chain, d)
+    ground = Ground(memory[MEMORY:], soles, contact, params[at])
+    combine(figure, ClipsAt(value, slope, drifts), angle, mixture, memory[:MEMORY], ground, pose, jacobian)
 
 
 def packed_lifted(clips: Sequence[PlacedClip], sites: Array, margin: float, limbs: Sequence[Limb]) -> Array:
