@@ -16,6 +16,13 @@ def smooth_step(x: float) -> float:
 
 
 @njit
+def smooth_step_slope(x: float) -> float:
+    """S′(x) = 30 x² (1 − x)² on [0, 1], 0 elsewhere."""
+    x = np.maximum(0.0, np.minimum(1.0, x))
+    return 30.0 * (x * (1.0 - x)) ** 2
+
+
+@njit
 def cubic_step(x: float) -> float:
     """S₃(x) = x² (3 − 2 x) on [0, 1], 0 before and 1 after; C¹."""
     x = np.maximum(0.0, np.minimum(1.0, x))

@@ -12,7 +12,7 @@ from numba import njit
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, curve_acceleration, curve_point, curve_velocity, wrap_phase
-from controllers.easing import smooth_step
+from controllers.easing import smooth_step, smooth_step_slope
 from controllers.haptic_map.clip_change import gate_behind, known_between
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
@@ -103,8 +103,7 @@ def after(phase: float, moment: float, period: float) -> float:
 def lead_of(params: Array, memory: Array, phase: float) -> tuple[float, float]:
     """Lead [s] of the clip over a hand at a phase [s], which decays with the phase, and its derivative by the phase."""
     went = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCHES_UP
-    went = min(max(went, 0.0), 1.0)
-    return memory[AHEAD] * (1.0 - smooth_step(went)), -memory[AHEAD] * 30.0 * (went * (1.0 - went)) ** 2 / _CATCHES_UP
+    return memory[AHEAD] * (1.0 - smooth_step(went)), -memory[AHEAD] * smooth_step_slope(went) / _CATCHES_UP
 
 
 @njit

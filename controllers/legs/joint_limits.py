@@ -14,7 +14,7 @@ of walk, run, jump and backflip are 2.4° beyond their limits at most, without s
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
+from controllers.easing import smooth_step, smooth_step_slope
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import clamped
 from controllers.state import Array, Quat
@@ -25,17 +25,10 @@ _LOW, _HIGH = 0.15, 0.35  # [m] heights of the end over which A rises: on the gr
 
 
 @njit
-def _step(x: float) -> tuple[float, float]:
-    """C² step from 0 to 1 on [0, 1], and its derivative."""
-    x = min(max(x, 0.0), 1.0)
-    return smooth_step(x), 30.0 * (x * (1.0 - x)) ** 2
-
-
-@njit
 def in_the_air(height: float) -> tuple[float, float]:
     """A of an end at a height over the ground [m], and its derivative [1/m]."""
-    share, slope = _step((height - _LOW) / (_HIGH - _LOW))
-    return share, slope / (_HIGH - _LOW)
+    x = (height - _LOW) / (_HIGH - _LOW)
+    return smooth_step(x), smooth_step_slope(x) / (_HIGH - _LOW)
 
 
 @njit
@@ -67,8 +60,8 @@ def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int
     if cx == x and cy == y and cz == z:
         return
     size = np.sqrt(x * x + y * y + z * z)
-    turned, slope = _step((size - _FROM) / (_TO - _FROM))
-    left, slope = 1.0 - turned, -slope / (_TO - _FROM)
+    nearly = (size - _FROM) / (_TO - _FROM)
+    left, slope = 1.0 - smooth_step(nearly), -smooth_step_slope(nearly) / (_TO - _FROM)
     share = air * left
     ax, ay, az = cx - x, cy - y, cz - z
     hx, hy, hz = x + share * ax, y + share * ay, z + share * az

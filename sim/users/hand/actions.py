@@ -3,21 +3,18 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from controllers.checks import check_kinds
 from controllers.state import Array
 from sim.errors import SimError
 
-PUSH_COLUMNS = 11
-"""A push as a row: start, duration, peak, direction (3), outward, place (3), radius. A radius of 0 means any place."""
-
+_PUSH_COLUMNS, _TURN_COLUMNS = 11, 5
 GRAB_COLUMNS = 11
-"""A grab as a row: start, reach, place (3) or NaN, carry (3), duration, hold, steady."""
-
-TURN_COLUMNS = 5
-"""A turn as a row: start, duration, rotation vector at its peak (3)."""
+"""Columns of a `grab_table`."""
 
 
 def _given(vector: Sequence[float] | None) -> Sequence[float]:
@@ -80,8 +77,27 @@ class Push:
 
 
 def push_table(pushes: Sequence[Push]) -> Array:
-    """Rows of all pushes, shape (n, 11)."""
-    return np.array([push.row() for push in pushes]).reshape(len(pushes), PUSH_COLUMNS)
+    """Rows of all pushes for `push_at`, shape (n, 11)."""
+    return np.array([push.row() for push in pushes]).reshape(len(pushes), _PUSH_COLUMNS)
+
+
+class PushRow(NamedTuple):
+    """A `Push` in compiled code: times [s], peak [N], place and radius [m]; a radius of 0 means any place."""
+
+    start: float
+    duration: float
+    peak: float
+    direction: Array
+    outward: float
+    place: Array
+    radius: float
+
+
+@njit
+def push_at(pushes: Array, i: int) -> PushRow:
+    """Push i of a `push_table`."""
+    row = pushes[i]
+    return PushRow(row[0], row[1], row[2], row[3:6], row[6], row[7:10], row[10])
 
 
 @dataclass(frozen=True)
@@ -147,7 +163,7 @@ class Grab:
 
 
 def grab_table(grabs: Sequence[Grab]) -> Array:
-    """Rows of all grabs by starting time, shape (n, 11).
+    """Rows of all grabs for `grab_at`, by starting time, shape (n, 11).
 
     Raises
     ------
@@ -159,6 +175,25 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
         if after.at < before.end:
             raise SimError(f"a grab begins at {after.at:g} s, before another has ended at {before.end:g} s")
     return np.array([grab.row() for grab in ordered]).reshape(len(ordered), GRAB_COLUMNS)
+
+
+class GrabRow(NamedTuple):
+    """A `Grab` in compiled code: times [s], place, NaN for where the hand is, and carry [m]; steady is 0 or 1."""
+
+    start: float
+    reach: float
+    place: Array
+    carry: Array
+    duration: float
+    hold: float
+    steady: float
+
+
+@njit
+def grab_at(grabs: Array, i: int) -> GrabRow:
+    """Grab i of a `grab_table`."""
+    row = grabs[i]
+    return GrabRow(row[0], row[1], row[2:5], row[5:8], row[8], row[9], row[10])
 
 
 @dataclass(frozen=True)
@@ -206,5 +241,20 @@ class Turn:
 
 
 def turn_table(turns: Sequence[Turn]) -> Array:
-    """Rows of all turns, shape (n, 5)."""
-    return np.array([turn.row() for turn in turns]).reshape(len(turns), TURN_COLUMNS)
+    """Rows of all turns for `turn_at`, shape (n, 5)."""
+    return np.array([turn.row() for turn in turns]).reshape(len(turns), _TURN_COLUMNS)
+
+
+class TurnRow(NamedTuple):
+    """A `Turn` in compiled code: times [s], and the rotation vector at its peak [rad]."""
+
+    start: float
+    duration: float
+    peak: Array
+
+
+@njit
+def turn_at(turns: Array, i: int) -> TurnRow:
+    """Turn i of a `turn_table`."""
+    row = turns[i]
+    return TurnRow(row[0], row[1], row[2:5])

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
+from controllers.easing import smooth_step, smooth_step_slope
 from controllers.state import Array
 from models.phantom.parameters import LEAST_TIP, PREMIUM_1_5
 from sim.errors import SimError
-from sim.users.hand.actions import Grab, Push, Turn, grab_table, push_table, turn_table
+from sim.users.hand.actions import Grab, Push, Turn, grab_at, grab_table, push_at, push_table, turn_table
 
 _INERTIA = min(PREMIUM_1_5.gimbal_inertia)  # [kg m²]
 
@@ -24,7 +24,7 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
     Parameters
     ----------
     pushes : Array
-        Rows of `sim.users.hand.actions.push_table`, shape (n, 11).
+        A `sim.users.hand.actions.push_table` of n pushes.
     begun : Array
         When each push began [s], NaN if it has not; shape (n,), updated.
     t : float
@@ -35,20 +35,20 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
         Added to [N], in H, shape (3,).
     """
     for i in range(pushes.shape[0]):
-        start, duration, peak = pushes[i, 0], pushes[i, 1], pushes[i, 2]
+        push = push_at(pushes, i)
         if math.isnan(begun[i]):
-            radius = pushes[i, 10]
-            away = math.sqrt((p[0] - pushes[i, 7]) ** 2 + (p[1] - pushes[i, 8]) ** 2 + (p[2] - pushes[i, 9]) ** 2)
-            if t < start or (radius > 0.0 and away > radius):
+            x, y, z = p[0] - push.place[0], p[1] - push.place[1], p[2] - push.place[2]
+            away = math.sqrt(x**2 + y**2 + z**2)
+            if t < push.start or (push.radius > 0.0 and away > push.radius):
                 continue
-            begun[i] = t if radius > 0.0 else start
-        phase = (t - begun[i]) / duration
+            begun[i] = t if push.radius > 0.0 else push.start
+        phase = (t - begun[i]) / push.duration
         if phase > 1.0:
             continue
-        bump = peak * math.sin(math.pi * phase) ** 2
-        if pushes[i, 6] == 0.0:
+        bump = push.peak * math.sin(math.pi * phase) ** 2
+        if push.outward == 0.0:
             for k in range(3):
-                force[k] += bump * pushes[i, 3 + k]
+                force[k] += bump * push.direction[k]
         else:
             reach = math.sqrt(p[0] ** 2 + p[1] ** 2)
             if reach > 1e-9:
@@ -89,24 +89,19 @@ def arm_force(
 
 
 @njit
-def _least_jerk(s: float) -> tuple[float, float]:
-    """Minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
-    s = min(max(s, 0.0), 1.0)
-    return smooth_step(s), 30.0 * s * s * (1.0 - s) * (1.0 - s)
-
-
-@njit
 def grab_force(
     stiffness: float, damping: float, grabs: Array, held: Array, t: float, p: Array, v: Array, force: Array
 ) -> float:
     """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
+
+    The way to the place and the carrying have the minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵.
 
     Parameters
     ----------
     stiffness, damping : float
         k [N/m], b [N s/m].
     grabs : Array
-        Rows of `sim.users.hand.actions.grab_table`, shape (n, 11).
+        A `sim.users.hand.actions.grab_table` of n grabs.
     held : Array
         Position of the hand when each grab began [m], NaN if it has not; shape (n, 3), updated.
     t, p, v, force
@@ -118,22 +113,26 @@ def grab_force(
         1 while the switch is pressed, else 0.
     """
     for i in range(grabs.shape[0]):
-        pressed_at = grabs[i, 0] + grabs[i, 1]
-        if not grabs[i, 0] <= t < pressed_at + grabs[i, 8] + grabs[i, 9]:
+        grab = grab_at(grabs, i)
+        pressed_at = grab.start + grab.reach
+        if not grab.start <= t < pressed_at + grab.duration + grab.hold:
             continue
         if math.isnan(held[i, 0]):
             held[i] = p
-        reached, reaching = (1.0, 0.0) if grabs[i, 1] == 0.0 else _least_jerk((t - grabs[i, 0]) / grabs[i, 1])
-        share = (t - pressed_at) / grabs[i, 8]
-        carried, carrying = _least_jerk(share)
-        if grabs[i, 10] != 0.0:
+        reached, reaching = 1.0, 0.0
+        if grab.reach > 0.0:
+            way_there = (t - grab.start) / grab.reach
+            reached, reaching = smooth_step(way_there), smooth_step_slope(way_there)
+        share = (t - pressed_at) / grab.duration
+        carried, carrying = smooth_step(share), smooth_step_slope(share)
+        if grab.steady != 0.0:
             carried, carrying = min(max(share, 0.0), 1.0), 1.0 if 0.0 <= share < 1.0 else 0.0
         for k in range(3):
-            way = 0.0 if math.isnan(grabs[i, 2]) else grabs[i, 2 + k] - held[i, k]
-            wanted = held[i, k] + reached * way + carried * grabs[i, 5 + k]
-            speed = carrying * grabs[i, 5 + k] / grabs[i, 8]
+            way = 0.0 if math.isnan(grab.place[0]) else grab.place[k] - held[i, k]
+            wanted = held[i, k] + reached * way + carried * grab.carry[k]
+            speed = carrying * grab.carry[k] / grab.duration
             if reaching > 0.0:
-                speed += reaching * way / grabs[i, 1]
+                speed += reaching * way / grab.reach
             force[k] += stiffness * (wanted - p[k]) + damping * (speed - v[k])
         return 1.0 if t >= pressed_at else 0.0
     return 0.0

@@ -7,6 +7,7 @@ from numba import njit
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply
 from controllers.state import Array
 from controllers.work_array import work_array
+from sim.users.hand.actions import turn_at
 
 
 @njit
@@ -16,18 +17,19 @@ def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
     Parameters
     ----------
     turns : Array
-        Rows of `sim.users.hand.actions.turn_table`, shape (n, 5).
+        A `sim.users.hand.actions.turn_table`.
     t, turn, rate
         Time [s] and results, in H.
     """
     turn[:], rate[:] = 0.0, 0.0
     for i in range(turns.shape[0]):
-        phase = math.pi * (t - turns[i, 0]) / turns[i, 1]
+        wanted = turn_at(turns, i)
+        phase = math.pi * (t - wanted.start) / wanted.duration
         if 0.0 < phase < math.pi:
-            share, change = math.sin(phase) ** 2, math.pi / turns[i, 1] * math.sin(2.0 * phase)
+            share, change = math.sin(phase) ** 2, math.pi / wanted.duration * math.sin(2.0 * phase)
             for k in range(3):
-                turn[k] += share * turns[i, 2 + k]
-                rate[k] += change * turns[i, 2 + k]
+                turn[k] += share * wanted.peak[k]
+                rate[k] += change * wanted.peak[k]
 
 
 @njit
