@@ -164,7 +164,7 @@ def _out_of_reach(blob: Array, node: int, square: float, best: float) -> bool:
 
 
 @njit
-def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:
+def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:  # noqa: C901 - each case of a piece without a call, once per tick
     """Phase t* of the point of the curve packed at ``blob[at:]`` that is nearest to p, over the whole curve.
 
     Parameters

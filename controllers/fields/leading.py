@@ -18,7 +18,7 @@ from controllers.walking.walking import FOLLOWED, Walking, followed_at
 
 
 @njit
-def leading_force(
+def leading_force(  # noqa: PLR0913 - a formula of numbers, also on CasADi symbols
     p_x: float, p_y: float, v_x: float, v_y: float, x: float, y: float, c: float, s: float, along: float,
     back: float, lead: float, room: float, scale: float, k_l: float, b: float,
 ) -> tuple[float, float]:  # fmt: skip

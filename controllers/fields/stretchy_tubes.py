@@ -143,7 +143,7 @@ def _distance(p: Array, x: float, y: float, z: float) -> float:
 
 
 @njit
-def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:  # noqa: C901 - a state machine, a state a branch
     """Kernel of `StretchyTubes`: parameters `StretchyGains`, memory see above `_PHASE`; it contains the curve."""
     gains = StretchyGains(
         params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]

@@ -78,7 +78,7 @@ def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slo
 
 
 @njit
-def _carried(
+def _carried(  # noqa: PLR0913 - derivatives by either number of the walker, in one kernel
     path: Array, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
     slope: Array, by: int, p: Array, q: Array, spin: Array,
 ) -> None:  # fmt: skip

@@ -113,7 +113,7 @@ class RobotArm(KernelMap):
         shoulder, elbow or wrist, or exceeds a joint limit; the message says where.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the constants of an arm are independent
         self,
         lengths: Sequence[float],
         limits: Array,

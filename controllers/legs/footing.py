@@ -110,7 +110,7 @@ def _yawed(angle: float, q: Array) -> tuple[float, float, float, float]:
 
 
 @njit
-def keep_footing(
+def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     footing: Array, limb: int, ahead: float, mixture: float, sole: Array, ground: float, frame: Array, end: Array,
     q: Quat,
 ) -> None:  # fmt: skip

@@ -161,7 +161,7 @@ def _above(least: float, heights: Array) -> Array:
     return 0.5 * (heights + least + np.hypot(heights - least, _SMOOTH))
 
 
-def with_planted_ends(
+def with_planted_ends(  # noqa: PLR0913 - a clip, its limbs and its lap, each of which is needed
     rows: Array,
     channels: Array,
     drift: Array,

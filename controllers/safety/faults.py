@@ -126,7 +126,7 @@ def first_not_finite(values: Array) -> float:
 
 
 @njit
-def judge_reading(
+def judge_reading(  # noqa: C901 - a kind of fault a branch, the gravest first
     faults: Array,
     theta: tuple[float, float, float],
     gimbal: tuple[float, float, float],

@@ -67,7 +67,7 @@ class Passage(NamedTuple):
 
 
 @njit
-def _pass(
+def _pass(  # noqa: PLR0913 - a kernel takes the arrays of a loop one by one
     plant: Plant, port: PhantomPort, hand: Hand, field: Compiled, memory: Array, limits: Array,
     limiter: Array, p: Array, force: Array, river: Array,
 ) -> None:  # fmt: skip

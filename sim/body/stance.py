@@ -126,7 +126,7 @@ def _add_point(
 
 
 @njit
-def stance_response(
+def stance_response(  # noqa: PLR0913 - a kernel takes the arrays of a leg one by one
     bodies: IntArray, points: Array, share: Array, near: Array, xpos: Array, xmat: Array, v: Array, a: Array,
     offset: Array, response: Array,
 ) -> None:  # fmt: skip

@@ -215,7 +215,7 @@ def _plan_torques(s: FigureState) -> bool:
 
 
 @njit
-def _give_way(s: FigureState) -> bool:
+def _give_way(s: FigureState) -> bool:  # noqa: C901 - loops over motors, which a call would allocate
     """Reduce the accelerations of saturated joints to what their limits allow: M_ss Δa = −lost.
 
     Joints of standing legs are left out (see `_make_up_for_legs`). Returns whether any acceleration was changed.

@@ -223,7 +223,7 @@ def _is_enumeration(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, enum.Enum)
 
 
-def _value(value: Any, name: str, others: _Others) -> object:
+def _value(value: Any, name: str, others: _Others) -> object:  # noqa: C901 - a kind of value a branch
     """Description of a global, closure variable, default or option that differs for different values."""
     if isinstance(value, Dispatcher):
         others.append((value.py_func, value.targetoptions))

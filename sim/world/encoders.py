@@ -77,7 +77,7 @@ def plausibility(period: float, silent: float = SILENT_PERIODS) -> Plausibility:
 
 
 @njit
-def take_reading(
+def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
     hand: Array,
     memory: Array,
     keep: float,

@@ -116,7 +116,7 @@ def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
             yield line, fields
 
 
-def _read_asf(path: Path) -> _Skeleton:
+def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - a section of the file a branch
     """Parse an ASF file."""
     root = _Bone("root")
     skeleton = _Skeleton({"root": root}, {}, [0.0, 0.0, 0.0], True, 1.0)

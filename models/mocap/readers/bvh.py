@@ -122,7 +122,7 @@ class _Tokens:
         return MotionFileError(self.path, self.line, what, expected)
 
 
-def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:  # noqa: C901 - a keyword of the file a branch
     """Joints in the file's order and number of channels; leaves the lines after MOTION."""
     tokens = _Tokens(lines, path)
     if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
