@@ -1,7 +1,7 @@
 """Cholesky factors of small symmetric positive definite matrices, in place: no call of LAPACK in a tick.
 
-`mju_cholFactor` and `mju_cholSolve` would take 0.60 µs for a leg's nine equations instead of 0.69, and the same to 1e-15;
-but they take whole matrices, not blocks of a larger one, and no column of several right sides.
+`mju_cholFactor` and `mju_cholSolve` would take 0.60 µs for a leg's nine equations instead of 0.69, with the same
+result; but they take whole matrices, not blocks of a larger one, and no column of several right sides.
 """
 
 import numpy as np
