@@ -20,7 +20,7 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 FPS = 120.0  # rows of o per second of the phase
-MARGIN = 0.1  # [s] before the gate at which the rows begin
+LEAD_IN = 0.1  # [s] before the gate at which the rows begin
 # Rows of zeros, then of the first row, that close the periodic spline behind the last row; never read. Their
 # influence decays by 0.27 a row, to 7e-10.
 _PADDING = 16
@@ -38,7 +38,7 @@ class ClipChange(NamedTuple):
     gates : Array, shape (m,)
         Phases at which the change may begin, after the start of the lap [s].
     offsets : Array, shape (n, nv)
-        Rows of o from `MARGIN` before the gate on, `FPS` per second; zero at the end.
+        Rows of o from `LEAD_IN` before the gate on, `FPS` per second; zero at the end.
     """
 
     first: int
@@ -49,7 +49,7 @@ class ClipChange(NamedTuple):
     @property
     def seconds(self) -> float:
         """T, duration from the gate to the end [s]."""
-        return (len(self.offsets) - 1) / FPS - MARGIN
+        return (len(self.offsets) - 1) / FPS - LEAD_IN
 
 
 def packed_changes(changes: Sequence[ClipChange]) -> Array:
@@ -101,7 +101,7 @@ def gate_behind(
 @njit
 def change_lasts(changes: Array, k: int) -> float:
     """T, duration of a change [s]."""
-    return (changes[1 + k * _ENTRY + _COUNT] - 1.0) / FPS - MARGIN
+    return (changes[1 + k * _ENTRY + _COUNT] - 1.0) / FPS - LEAD_IN
 
 
 @njit
@@ -123,7 +123,7 @@ def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacob
     """
     entry = changes[1 + k * _ENTRY :]
     size, last = 6 + 3 * ((pose.shape[0] - 7) // 4), int(entry[_COUNT]) - 1
-    u = min(max((s + MARGIN) * FPS, 0.0), float(last))
+    u = min(max((s + LEAD_IN) * FPS, 0.0), float(last))
     row = min(int(u), last - 1)
     offset, rate = work_array(size), work_array(size)
     interpolate(borrowed(changes[int(entry[_ROWS]) + row * size :]), size, u - row, FPS, offset, rate)

@@ -19,7 +19,7 @@ from controllers.rotations import angular_velocity, exponential, logarithm, rota
 from controllers.saturation import clamped
 from controllers.state import Array, Quat
 
-MARGIN = 0.1  # [rad] excess over a limit at which saturation is complete, at half of that beyond the limit
+SATURATION_WIDTH = 0.1  # [rad] excess over a limit at which saturation is complete, at half of that beyond the limit
 _FROM, _TO = 2.9, 3.13  # [rad] range of |v| over which S falls
 _LOW, _HIGH = 0.15, 0.35  # [m] heights of the end over which A rises: on the ground, limits would move a foot by 7 cm
 
@@ -53,9 +53,9 @@ def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int
         return
     x, y, z = logarithm(q[0], q[1], q[2], q[3])
     (cx, sx), (cy, sy), (cz, sz) = (
-        clamped(x, limits[0, 0], limits[0, 1], MARGIN),
-        clamped(y, limits[1, 0], limits[1, 1], MARGIN),
-        clamped(z, limits[2, 0], limits[2, 1], MARGIN),
+        clamped(x, limits[0, 0], limits[0, 1], SATURATION_WIDTH),
+        clamped(y, limits[1, 0], limits[1, 1], SATURATION_WIDTH),
+        clamped(z, limits[2, 0], limits[2, 1], SATURATION_WIDTH),
     )
     if cx == x and cy == y and cz == z:
         return

@@ -34,7 +34,7 @@ _DECIDED = _ARGUMENT + 5
 _PATH = _DECIDED + DECISION
 _SEARCHES = 4  # Newton steps of the search for the nearest point, warm-started
 _STEERING = 0.15  # [m] of path, the length constant with which the curvature follows the stylus
-MARGIN = 4  # rows of path kept in reserve, since the filter before the map may evaluate it ahead of the walker
+RESERVE_ROWS = 4  # rows of path kept in reserve, since the filter before the map may evaluate it ahead of the walker
 
 
 class Walker(NamedTuple):
@@ -191,7 +191,7 @@ def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
         lap = (path[0] + 0.5) * STEP / follow.stride
         share = follow.shares[int(phases * (lap - np.floor(lap))) % int(phases)]
         lay_row(path, share * bend * STEP, abs(bend), share * bend * walker.speed[0] ** 2)
-        walker.sway[0] = lean_row(path, int(ahead / STEP) - MARGIN, follow.decay, walker.sway[0])
+        walker.sway[0] = lean_row(path, int(ahead / STEP) - RESERVE_ROWS, follow.decay, walker.sway[0])
 
 
 @njit

@@ -14,7 +14,7 @@ from controllers.state import HAND_POSITION, HAND_TIME, Array
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import STEP, path_front, straight_path
 from controllers.walking.walker import (
-    MARGIN,
+    RESERVE_ROWS,
     Following,
     following_at,
     fresh_walker,
@@ -205,7 +205,7 @@ class Walking:
     @property
     def ahead(self) -> float:
         """D, length of path laid ahead of the figure [m]: enough to place a foot, and to lean into a bend in time."""
-        return max(self.gait.reach, _FORESIGHT * self._sway) + MARGIN * STEP
+        return max(self.gait.reach, _FORESIGHT * self._sway) + RESERVE_ROWS * STEP
 
     @property
     def lead(self) -> tuple[float, float]:

@@ -12,8 +12,9 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.state import POSITION, Array
 from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
+from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS
 from models.world.scene import PHANTOM
-from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense, sensed_before
+from sim.world.phantom_port import actuate, phantom_port, sense, sensed_before
 from sim.world.world import phantom_angles
 
 SUBSTEPS = 8
@@ -32,7 +33,7 @@ def simulated_course(
     theta = np.array(phantom_angles(start))
     columns = [vector_to_hand_frame(column) for column in np.array(jacobian(theta)).T]
     rate = np.linalg.solve(np.array(columns).T, velocity)
-    for i, name in enumerate((*ARM_JOINTS, "elbow", "twin")):
+    for i, name in enumerate((*MOTOR_JOINTS, *CLOSING_JOINTS)):
         joint = data.joint(PHANTOM + name)
         joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
     mujoco.mj_forward(model, data)

@@ -25,12 +25,12 @@ from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
 from controllers.fields.follow import Follow
 from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
-from models.phantom.spec import phantom_spec
+from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS, phantom_spec
 from models.world.scene import PHANTOM, R_WP
 from sim.compilation.compiled import entry_point
 from sim.errors import SimError
 from sim.users.hand.arm import Arm
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense, sensed_before
+from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense, sensed_before
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
 
@@ -280,7 +280,7 @@ def hand_path(
         sensed_before(port, still + state[6:9], state[9:12])
         late += state[12:].reshape(-1, 3)[::-1]
     late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
-    names = [PHANTOM + name for name in (*ARM_JOINTS, "elbow", "twin")]
+    names = [PHANTOM + name for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]
     for i, name in enumerate(names):
         data.joint(name).qpos[0], data.joint(name).qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
     mujoco.mj_forward(model, data)

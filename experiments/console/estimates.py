@@ -8,7 +8,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from experiments.console.progress import expected_seconds
-from sim.recording.recorder import MARGIN, Group
+from sim.recording.recorder import DISK_RESERVE, Group
 
 SIMULATING = "a simulated second"
 """Name under which the wall-clock time per simulated second is stored."""
@@ -41,10 +41,10 @@ def foreseen(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | No
 
 def _check(out: Path, seconds: float, rate: float) -> None:
     size, free = seconds * rate, _free(out)
-    if size + MARGIN > free:
+    if size + DISK_RESERVE > free:
         raise ParameterError(
             f"--seconds is {seconds:g}: a recording of {_size(size)} or more, and {_size(free)} are free where {out} "
-            f"is; expected less than {max(0.0, free - MARGIN) / rate:.3g} s"
+            f"is; expected less than {max(0.0, free - DISK_RESERVE) / rate:.3g} s"
         )
 
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from controllers.legs.footsteps import packed_steppers
-from controllers.legs.joint_limits import MARGIN
+from controllers.legs.joint_limits import SATURATION_WIDTH
 from controllers.legs.limbs import Limb
 from controllers.state import Array
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
@@ -19,7 +19,7 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
         offsets = np.array([figure.body(body).pos for body in bodies])
         sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
         # A joint comes to rest half a margin beyond its soft limit, hence on the limit of its range.
-        limits = joint_range()[[first - 1, second - 1, third - 1]] + 0.5 * MARGIN * np.array([1.0, -1.0])
+        limits = joint_range()[[first - 1, second - 1, third - 1]] + 0.5 * SATURATION_WIDTH * np.array([1.0, -1.0])
         legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole, limits))
     return tuple(legs)
 

@@ -14,7 +14,7 @@ import numpy as np
 from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
-from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
+from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RiverClips
 from controllers.haptic_map.river_memory import PHASE, RIVER
 from controllers.state import Array
@@ -208,7 +208,7 @@ def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, s
     best, changed = min(made_so, key=lambda found: found[1].costs[-1])
     poses, own = best.poses.copy(), best.own
     poses[own] = changed.clip.poses
-    shown = slice(own.start - round(MARGIN * FPS), own.stop)
+    shown = slice(own.start - round(LEAD_IN * FPS), own.stop)
     offsets = _way(best.second[shown], poses[shown])
     # Offsets at the end are only the lag of the stylus filter: fade them out.
     left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)

@@ -29,7 +29,7 @@ CAMERAS: dict[Camera, tuple[float, float]] = {
 }
 APART = 0.95  # distance of the ghost from the figure, to the side [m]
 BEHIND = 0.35  # and away from the camera [m]
-MARGIN = 1.1  # size of the picture relative to what must be in it
+FRAME_SCALE = 1.1  # size of the picture relative to what must be in it
 ARM_REACH = 0.45  # least visible distance to either side of a root [m]
 LEGEND = 0.1  # room for the legend at the bottom [m]
 ARROW = 0.06  # drawn length of a large force [m]
@@ -162,6 +162,6 @@ class Stage:
         self.clearance.clear()
         side = max(ARM_REACH, float(np.max([np.abs(cloud[:, 0]).max() for cloud in points]))) + 0.1
         top = float(np.max([cloud[:, 1].max() for cloud in points])) + 0.15
-        half = MARGIN * max(0.5 * top, side / aspect)
+        half = FRAME_SCALE * max(0.5 * top, side / aspect)
         field = np.deg2rad(self.world.model.vis.global_.fovy)
         return half / np.tan(0.5 * field) + 0.3, 0.5 * top - LEGEND

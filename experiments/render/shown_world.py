@@ -28,7 +28,7 @@ CURVE_RADIUS = 0.0009  # [m]
 TUBE_OPACITY = 0.17  # the wall lies twice over what is inside: (1 − 0.17)², 69 %, of it is seen
 GHOST_WHITE = 0.45  # share of white in the ghost's colour
 SHADOW_REACH = 5.5  # half width of the shadow map [m]
-FIELD_OF_VIEW = 30.0  # vertical [degrees]: a ball at the upper edge is drawn 1/cos 15°, 4 % longer than wide
+FIELD_OF_VIEW_DEG = 30.0  # vertical [degrees]: a ball at the upper edge is drawn 1/cos 15°, 4 % longer than wide
 _WOOD = (0.8, 0.71, 0.6, 1.0)
 _WHITE, _LINES = 0.97, 0.8  # brightness of the floor and of its lines
 STAGE, BENCH = 1, 2  # geom groups: figure, ghost or arm on the floor; the device with its curves
@@ -161,7 +161,7 @@ def _sort(spec: mujoco.MjSpec) -> None:
 def _light(spec: mujoco.MjSpec) -> None:
     """Daylight with soft fill, a pale floor of tiles of half a metre, and a sky of the same white."""
     visual = spec.visual
-    visual.global_.fovy = FIELD_OF_VIEW
+    visual.global_.fovy = FIELD_OF_VIEW_DEG
     visual.headlight.ambient[:], visual.headlight.diffuse[:], visual.headlight.specular[:] = 0.46, 0.14, 0.0
     visual.quality.shadowsize, visual.quality.offsamples = 4096, 4
     spec.stat.extent, visual.map.shadowclip, visual.map.znear = SHADOW_REACH, 1.0, 0.01

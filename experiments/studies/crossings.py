@@ -27,10 +27,11 @@ from experiments.config.modes import Rivers
 from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
 from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
+from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
+from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import place_stylus
 
@@ -104,7 +105,7 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     data = mujoco.MjData(model)
     place_stylus(model, data, np.asarray(start, dtype=float))
     mujoco.mj_forward(model, data)
-    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in MOTOR_JOINTS)
     plant = Plant(
         model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
         ground=np.zeros(3), arm_v=(a, b, c), substeps=substeps, period=scene.servo_period,

@@ -29,9 +29,9 @@ from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
+from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS, MOTORS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.compilation.compiled import entry_point
-from sim.world.phantom_port import ARM_JOINTS, MOTORS
 from sim.world.plant import Plant, make_plant, step
 from sim.world.world import World
 
@@ -199,7 +199,7 @@ class Twin:
         self._world = World(scene, "none")
         self._world.reset(np.zeros(3), rest_pose())
         model, data = self._world.model, self._world.data
-        joints = [model.joint(PHANTOM + name) for name in (*ARM_JOINTS, "elbow", "twin")]
+        joints = [model.joint(PHANTOM + name) for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]
         a, b, c = (int(model.actuator(PHANTOM + name).id) for name in MOTORS)
         pole = math.exp(-BANDWIDTH * scene.servo_period)
         self._memory = TwinMemory(

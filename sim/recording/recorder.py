@@ -30,7 +30,7 @@ CHUNK_SECONDS = 0.5  # [s] of rows that a killed run can lose, besides rows not 
 # A write is copied page by page, and a kill between two pages tears whatever crosses them. With this page size HDF5's
 # own structures stay within a page (up to 8176 chunks, more than an hour); rows need not.
 PAGE = 4096
-MARGIN = 4_000_000  # [bytes] kept free on the disk, for structures and summary of the file
+DISK_RESERVE = 4_000_000  # [bytes] kept free on the disk, for structures and summary of the file
 _KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
 
@@ -74,7 +74,7 @@ class DiskFull(RecordingError):
 def _check_room(path: Path, size: int) -> None:
     """Check that after writing `size` [bytes] the disk has room to close the file; raises `DiskFull` otherwise."""
     free = shutil.disk_usage(path.parent).free
-    if free < size + MARGIN:
+    if free < size + DISK_RESERVE:
         raise DiskFull(f"{path}: the disk is full ({free / 1e6:.0f} MB free); {_KEPT}")
 
 

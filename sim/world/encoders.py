@@ -41,7 +41,7 @@ from models.phantom.parameters import PREMIUM_1_5
 Angles = tuple[float, float, float]
 
 PEAK_TORQUE = PREMIUM_1_5.peak_torque
-FRICTION = PREMIUM_1_5.coulomb_friction
+COULOMB_FRICTION = PREMIUM_1_5.coulomb_friction
 ANGLES, RATES, SENSED, MEMORY_SIZE = 0, 6, 12, 13
 """Places in the velocity filter's memory: last angles (6, those of the gimbal unused), filtered rates (6), 1 once a
 reading was taken."""
@@ -184,7 +184,7 @@ def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: 
         latch(faults, FORCE_NOT_FINITE, t, force[0] + force[1] + force[2])
     load = 0.0
     for i in range(3):
-        load = max(load, abs(wanted[i]) / FRICTION[i])
+        load = max(load, abs(wanted[i]) / COULOMB_FRICTION[i])
         # For NaN, min(P, max(−P, τ)) would be −P, so after a fault the torque is set to zero explicitly.
         trusted = faults[FAULT_CODE] == 0.0
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], wanted[i] + weight[i])) if trusted else 0.0

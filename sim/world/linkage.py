@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.phantom.parameters import PREMIUM_1_5
+from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM
 from sim.errors import SimError
-from sim.world.phantom_port import ARM_JOINTS
 from sim.world.world import World
 
 Triple = tuple[float, float, float]
@@ -51,7 +51,7 @@ class Linkage:
     def into(self, world: World) -> None:
         """Set friction and inertia of a world's Phantom; delay and offset have no place in the world's model."""
         model = world.model
-        for axis, name in enumerate(ARM_JOINTS):
+        for axis, name in enumerate(MOTOR_JOINTS):
             place = int(model.joint(PHANTOM + name).dofadr[0])
             model.dof_frictionloss[place], model.dof_damping[place] = self.coulomb[axis], self.viscous[axis]
             model.dof_armature[place] = PREMIUM_1_5.armature[axis] + self.inertia[axis]

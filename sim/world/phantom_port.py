@@ -19,13 +19,10 @@ from models.phantom.kinematics import (
     stylus_orientation,
     vector_to_hand_frame,
 )
+from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, MOTORS
 from models.world.scene import PHANTOM
 from sim.errors import SimError
 from sim.world.encoders import ANGLES, MEMORY_SIZE, RATES, SENSED, motor_torques, plausibility, take_reading
-
-ARM_JOINTS = ("theta1", "theta2", "theta3")
-GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
-MOTORS = ("motor1", "motor2", "motor3")
 
 
 class PhantomPort(NamedTuple):
@@ -111,7 +108,7 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
     hand[HAND_QUATERNION] = 1.0
     return PhantomPort(
         qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl, applied=data.qfrc_applied,
-        arm_q=place(ARM_JOINTS, "q"), arm_v=place(ARM_JOINTS, "v"), gimbal_q=place(GIMBAL_JOINTS, "q"),
+        arm_q=place(MOTOR_JOINTS, "q"), arm_v=place(MOTOR_JOINTS, "v"), gimbal_q=place(GIMBAL_JOINTS, "q"),
         gimbal_v=place(GIMBAL_JOINTS, "v"), motor=place(MOTORS, "motor"), period=period,
         smoothing=velocity_smoothing(cutoff, period),
         memory=np.zeros(MEMORY_SIZE), hand=hand, torque=np.zeros(3), faults=plausibility(period).fresh(),

@@ -9,12 +9,13 @@ from controllers.kernel_call import call_as_given
 from controllers.lent import lend
 from controllers.safety.faults import is_silent
 from controllers.state import Array
+from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM
 from sim.compilation.native import mj_step
 from sim.users.hand.arm import Arm, CompiledArm, hand_force
 from sim.users.hand.fingers import turning_moment
 from sim.users.person.person_state import PersonState, nobody
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, let_go, true_motion, true_turn
+from sim.world.phantom_port import PhantomPort, let_go, true_motion, true_turn
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
@@ -72,7 +73,7 @@ class Hand(NamedTuple):
 def make_plant(world: World | RobotWorld) -> Plant:
     """Connect to a world; it must outlive the plant, which holds addresses of its memory."""
     model, data = world.model, world.data
-    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in MOTOR_JOINTS)
     return Plant(
         model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
         ground=world.ground, arm_v=(a, b, c), substeps=world.config.substeps(), period=world.config.servo_period,

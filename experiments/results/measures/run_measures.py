@@ -33,7 +33,7 @@ Span = tuple[float, float]
 
 SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
 HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
-STILL = 1e-3  # [m] of motion within which the stylus counts as standing still
+STANDS_WITHIN = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
 _TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
@@ -161,10 +161,10 @@ class PathMeasure:
         return pushed
 
     def _add_place(self, t: Array, p: Array) -> None:
-        """Update the time at which the stylus last moved by more than `STILL`."""
+        """Update the time at which the stylus last moved by more than `STANDS_WITHIN`."""
         k = 0
         while k < len(t):
-            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STILL
+            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDS_WITHIN
             if not far.any():
                 return
             k += int(np.argmax(far))

@@ -15,7 +15,7 @@ GAINS = {
     "head": (0.0, 0.6, 0.7),
 }
 LAP_ANGLE = 0.7  # angle by which the default hand turns the stylus, twice a lap [rad]
-MARGIN = np.deg2rad(3.0)  # kept from the joints' limits, since rotations about different axes do not quite add
+JOINT_MARGIN = np.deg2rad(3.0)  # kept from the joints' limits, since rotations about different axes do not quite add
 
 
 def expressive_figure(base: HapticMap) -> Expressive:
@@ -23,8 +23,8 @@ def expressive_figure(base: HapticMap) -> Expressive:
     joints: list[ExpressiveJoint] = []
     for name, gain in GAINS.items():
         low, high = joint_range()[JOINTS.index(name)].T
-        x, y, z = (float(end) for end in low + MARGIN)
-        a, b, c = (float(end) for end in high - MARGIN)
+        x, y, z = (float(end) for end in low + JOINT_MARGIN)
+        a, b, c = (float(end) for end in high - JOINT_MARGIN)
         joints.append(ExpressiveJoint(BODIES.index(name), gain, (x, y, z), (a, b, c)))
     return Expressive(base, joints)
 

@@ -7,7 +7,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange, gate_behind, known_between, packed_changes
+from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange, gate_behind, known_between, packed_changes
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import (
     AHEAD,
@@ -32,7 +32,7 @@ SIZE = 3 + 3 * ((PLAIN.nq - 3) // 4)
 
 def _offsets() -> np.ndarray:
     """Some that decay within the time of the change, with three derivatives."""
-    s = np.arange(round((LASTS + MARGIN) * FPS) + 1) / FPS - MARGIN
+    s = np.arange(round((LASTS + LEAD_IN) * FPS) + 1) / FPS - LEAD_IN
     left = np.clip(1.0 - s / LASTS, 0.0, None) ** 4
     way = np.random.default_rng(3).normal(scale=0.4, size=SIZE)
     return left[:, None] * (way + 0.2 * np.sin(3.0 * s[:, None] + np.arange(SIZE)))
@@ -57,7 +57,7 @@ def _memory(phase: float, changing: bool = True) -> np.ndarray:
 def test_what_is_shown_is_the_second_clip_moved_by_the_offset_and_in_the_end_itself() -> None:
     for since in (-0.05, 0.0, 0.3, 1.0, LASTS - 1e-6):
         phase = GATE + since
-        row = (since + MARGIN) * FPS
+        row = (since + LEAD_IN) * FPS
         offset = OFFSETS[int(row)] + (row - int(row)) * (
             OFFSETS[min(int(row) + 1, len(OFFSETS) - 1)] - OFFSETS[int(row)]
         )

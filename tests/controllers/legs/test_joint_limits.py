@@ -10,7 +10,7 @@ from test_limbs import foot
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.joint_limits import MARGIN, hold_joint, in_the_air
+from controllers.legs.joint_limits import SATURATION_WIDTH, hold_joint, in_the_air
 from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
@@ -50,10 +50,10 @@ def test_beyond_them_it_comes_to_rest():
     for vector in vectors:
         low, high = LIMITS.T
         after = held(vector)[0].as_rotvec()
-        assert (after > low - 0.5 * MARGIN - 1e-9).all()
-        assert (after < high + 0.5 * MARGIN + 1e-9).all()
-        far = (vector < low - MARGIN) | (vector > high + MARGIN)
-        beyond = np.where(vector > high, high + 0.5 * MARGIN, low - 0.5 * MARGIN)
+        assert (after > low - 0.5 * SATURATION_WIDTH - 1e-9).all()
+        assert (after < high + 0.5 * SATURATION_WIDTH + 1e-9).all()
+        far = (vector < low - SATURATION_WIDTH) | (vector > high + SATURATION_WIDTH)
+        beyond = np.where(vector > high, high + 0.5 * SATURATION_WIDTH, low - 0.5 * SATURATION_WIDTH)
         np.testing.assert_allclose(after[far], beyond[far], atol=1e-9)
 
 
@@ -93,8 +93,8 @@ def test_an_in_between_keeps_the_limits_that_its_clips_keep_and_its_derivative_s
         x = stylus(rng.uniform(0.03, 0.07), rng.uniform(0.01, 6.27), rng.uniform(-0.03, 0.03))
         pose = narrow.pose(x)
         vectors = Rotation.from_quat(pose[7:19].reshape(3, 4), scalar_first=True).as_rotvec()
-        within = (vectors > leg.limits[..., 0] - 0.5 * MARGIN - 1e-9) & (
-            vectors < leg.limits[..., 1] + 0.5 * MARGIN + 1e-9
+        within = (vectors > leg.limits[..., 0] - 0.5 * SATURATION_WIDTH - 1e-9) & (
+            vectors < leg.limits[..., 1] + 0.5 * SATURATION_WIDTH + 1e-9
         )
         assert within.all() or in_the_air(foot(free.pose(x))[0][2])[0] < 1.0
         changes += not np.array_equal(pose, free.pose(x))
