@@ -57,7 +57,7 @@ def of_kind(name: str, value: object, kind: object) -> None:
         The name, the value, and what would be right.
     """
     if not _is(value, kind):
-        raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_said(kind)}")
+        raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_expected(kind)}")
 
 
 def numbers_of(name: str, values: npt.ArrayLike) -> Array:
@@ -96,13 +96,13 @@ def _open(kind: object) -> bool:
     return get_origin(kind) is not tuple or Ellipsis in get_args(kind)
 
 
-def _said(kind: Any) -> str:
+def _expected(kind: Any) -> str:
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
-        return " or ".join(_said(one) for one in inner)
+        return " or ".join(_expected(one) for one in inner)
     if origin is Literal:
         return f"one of {', '.join(inner)}"
     if origin in (tuple, Sequence):
-        several = "a sequence" if inner[0] is Any else f"a sequence, each {_said(inner[0])}"
+        several = "a sequence" if inner[0] is Any else f"a sequence, each {_expected(inner[0])}"
         return several if _open(kind) else f"{len(inner)} numbers"
     return _NUMBERS[kind][1] if kind in _NUMBERS else _WORDS.get(kind) or kind.__name__

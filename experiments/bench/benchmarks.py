@@ -23,7 +23,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, HandState, IntArray
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
-from experiments.bench.figures import Figure, tell
+from experiments.bench.figures import Figure, print_figures
 from experiments.bench.page_cost import picture_microseconds
 from experiments.bench.recorder_cost import recorder_cost
 from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
@@ -52,8 +52,8 @@ _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 
 
 def bench(as_json: bool, check: bool) -> int:
-    """Measure and print all figures; see `experiments.bench.figures.tell` for the arguments and the result."""
-    return tell(figures(), as_json, check)
+    """Measure and print all figures; see `experiments.bench.figures.print_figures` for the arguments and the result."""
+    return print_figures(figures(), as_json, check)
 
 
 def figures() -> Iterator[Figure]:

@@ -45,16 +45,16 @@ class Figure:
         return f"{said}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{told}"
 
 
-def tell(figures: Iterable[Figure], as_json: bool, check: bool) -> int:
+def print_figures(figures: Iterable[Figure], as_json: bool, check: bool) -> int:
     """Print figures as they are measured, or all as JSON; returns the exit code, 1 if `check` is set and one fails."""
-    told: list[Figure] = []
+    printed: list[Figure] = []
     for figure in figures:
-        told.append(figure)
+        printed.append(figure)
         if not as_json:
             print(figure.line(), flush=True)
-    failed = [figure.name for figure in told if figure.passes is False]
+    failed = [figure.name for figure in printed if figure.passes is False]
     if as_json:
-        print(json_text([asdict(figure) | {"passes": figure.passes} for figure in told]))
+        print(json_text([asdict(figure) | {"passes": figure.passes} for figure in printed]))
     elif failed:
-        print(f"{len(failed)} of {len(told)} figures fail: {'; '.join(failed)}")
+        print(f"{len(failed)} of {len(printed)} figures fail: {'; '.join(failed)}")
     return 1 if check and failed else 0

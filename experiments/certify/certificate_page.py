@@ -118,13 +118,13 @@ def _table(numbers: Mapping[str, object]) -> str:
     rows: list[str] = []
     for key, value in numbers.items():
         name, unit = WORDS.get(key, (key.replace("_", " "), ""))
-        told = _told(value)
+        told = _described(value)
         if told:
             rows.append(f"<tr><td>{escape(name)}</td><td>{escape(told)} {escape(unit)}</td></tr>")
     return f"<table>{''.join(rows)}</table>" if rows else ""
 
 
-def _told(value: object) -> str:
+def _described(value: object) -> str:
     """A number, a short array or a hand as text; empty for anything longer."""
     if isinstance(value, bool | str | int):
         return str(value)
@@ -134,7 +134,7 @@ def _told(value: object) -> str:
         return str(value)
     if isinstance(value, Mapping):
         entries = cast(Mapping[str, object], value)
-        return ", ".join(f"{name}: {_told(item)}" for name, item in entries.items())
+        return ", ".join(f"{name}: {_described(item)}" for name, item in entries.items())
     if isinstance(value, np.ndarray | list | tuple):
         array = np.asarray(cast(npt.ArrayLike, value))
         if array.dtype.kind in "fiu" and 0 < array.size <= _SHORT:

@@ -55,7 +55,7 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
                 console.print(_recording_ended(status.recorded), highlight=False)
             if status.state is not state:
                 state = status.state
-                console.print(_told(status, options.dead_man, terminal), highlight=False)
+                console.print(_status_line(status, options.dead_man, terminal), highlight=False)
                 if terminal and state is State.FAULT:
                     _forget_keys()
             if status.fault is not Fault.NONE and not terminal:
@@ -100,7 +100,7 @@ def _forget_keys() -> None:
     termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
 
 
-def _told(status: RunStatus, dead_man: bool, terminal: bool) -> str:
+def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
     again = " Enter arms it." if terminal else ""
     said = {
         State.DISARMED: _DISARMED + again,

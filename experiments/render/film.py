@@ -208,7 +208,7 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
         files.callback(frames.close)
         whole = files.enter_context(FilmFile(target, film.width, film.height, film.fps))
         half = beside and files.enter_context(FilmFile(beside, film.width // 2, film.height // 2, film.fps / 2.0))
-        for row in _told(range(len(frames)), console):
+        for row in _with_progress(range(len(frames)), console):
             picture = frames.frame(row)
             whole.add(picture)
             if half and row % 2 == 0:
@@ -221,7 +221,7 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
     return Filmed(tuple(map(str, targets)), len(frames), reach)
 
 
-def _told(rows: range, console: Console) -> Iterator[int]:
+def _with_progress(rows: range, console: Console) -> Iterator[int]:
     """Yield rows, with a progress bar that shows the remaining time."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:

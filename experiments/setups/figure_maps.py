@@ -257,7 +257,7 @@ def _river_clips_parts(
         return changing, not_followed(changing, names, config.figure, figure)
 
     told = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
-    return replace(parts.said((told,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
+    return replace(parts.with_remarks((told,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -279,7 +279,7 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
     else:
         parts = _about_circle(_place(part), made, clips)
     remark = f"the clips are those of the map: {', '.join(made.names)}"
-    return replace(parts.said((remark,)), static={"map_sha256": map_digest(path)})
+    return replace(parts.with_remarks((remark,)), static={"map_sha256": map_digest(path)})
 
 
 MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {

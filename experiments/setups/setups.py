@@ -50,9 +50,9 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
     """
     played, remarks = clips_for(config.map) if clips is None else (clips, ())
     if isinstance(config.map, Led):
-        return led_parts(config, config.map, played, figure).said(remarks)
+        return led_parts(config, config.map, played, figure).with_remarks(remarks)
     setup = MAP_SETUPS[config.map.kind]
-    return for_size_of(figure, lambda model: setup(config, config.map, played, model)).said(remarks)
+    return for_size_of(figure, lambda model: setup(config, config.map, played, model)).with_remarks(remarks)
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:

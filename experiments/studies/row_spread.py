@@ -26,7 +26,7 @@ _ROW = re.compile(r"^\| [^|]+ \| `(hvf (?:run|lift) [^`]+)` \| ([^|]+) \|$", re.
 _RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
 
 
-def said(page: str) -> dict[str, tuple[float, float]]:
+def stated_residuals(page: str) -> dict[str, tuple[float, float]]:
     """Commands in the rows of a page, with the lowest and highest residual [%] that each row states."""
     found = ((shlex.join(shlex.split(line)), _RESIDUAL.search(measured)) for line, measured in _ROW.findall(page))
     return {line: (float(says[1]), float(says[2] or says[1])) for line, says in found if says is not None}
@@ -57,7 +57,7 @@ def main(cores: Sequence[str]) -> None:
                 if line.startswith("hvf lift "):
                     _typed(shlex.split(line), folder, core)
         print("| command | README says % | residual %, from and to | falls |\n|---|---|---|---|")
-        for line, (low, high) in said(page).items():
+        for line, (low, high) in stated_residuals(page).items():
             runs = [
                 measured(f"{line} --seed {seed} --mass {DEFAULT_MASS * (1.0 + nudge)!r}", folder, core)
                 for core, folder in folders.items()

@@ -33,7 +33,7 @@ def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned
     return [run_tuning(replication(config, number), out / f"{number}") for number in numbers]
 
 
-def told(found: Sequence[Tuned]) -> list[str]:
+def lines(found: Sequence[Tuned]) -> list[str]:
     """Chosen values of each replication, and for each contender and objective the gains with their mean, in words."""
     lines = [_chosen(one) for one in found]
     for first in found[0].comparisons:
@@ -69,4 +69,4 @@ def _chosen(one: Tuned) -> str:
 
 if __name__ == "__main__":
     _, file, folder, first, last = sys.argv
-    print("\n".join(told(tuning_trials(Path(file), Path(folder), range(int(first), int(last) + 1)))))
+    print("\n".join(lines(tuning_trials(Path(file), Path(folder), range(int(first), int(last) + 1)))))

@@ -153,7 +153,7 @@ class Study:
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             warm((trial.config for trial in trials), SHELF, console)
             with executor(where) as runs:
-                ran = run_missing(trials, database, runs, self.config.recordings, console, _told(trials))
+                ran = run_missing(trials, database, runs, self.config.recordings, console, _descriptions(trials))
             planned_keys = {trial.key for trial in trials}
             rows = {row.key: row for row in database.rows() if row.key in planned_keys}
         frame = table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})
@@ -212,7 +212,7 @@ def _one_each(trials: Sequence[Trial]) -> list[Trial]:
     return list({trial.meeting.number: trial for trial in trials}.values())
 
 
-def _told(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
+def _descriptions(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
     """Descriptions of the trials for readers of the database, by key."""
     told: dict[str, dict[str, object]] = {}
     for key, met, config in trials:

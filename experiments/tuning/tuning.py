@@ -133,7 +133,7 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
                 others[RANDOM] = chosen(drawn, config.directions)
             with console.status("held-back users"):
                 judged = contenders(config, best, others, panel)
-    return _told(config, out, text, found, best, judged)
+    return _written(config, out, text, found, best, judged)
 
 
 def _searched(
@@ -145,7 +145,7 @@ def _searched(
         return search(config, storage, identity, panel, sampler, lambda n: progress.update(bar, completed=n))
 
 
-def _told(
+def _written(
     config: TuneConfig, out: Path, text: str, found: Sequence[Candidate], best: Candidate, judged: Sequence[Contender]
 ) -> Tuned:
     tuned = judged[0]

@@ -104,7 +104,7 @@ class EmulatedPhantom:
         self._holding = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
         self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
         self._applied, self._last, self._motors = np.zeros((steps, 3)), np.zeros(3), list(self.port.motor)
-        self._steps, self._told = 0, 0
+        self._steps, self._sequence = 0, 0
         self.torque = np.zeros(3)
         self.telemetry = fresh_telemetry()
         self.identity = emulated_identity("MuJoCo", not any(linkage.offset))
@@ -116,13 +116,13 @@ class EmulatedPhantom:
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`; there is a new reading after each command."""
-        q, port, new = self.port.qpos, self.port, self._steps + 1 > self._told
+        q, port, new = self.port.qpos, self.port, self._steps + 1 > self._sequence
         theta = q[list(port.arm_q)] + self._offset
         reading[READING_THETA : READING_THETA + 3] = encoder_reading((theta[0], theta[1], theta[2]))
         g = port.gimbal_q
         reading[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
         reading[READING_SWITCH], reading[READING_CLOCK] = 1.0, self.clock
-        reading[READING_SEQUENCE] = self._told = self._steps + 1
+        reading[READING_SEQUENCE] = self._sequence = self._steps + 1
         self.telemetry[READ] += new
         return new
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from experiments.bench.figures import Figure, tell
+from experiments.bench.figures import Figure, print_figures
 from experiments.bench.tick_cost import MODES
 
 FIGURES = (
@@ -20,14 +20,14 @@ def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_fail
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert [figure.passes for figure in FIGURES] == [True, False, None]
-    assert tell(FIGURES, False, True) == 1
+    assert print_figures(FIGURES, False, True) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "pass  a tick: 1.4 mj_steps (≤ 1.5)"
     assert lines[1] == "FAIL  threads: 0.8 (≥ 0.9)"
     assert lines[2] == "      told: 3"
     assert lines[3] == "1 of 3 figures fail: threads"
-    assert tell(FIGURES, False, False) == 0
-    assert tell((FIGURES[0], FIGURES[2]), False, True) == 0
+    assert print_figures(FIGURES, False, False) == 0
+    assert print_figures((FIGURES[0], FIGURES[2]), False, True) == 0
 
 
 def test_what_is_not_a_number_passes_nothing() -> None:
@@ -36,7 +36,7 @@ def test_what_is_not_a_number_passes_nothing() -> None:
 
 
 def test_json_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:
-    assert tell(FIGURES, True, True) == 1
+    assert print_figures(FIGURES, True, True) == 1
     told = json.loads(capsys.readouterr().out)
     assert [one["passes"] for one in told] == [True, False, None]
     assert told[0] == {

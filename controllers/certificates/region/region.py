@@ -228,18 +228,20 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
     tried = alone if alone.found is None or hands == loosest else search(river, axis, tube, hands, ceiling)
     if tried.found is not None:
         figures = _figures(axis, tried.found)
-        return Verdict("certified", _told(axis, tried.found), tried.found.offsets(axis)[0], ASSUMPTIONS, {}, figures)
+        return Verdict(
+            "certified", _described(axis, tried.found), tried.found.offsets(axis)[0], ASSUMPTIONS, {}, figures
+        )
     reason = _why(alone.frozen, loosest) if alone.found is None else "no one Lyapunov function suits all these hands"
     firm = _firm(hands)
     part = Search(None, None) if hands == loosest else search(river, axis, tube, firm, ceiling)
     if part.found is None:
         return Verdict("unknown", f"{reason}; narrow their intervals", None, ASSUMPTIONS)
     figures = _figures(axis, part.found) | {"firm_hands": firm}
-    reason = f"{reason}. Certain for {_named(firm)}: {_told(axis, part.found)}"
+    reason = f"{reason}. Certain for {_named(firm)}: {_described(axis, part.found)}"
     return Verdict("unknown", reason, None, ASSUMPTIONS, {}, figures)
 
 
-def _told(axis: Axis, found: Found) -> str:
+def _described(axis: Axis, found: Found) -> str:
     offset, wrong = found.offsets(axis)
     return (
         f"from {1e3 * offset:.3g} mm off the curve, or {wrong:.3g} m/s from its pace, the hand comes within "

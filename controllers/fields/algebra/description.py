@@ -61,22 +61,22 @@ def code_digest(function: object) -> str:
     with its content, as pickled. A value that cannot be pickled, as an open file, makes the hash another one each time:
     what was found out about such a law is never taken for what runs.
     """
-    return digest(*_told(function, set()))
+    return digest(*_identity(function, set()))
 
 
-def _told(value: object, seen: set[int]) -> Iterator[bytes]:
+def _identity(value: object, seen: set[int]) -> Iterator[bytes]:
     value = getattr(value, "py_func", value)
     if isinstance(value, CodeType):
         yield value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode()
         for constant in value.co_consts:
-            yield from _told(constant, seen)
+            yield from _identity(constant, seen)
     elif isinstance(value, FunctionType):
         if id(value) not in seen:
             seen.add(id(value))
-            yield from _told(value.__code__, seen)
+            yield from _identity(value.__code__, seen)
             read = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
             for cell in (*(value.__defaults__ or ()), *(c.cell_contents for c in value.__closure__ or ()), *read):
-                yield from _told(cell, seen)
+                yield from _identity(cell, seen)
     elif isinstance(value, _NAMED):
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
     else:

@@ -80,13 +80,13 @@ class Desk:
 
     def poll(self) -> None:
         """Process the messages of the engine and of the workers, and read the latest displayed values."""
-        while (told := self.engine.told()) is not None:
-            self._hear(told)
-        while (found := self._verdicts.told()) is not None:
+        while (answer := self.engine.answer()) is not None:
+            self._hear(answer)
+        while (found := self._verdicts.answer()) is not None:
             config, now, more = found
             if self.config is not None and config.mode == self.config.mode:
                 self.verdict, self.checking = now, more
-        if self._preparation is not None and (made := self._preparation.told()) is not None:
+        if self._preparation is not None and (made := self._preparation.answer()) is not None:
             self._take_clip(made)
         if not self.engine.alive:
             raise SimError("the servo's process has ended; start hvf live again")
@@ -95,22 +95,22 @@ class Desk:
             self._remember(now)
         self.now = now
 
-    def _hear(self, told: object) -> None:
-        self.progress = told if isinstance(told, Progress) else None
-        if isinstance(told, Built):
-            self.built, self.config = told, told.config
+    def _hear(self, answer: object) -> None:
+        self.progress = answer if isinstance(answer, Progress) else None
+        if isinstance(answer, Built):
+            self.built, self.config = answer, answer.config
             self.builds += 1
             self.history.clear()
             self._done, self._undone, self._bends, self._expected = [], [], 0, 0
             self._judge()
-            for remark in told.remarks:
+            for remark in answer.remarks:
                 self._say(remark)
-        elif isinstance(told, Refused):
-            self._say(told.text)
+        elif isinstance(answer, Refused):
+            self._say(answer.text)
             if self.built is not None and self.config is not None and self.config.map == self.built.config.map:
                 self._judge()
-        elif isinstance(told, Saved):
-            self._say(f"Take kept in {told.folder}.")
+        elif isinstance(answer, Saved):
+            self._say(f"Take kept in {answer.folder}.")
 
     def _remember(self, now: dict[str, Array]) -> None:
         if now["t"][0] < self.now["t"][0]:

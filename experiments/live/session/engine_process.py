@@ -74,15 +74,15 @@ class EngineProcess(PageProcess):
         self._close_queues()
 
 
-def _main(shown: Any, held: Any, orders: Any, told: Any) -> None:
-    _Runner(Board(shown, SHOWN), Board(held, HELD), orders, told).run()
+def _main(shown: Any, held: Any, orders: Any, answers: Any) -> None:
+    _Runner(Board(shown, SHOWN), Board(held, HELD), orders, answers).run()
 
 
 class _Runner:
     """The loop of the process: orders, a block, a picture, and the wall clock."""
 
-    def __init__(self, shown: Board, held: Board, orders: Any, told: Any):
-        self._shown, self._held, self._orders, self._told = shown, held, orders, told
+    def __init__(self, shown: Board, held: Board, orders: Any, answers: Any):
+        self._shown, self._held, self._orders, self._answers = shown, held, orders, answers
         self._engine: Engine | None = None
         self._take: Take | None = None
         self._parent, self._going = os.getppid(), True
@@ -141,7 +141,7 @@ class _Runner:
             try:
                 self._obey(order)
             except (ModelError, ControllerError, SimError, OSError) as error:
-                self._told.put(Refused(str(error)))
+                self._answers.put(Refused(str(error)))
 
     def _obey(self, order: object) -> None:
         if isinstance(order, Build):
@@ -177,22 +177,22 @@ class _Runner:
         if self._take is None:
             return
         take, self._take = self._take, None
-        self._told.put(Progress("saving the take", 0.5))
+        self._answers.put(Progress("saving the take", 0.5))
         try:
-            self._told.put(Saved(take.folder, take.end(engine)))
+            self._answers.put(Saved(take.folder, take.end(engine)))
         except SimError as error:
-            self._told.put(Refused(str(error)))
+            self._answers.put(Refused(str(error)))
 
     def _build(self, order: Build) -> None:
         if self._engine is not None:
             self._stop(self._engine)
-        self._told.put(Progress("putting the run together", 0.1))
+        self._answers.put(Progress("putting the run together", 0.1))
         session = wire(order.config, ready=self._compile)
         self._engine = Engine(session)
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
         self._changed = True
         self._slice(self._engine)  # so that its code is compiled or loaded now, not during the run
-        self._told.put(_built(session, self._engine))
+        self._answers.put(_built(session, self._engine))
         self._picture()
 
     def _compile(self, units: Sequence[Unit]) -> None:
@@ -203,10 +203,10 @@ class _Runner:
         def tell(unit: Unit) -> None:
             nonlocal done
             done += 1
-            self._told.put(Progress(f"{for_ever}: {done} of {len(waiting)}", done / len(waiting)))
+            self._answers.put(Progress(f"{for_ever}: {done} of {len(waiting)}", done / len(waiting)))
 
         if waiting:
-            self._told.put(Progress(f"{for_ever}: 0 of {len(waiting)}; it takes a minute or two", 0.02))
+            self._answers.put(Progress(f"{for_ever}: 0 of {len(waiting)}; it takes a minute or two", 0.02))
             compile_units(waiting, tell)
 
     def _picture(self) -> None:

@@ -34,8 +34,8 @@ class PageProcess:
     ):
         context = get_context("spawn")
         self._asked: Any = context.Queue()
-        self._told: Any = context.Queue()
-        queues = self._asked, self._told
+        self._answers: Any = context.Queue()
+        queues = self._asked, self._answers
         self._process = context.Process(target=main, args=(*arguments, *queues), daemon=daemon, name=name)
         start_undisturbed(self._process)
 
@@ -43,10 +43,10 @@ class PageProcess:
         """Send a request."""
         self._asked.put(what)
 
-    def told(self, seconds: float = 0.0) -> Any:
+    def answer(self, seconds: float = 0.0) -> Any:
         """The next answer, waiting for at most `seconds` [s]; None if there is none."""
         try:
-            return self._told.get(timeout=seconds) if seconds > 0.0 else self._told.get_nowait()
+            return self._answers.get(timeout=seconds) if seconds > 0.0 else self._answers.get_nowait()
         except queue.Empty:
             return None
 
@@ -57,7 +57,7 @@ class PageProcess:
 
     def _close_queues(self) -> None:
         """Close both queues without waiting for what they still hold."""
-        for line in (self._asked, self._told):
+        for line in (self._asked, self._answers):
             line.close()
             line.cancel_join_thread()
 

@@ -133,7 +133,7 @@ class MapParts(Generic[Map]):
         whole = expressive_figure(self.haptic_map) if self.expressive else self.haptic_map
         return whole if self.size == 1.0 else Sized(whole, self.size)
 
-    def said(self, remarks: tuple[str, ...]) -> Self:
+    def with_remarks(self, remarks: tuple[str, ...]) -> Self:
         """The same parts with more remarks, put before the present ones."""
         return replace(self, remarks=remarks + self.remarks)
 

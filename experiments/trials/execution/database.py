@@ -50,7 +50,7 @@ class Database:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(path.with_suffix(".lock"), path)
         try:
-            with self._told():
+            with self._errors_named():
                 self._db = sqlite3.connect(path, isolation_level=None)
                 self._begin(identity, name, text)
         except BaseException:
@@ -99,20 +99,20 @@ class Database:
             row.key, row.state, row.reason, json.dumps(finite), json.dumps(what), row.seconds, row.worker,
             row.processor, now,
         )  # fmt: skip
-        with self._told():
+        with self._errors_named():
             self._db.execute("INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
 
     def rows(self) -> Iterator[Row]:
         """All rows, in the order of their keys."""
         columns = "key, state, reason, measures, seconds, worker, processor"
-        with self._told():
+        with self._errors_named():
             for key, state, reason, measures, *rest in self._db.execute(f"SELECT {columns} FROM trials ORDER BY key"):
                 read = {name: math.nan if value is None else value for name, value in json.loads(measures).items()}
                 yield Row(key, state, reason, read, *rest)
 
     def keys(self) -> set[str]:
         """Keys of all rows."""
-        with self._told():
+        with self._errors_named():
             return {key for (key,) in self._db.execute("SELECT key FROM trials")}
 
     def close(self) -> None:
@@ -121,7 +121,7 @@ class Database:
         os.close(self._lock)
 
     @contextmanager
-    def _told(self) -> Generator[None]:
+    def _errors_named(self) -> Generator[None]:
         """Turn SQLite's errors into a `StudyError` of one line."""
         try:
             yield
