@@ -44,6 +44,12 @@ def verdict_on(made: Cylindrical | Composite, lap: float, parallel: bool) -> Ver
     return tried(__name__, lambda: toured(made, lap, parallel), SECONDS, made_of)
 
 
+def unbearable(made: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
+    """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
+    verdict = verdict_on(made, lap, parallel)
+    return () if verdict.bearable else (f"the physical figure {verdict} with {name} at this lap",)
+
+
 def _domain(made: Cylindrical | Composite) -> Array:
     """Intervals of r and z [m] that the hand passes through."""
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])

@@ -41,7 +41,7 @@ from experiments.fitting.blendable import (
     same,
 )
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.leg_choice import carried
+from experiments.fitting.leg_choice import carried, unbearable
 from experiments.fitting.push_trials import followed_map
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
@@ -61,7 +61,7 @@ from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of, reached
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import DEFAULT_STATURE, N_POSE, figure_model, proportion
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSES, Clip
 from sim.compilation.sources import kept_folder
 
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
@@ -145,7 +145,12 @@ def cylindrical_parts(
     made = _cylinder(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
-        return (balanced(made, figure, lap), ()) if same(clips) or moves_alike(made, lap) else carrying()
+        if same(clips):
+            alone = balanced(made, figure, lap)
+            # An open clip is played there and back. Backwards it needs the same forces, but is followed less well.
+            as_prepared = clips[0].closes(CLOSES) and keep_own_pace(clips[:1], made.loops[:1], lap)
+            return alone, () if as_prepared else unbearable(alone, clips[0].name, lap, parallel)
+        return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else carrying()
 
     return replace(_about_circle(place, made, clips), refined=refined)
 

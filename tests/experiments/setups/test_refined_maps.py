@@ -2,9 +2,14 @@
 
 from dataclasses import replace
 
+import pytest
+
 from experiments.config.words import run_config
+from experiments.fitting import leg_choice
+from experiments.fitting.verdict import Verdict
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
 
 
 def test_how_a_physical_figure_follows_is_said_of_a_physical_figure_only() -> None:
@@ -12,3 +17,14 @@ def test_how_a_physical_figure_follows_is_said_of_a_physical_figure_only() -> No
     falls = replace(parts, refined=lambda: (parts.haptic_map, ("the physical figure falls",)))
     assert falls.refine(physical=True).remarks == (*parts.remarks, "the physical figure falls")
     assert falls.refine(physical=False).remarks == parts.remarks
+
+
+def test_a_clip_alone_is_tried_where_it_is_not_played_as_it_is_and_what_it_lacks_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The run has flights; 2.2 s and 1.47 s are whole numbers of its strides, 1.8 s is off both by 20 %."""
+    monkeypatch.setattr(leg_choice, "verdict_on", lambda *_: Verdict(0.2, 1.5))
+    own = embedded("run").duration
+    for lap, said in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
+        parts = map_parts(run_config(clips=("run",) * 4, lap=lap, seconds=1.0), figure_model())
+        assert parts.refine(physical=True).remarks[len(parts.remarks) :] == said
