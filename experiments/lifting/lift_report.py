@@ -7,6 +7,8 @@ import numpy as np
 
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from experiments.fitting.blendable import not_blendable
+from experiments.fitting.leg_choice import BEYOND, SINKS
+from experiments.fitting.similarity import SKATES
 from experiments.lifting.lift import LiftedClips
 from experiments.lifting.map_quality import MapQuality, measure_map
 from experiments.lifting.motion_measure import MotionMeasure
@@ -74,6 +76,13 @@ class LiftReport(NamedTuple):
             *(f"  in-between {pair}: {_wrong(measure)}" for pair, measure in quality.between.items()),
             f"  the clips themselves: {_wrong(quality.clips)}",
         ]
+        if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
+            lines.append(
+                f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * SKATES:.0f} cm, a joint is "
+                f"{np.degrees(BEYOND):.0f}° or more beyond its limits, or the body {100 * SINKS:.0f} cm below the floor). "
+                "A run with the physical figure tries the map first, and plays the legs of a curve's own clip where it "
+                "does not follow the whole."
+            )
         return lines
 
     def to_json(self) -> dict[str, object]:
@@ -113,6 +122,11 @@ def _wrong(measure: MotionMeasure) -> str:
         f"joints {np.degrees(measure.limits):.1f}° beyond their limits, soles slide {100 * measure.slide:.1f} cm, "
         f"{100 * measure.penetration:.1f} cm below the floor, flights {100 * measure.ballistic:.1f} cm from free fall"
     )
+
+
+def _is_motion(measure: MotionMeasure) -> bool:
+    """Whether a measured motion keeps its feet, its joints and the floor, within the tolerances of `leg_choice`."""
+    return measure.slide <= SKATES and measure.limits <= BEYOND and measure.penetration <= SINKS
 
 
 def _arrangement(measure: ArrangementMeasure) -> dict[str, object]:

@@ -1,0 +1,16 @@
+"""What `hvf lift` says of a map."""
+
+from controllers.haptic_map.lifting.room import Room
+from experiments.lifting.lift import lift_clips
+from experiments.lifting.lift_report import report_lift
+
+
+def test_in_betweens_that_are_no_motion_are_named_with_what_a_run_does_about_them() -> None:
+    report = report_lift(lift_clips(["walk", "run"], Room()), 1)
+    assert "No motion half way" not in str(report)
+    (pair,) = report.quality.between
+    for fault in ({"slide": 0.03}, {"limits": 0.1}, {"penetration": 0.02}):
+        bad = {pair: report.quality.between[pair]._replace(**fault)}
+        last = report._replace(quality=report.quality._replace(between=bad)).lines()[-1]
+        assert last.startswith(f"No motion half way: {pair} (feet slide by more than 2 cm")
+        assert "tries the map first" in last
