@@ -79,7 +79,7 @@ class LiftReport(NamedTuple):
         if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
             lines.append(
                 f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * SKATES:.0f} cm, a joint is "
-                f"{np.degrees(BEYOND):.0f}° or more beyond its limits, or the body {100 * SINKS:.0f} cm below the floor). "
+                f"{np.degrees(BEYOND):.0f}° or more beyond its limits, or the body {100 * SINKS:.0f} cm below ground). "
                 "A run with the physical figure tries the map first, and plays the legs of a curve's own clip where it "
                 "does not follow the whole."
             )
