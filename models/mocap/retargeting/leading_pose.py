@@ -10,8 +10,8 @@ Between the pose and the motion is one step, v₀, that the motion does not go o
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
   interpolation has spread the one step.
 
-The jump is sought in the first quarter of a motion. Where a pose is held without any change, as no living body stands, it
-is sought where that ends, however late; such a pose is told by its zero rotations or its straight limbs alone.
+The jump is sought in the first quarter of a motion. Where a pose is held without any change, as no living body stands,
+it is sought where that ends, however late; such a pose is told by its zero rotations or its straight limbs alone.
 
 The second and third do not depend on how fast the motion is, nor on its frame rate. |v| is the RMS over the joints that
 segments of the figure follow.
