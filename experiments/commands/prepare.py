@@ -47,7 +47,7 @@ class Command:
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
         told = {
             "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,
-            "faults": outcome.faults(),
+            "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
         report = outcome.made.report
         lines = [*(report.notes() if report else ()), summary(outcome)]

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from controllers.checks import of_kind
-from experiments.flights.ballistics import clip_ballistics
+from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.followed import followed
-from experiments.preparation.prepared_file import PreparedFile
+from experiments.preparation.prepared_file import PreparedFile, doubts
 from models.mocap.library import check_target, writing
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
@@ -49,8 +49,11 @@ def prepare_file(
     source, target = Path(source), Path(target)
     check_target(target, overwrite)
     made = prepared(source, loop, mirror, hints)
-    refuted = tuple(flight.reason for flight in clip_ballistics(made.clip).flights if flight.verdict == "refuted")
-    outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip), refuted)
+    found = clip_ballistics(made.clip)
+    refuted = tuple(flight.reason for flight in found.flights if flight.verdict == "refuted")
+    outcome = PreparedFile(
+        made, well_formed(made.clip, clip_flights(made.clip)), followed(made.clip), refuted, doubts(found)
+    )
     with writing(target):
         write_bvh(made.clip, target)
         if report is not None:

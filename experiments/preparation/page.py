@@ -3,6 +3,7 @@
 from html import escape
 
 from experiments.files.html_page import html_page, image
+from experiments.flights.ballistics import clip_flights
 from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
 from experiments.preparation.prepared_file import PreparedFile, advice, changes
@@ -12,7 +13,7 @@ from models.mocap.preparation.well_formed import well_formed
 def page(outcome: PreparedFile) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
     made = outcome.made
-    before = well_formed(made.captured)
+    before = well_formed(made.captured, clip_flights(made.captured))
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     rows = "".join(
         f"<tr><th>{name}</th><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
@@ -30,7 +31,7 @@ def page(outcome: PreparedFile) -> str:
         f'<p>{well} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
-        + listed("What is not within bounds", (*outcome.faults(), *advice(made)))
+        + listed("What is not within bounds, or not certified", (*outcome.faults(), *outcome.doubts, *advice(made)))
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
         + listed("What the file was taken for", made.report.lines() if made.report else ())
