@@ -30,7 +30,7 @@ class Command:
     """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
     frame_rate: float | None = None
     """Frames per second, where the file does not state them (AMC) or states them wrongly [Hz]."""
-    report: Path | None = None
+    report: Annotated[Path | None, tyro.conf.arg(aliases=["--out-report"])] = None
     """Folder for a page that shows what was done."""
     overwrite: bool = False
     """Replace the target if it exists."""

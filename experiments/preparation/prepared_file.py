@@ -7,12 +7,20 @@ import numpy as np
 from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.followed import Followed
 from models.mocap.motion.clip import Clip
+from models.mocap.preparation.laps import likeness
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
 
 _ADDED = {"way back": "the way back", "open": "coming to rest at both ends"}
 _MOST = 0.5  # share of the file's own motion below which it is told
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
+
+
+class Measured(NamedTuple):
+    """Measures of a clip, and how the physical figure follows it."""
+
+    measures: WellFormed
+    followed: Followed
 
 
 class PreparedFile(NamedTuple):
@@ -36,7 +44,7 @@ class PreparedFile(NamedTuple):
     measures: WellFormed
     followed: Followed
     flights: tuple[str, ...]
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...]
 
     @property
     def clip(self) -> Clip:
@@ -113,6 +121,17 @@ def changes(made: Prepared) -> tuple[str, ...]:
         f"{100 * change.moved:.1f} cm over the floor RMS; " + made.fidelity.line()
     )
     return tuple(lines)
+
+
+def gaps(made: Prepared) -> tuple[str, str]:
+    """How far the ends of the loop are apart, d of `laps`, in the capture and in the clip."""
+    part, last = made.looped, made.clip.n_frames - 1
+    if part.kind == "open":
+        return "no loop", "no loop: at rest at both ends"
+    gap = float(likeness(made.clip, np.array([0, last]))[0][0, 1])
+    mirror = " in a mirror" if part.kind == "half stride" else ""
+    was = f"ends {np.rad2deg(part.gap):.1f}° apart{mirror}" if np.isfinite(part.gap) else "as stated"
+    return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
 
 
 def advice(made: Prepared) -> tuple[str, ...]:

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -289,7 +291,12 @@ def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
     assert after.slid < 0.01
     assert follows.stands
     assert "the physical figure follows it for 20 s" in summary(outcome)
-    assert (tmp_path / "prepare-walk.html").stat().st_size > 10_000
+    page = (tmp_path / "prepare-walk.html").read_text(encoding="utf-8")
+    assert re.search(r"<th>loop</th><td>ends [1-9]\d*\.\d° apart, .* s</td><td>ends 0\.0° apart</td>", page)
+    followed = (
+        rf"<td>the physical figure follows it for 20 s with a residual of {100 * follows.residual:.1f} % of weight"
+    )
+    assert re.search(r"<th>physical figure</th><td>the physical figure (falls|follows).*" + followed, page)
     again = load(tmp_path / "walk.bvh").clip
     np.testing.assert_allclose(pose_difference(again.poses, made.clip.poses), 0.0, atol=1e-7)
 
