@@ -25,6 +25,7 @@ from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
 from experiments.bench.figures import Figure, print_figures
 from experiments.bench.page_cost import picture_microseconds
+from experiments.bench.prepare_cost import prepare_cost
 from experiments.bench.recorder_cost import recorder_cost
 from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
@@ -113,6 +114,9 @@ def figures() -> Iterator[Figure]:
     yield in_steps("certificate of the demo", 1e6 * made, 300_000)
     yield Figure("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
     yield in_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
+    preparing = prepare_cost()
+    yield Figure("preparing captures, processor time", preparing.clip, "× the clips' duration", at_most=6.0)
+    yield Figure("preparing captures, against simulating their figure", preparing.simulating, "× the processor time")
 
 
 def libraries_seconds() -> float:

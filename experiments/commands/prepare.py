@@ -30,7 +30,7 @@ class Command:
     """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
     frame_rate: float | None = None
     """Frames per second, where the file does not state them (AMC) or states them wrongly [Hz]."""
-    report: Path | None = None
+    report: Annotated[Path | None, tyro.conf.arg(aliases=["--out-report"])] = None
     """Folder for a page that shows what was done."""
     overwrite: bool = False
     """Replace the target if it exists."""
@@ -47,7 +47,7 @@ class Command:
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
         told = {
             "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,
-            "faults": outcome.faults(),
+            "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
         report = outcome.made.report
         lines = [*(report.notes() if report else ()), summary(outcome)]

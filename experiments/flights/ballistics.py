@@ -14,20 +14,20 @@ from controllers.certificates.flight.ballistic import (
     judge_flights,
 )
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
-from controllers.certificates.flight.flight_fit import FlightFit, best_fall
+from controllers.certificates.flight.flight_fit import FlightFit, best_fall, find_flights
 from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
 from controllers.gravity import GRAVITY
-from controllers.state import Array
+from controllers.state import Array, Mask
 from experiments.files.certificate_files import clip_inputs
 from models.humanoid.skeleton import N_POSE
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import sole_points
+from models.mocap.preparation.skate import stance_slides
 from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, tracked_motion
@@ -116,16 +116,36 @@ def body_motion(clip: Clip) -> BodyMotion:
 def body_contact(clip: Clip) -> BodyContact:
     """Floor contact and foot skate of a clip, for the certificate's checks of the capture."""
     touched, points = contacts(clip), sole_points(clip.poses)
-    travelled = [0.0]
-    for part in range(points.shape[1]):
-        for start, end in spans(touched.resting[:, part]):
-            stance = points[start:end, part, :2]
-            travelled.append(float(np.linalg.norm(stance - np.median(stance, axis=0), axis=1).max()))
+    slid = float(stance_slides(points, touched.resting[:, : points.shape[1]]).max())
     turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)
     return BodyContact(
-        touched.clearance, touched.supported, np.any(touched.resting, axis=1), max(travelled),
+        touched.clearance, touched.supported, np.any(touched.resting, axis=1), slid,
         np.linalg.norm(turns, axis=2).max(axis=1, initial=0.0),
     )  # fmt: skip
+
+
+def clip_flights(clip: Clip) -> tuple[tuple[float, float], ...]:
+    """Time of the last contact before each flight of a clip and of the first one after it [s].
+
+    Of a closed clip the flights that begin within a lap: one over the seam ends in the next lap.
+    """
+    laps = _laps(clip)
+    supported = contacts(laps).supported
+    found = [span for span in find_flights(supported, laps.fps) if _within_first_lap(span[0], clip, supported)]
+    return tuple((start / laps.fps, end / laps.fps) for start, end in found)
+
+
+def _laps(clip: Clip) -> Clip:
+    """The clip; a closed one with a second lap, so that a flight over the seam is whole."""
+    return clip.with_next_lap() if clip.closes() else clip
+
+
+def _within_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
+    """Whether a flight from a frame on begins in the first lap: at its beginning it is the second half of the last one.
+
+    `supported` are the frames of all laps in which anything bears load.
+    """
+    return len(supported) == clip.n_frames or int(np.argmax(supported)) <= start < clip.n_frames - 1
 
 
 def clip_ballistics(
@@ -137,15 +157,10 @@ def clip_ballistics(
 
     `assumptions` are added to those of the verdict on the flights.
     """
-    laps = clip
-    if clip.closes():
-        laps = Clip(np.vstack([clip.poses, clip.displacement.moved(clip.poses[1:])]), clip.fps, clip.name)
+    laps = _laps(clip)
     motion = body_motion(laps)
-    flights = judge_flights(motion, judging.tolerance)
-    if laps is not clip:
-        # A flight at the beginning of a lap is the second half of the flight at its end.
-        first, last = int(np.argmax(motion.supported)), clip.n_frames - 1
-        flights = tuple(flight for flight in flights if first <= flight.fit.start < last)
+    judged = judge_flights(motion, judging.tolerance)
+    flights = tuple(flight for flight in judged if _within_first_lap(flight.fit.start, clip, motion.supported))
     bounds = rate_bounds(motion, flights, judging.friction)
     doubts, measures = contact_doubts(body_contact(laps), motion.com, laps.fps, judging.contact)
     verdict = ballistic_verdict(motion, flights, judging.tolerance, doubts, measures)

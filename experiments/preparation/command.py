@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from controllers.checks import of_kind
-from experiments.flights.ballistics import clip_ballistics
+from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.followed import followed
-from experiments.preparation.prepared_file import PreparedFile
+from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
 from models.mocap.library import check_target, writing
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
 from models.mocap.readers.own_bvh import write_bvh
@@ -49,13 +50,19 @@ def prepare_file(
     source, target = Path(source), Path(target)
     check_target(target, overwrite)
     made = prepared(source, loop, mirror, hints)
-    refuted = tuple(flight.reason for flight in clip_ballistics(made.clip).flights if flight.verdict == "refuted")
-    outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip), refuted)
+    found = clip_ballistics(made.clip)
+    refuted = tuple(flight.reason for flight in found.flights if flight.verdict == "refuted")
+    outcome = PreparedFile(made, *_measured(made.clip), refuted, doubts(found))
+    captured = None if report is None else _measured(made.captured)
     with writing(target):
         write_bvh(made.clip, target)
-        if report is not None:
+        if report is not None and captured is not None:
             from experiments.preparation.page import page  # late: matplotlib and viser
 
             Path(report).mkdir(parents=True, exist_ok=True)
-            (Path(report) / f"prepare-{source.stem}.html").write_text(page(outcome), encoding="utf-8")
+            (Path(report) / f"prepare-{source.stem}.html").write_text(page(outcome, captured), encoding="utf-8")
     return outcome
+
+
+def _measured(clip: Clip) -> Measured:
+    return Measured(well_formed(clip, clip_flights(clip)), followed(clip))

@@ -5,20 +5,20 @@ from html import escape
 from experiments.files.html_page import html_page, image
 from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
-from experiments.preparation.prepared_file import PreparedFile, advice, changes
-from models.mocap.preparation.well_formed import well_formed
+from experiments.preparation.prepared_file import Measured, PreparedFile, advice, changes, gaps
 
 
-def page(outcome: PreparedFile) -> str:
+def page(outcome: PreparedFile, captured: Measured) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
-    made = outcome.made
-    before = well_formed(made.captured)
+    made, (before, follows) = outcome.made, captured
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
+    gap_before, gap = gaps(made)
+    names = ("soles", "ends", "continuity", "dynamics", "loop", "physical figure")
+    was = (*before.lines(), gap_before, follows.line())
+    now = (*outcome.measures.lines(), gap, outcome.followed.line())
     rows = "".join(
-        f"<tr><th>{name}</th><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
-        for name, was, now in zip(
-            ("soles", "ends", "continuity", "dynamics"), before.lines(), outcome.measures.lines(), strict=True
-        )
+        f"<tr><th>{name}</th><td>{escape(first)}</td><td>{escape(then)}</td></tr>"
+        for name, first, then in zip(names, was, now, strict=True)
     )
 
     def listed(title: str, lines: tuple[str, ...]) -> str:
@@ -30,7 +30,7 @@ def page(outcome: PreparedFile) -> str:
         f'<p>{well} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
-        + listed("What is not within bounds", (*outcome.faults(), *advice(made)))
+        + listed("What is not within bounds, or not certified", (*outcome.faults(), *outcome.doubts, *advice(made)))
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
         + listed("What the file was taken for", made.report.lines() if made.report else ())

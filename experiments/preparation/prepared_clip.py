@@ -25,7 +25,7 @@ class PreparedClip(NamedTuple):
     clip : Clip
         The prepared clip; unchanged if the file is on the figure's own skeleton.
     remarks : tuple of str
-        How the file was interpreted and what was done with it, a line each.
+        What the file lacks, what was assumed or repaired, and what was done with it, a line each.
     feasible : bool
         False if the capture was prepared, but no motion near it is feasible on contact.
     """
@@ -78,15 +78,16 @@ class _Capture(NamedTuple):
 
     def prepared(self, raw: bool) -> PreparedClip:
         clip, report = self.loaded.clip, self.loaded.report
+        notes = () if report is None else tuple(f"{self.path.name}: {note}" for note in report.notes())
         if raw or report is None:
-            return PreparedClip(clip, () if report is None else report.lines())
+            return PreparedClip(clip, notes)
         rows = kept_array(kept_folder(_CODE), "prepared", self._made_of, self._shape, self._found)
         done = (
             "prepared"
             if rows[0, 1]
             else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
         )
-        remarks = (*report.lines(), f"{self.path.name}: {done}; --raw takes the capture as it is")
+        remarks = (*notes, f"{self.path.name}: {done}; --raw takes the capture as it is")
         return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks, bool(rows[0, 1]))
 
     def _found(self) -> Array:

@@ -4,12 +4,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.followed import Followed
 from models.mocap.motion.clip import Clip
+from models.mocap.preparation.laps import likeness
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
 
+_ADDED = {"way back": "the way back", "open": "coming to rest at both ends"}
+_MOST = 0.5  # share of the file's own motion below which it is told
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
+
+
+class Measured(NamedTuple):
+    """Measures of a clip, and how the physical figure follows it."""
+
+    measures: WellFormed
+    followed: Followed
 
 
 class PreparedFile(NamedTuple):
@@ -25,12 +36,15 @@ class PreparedFile(NamedTuple):
         How the physical figure follows it.
     flights : tuple of str
         Flights that the certificate refutes, and why, a line each.
+    doubts : tuple of str
+        What else the certificate does not certify, and why, a line each (`doubts`).
     """
 
     made: Prepared
     measures: WellFormed
     followed: Followed
     flights: tuple[str, ...]
+    doubts: tuple[str, ...]
 
     @property
     def clip(self) -> Clip:
@@ -58,8 +72,21 @@ def summary(outcome: PreparedFile) -> str:
         f"contact lacks {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
         f"{made.seconds:.0f} s of processor time; "
         + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
-        + "".join(f"; {line}" for line in advice(made))
+        + "".join(f"; {line}" for line in (*outcome.doubts, *advice(made)))
     )
+
+
+def doubts(found: ClipBallistics) -> tuple[str, ...]:
+    """Verdicts that are neither certified nor told by a refuted flight: a line each, without the certified flights."""
+    ballistic, turns = (found.certificate.verdicts[name] for name in ("ballistic", "turns"))
+    certified = {flight.reason for flight in found.flights if flight.verdict == "certified"}
+    lines: list[str] = []
+    if ballistic.verdict == "unknown":
+        why = "; ".join(part for part in ballistic.reason.split("; ") if part not in certified)
+        lines.append(f"whether it is ballistic is unknown: {why}")
+    if turns.verdict != "certified":
+        lines.append(f"turns are {turns.verdict}: {turns.reason}")
+    return tuple(lines)
 
 
 def changes(made: Prepared) -> tuple[str, ...]:
@@ -72,6 +99,10 @@ def changes(made: Prepared) -> tuple[str, ...]:
         "open": "the whole, at rest at both ends",
     }
     lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
+    own = (part.end - max(part.start, 0.0)) / made.clip.duration
+    if part.kind in _ADDED and own < _MOST:
+        what = f"of {made.clip.duration:.2f} s the file's own motion is {part.end - max(part.start, 0.0):.2f} s"
+        lines.append(f"{what}; the rest is {_ADDED[part.kind]}, which is not in the file")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
     if made.carried > _CARRIED:
@@ -90,6 +121,17 @@ def changes(made: Prepared) -> tuple[str, ...]:
         f"{100 * change.moved:.1f} cm over the floor RMS; " + made.fidelity.line()
     )
     return tuple(lines)
+
+
+def gaps(made: Prepared) -> tuple[str, str]:
+    """How far the ends of the loop are apart, d of `laps`, in the capture and in the clip."""
+    part, last = made.looped, made.clip.n_frames - 1
+    if part.kind == "open":
+        return "no loop", "no loop: at rest at both ends"
+    gap = float(likeness(made.clip, np.array([0, last]))[0][0, 1])
+    mirror = " in a mirror" if part.kind == "half stride" else ""
+    was = f"ends {np.rad2deg(part.gap):.1f}° apart{mirror}" if np.isfinite(part.gap) else "as stated"
+    return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
 
 
 def advice(made: Prepared) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.flights.ballistics import clip_flights
 from experiments.preparation.followed import followed
 from models.errors import ModelError
 from models.mocap.library import embedded
@@ -19,15 +20,15 @@ from models.mocap.preparation.well_formed import WellFormed, well_formed
 SECONDS = 20.0  # [s] for which the figure follows each clip
 HEAD = (
     "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
-    "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root from the capture, RMS | most "
-    "| processor time: s, times the clip, times simulating |\n"
+    "| skate mm | stand out | ends rad/s | flights: m/s² beside gravity (number) | joints beyond ° "
+    "| joints, root from the capture, RMS | most | processor time: s, times the clip, times simulating |\n"
     "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 )
 
 
 def row(name: str, made: Prepared) -> str:
     """A line of the table."""
-    was, now = well_formed(made.captured), well_formed(made.clip)
+    was, now = (well_formed(clip, clip_flights(clip)) for clip in (made.captured, made.clip))
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
     most = kept.extremes[0]
@@ -44,13 +45,17 @@ def row(name: str, made: Prepared) -> str:
         f"{1000 * was.skate:.0f} → {1000 * now.skate:.0f}",
         f"{was.outliers} → {now.outliers}",
         f"{was.seam:.1f} → {now.seam:.1f}",
-        f"{was.falling:.1f} → {now.falling:.1f}",
+        f"{_flights(was)} → {_flights(now)}",
         f"{np.rad2deg(was.excess):.0f} → {np.rad2deg(max(now.excess, 0.0)):.0f}",
         f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
         f"{most.joint} {np.rad2deg(most.angle):.0f}°",
         f"{made.seconds:.1f}, {made.seconds / seconds:.1f}, {made.seconds / (seconds * after.cost):.0f}",
     )
     return "| " + " | ".join(cells) + " |"
+
+
+def _flights(measures: WellFormed) -> str:
+    return f"{measures.falling:.1f} ({measures.flights})" if measures.flights else "none"
 
 
 def _soles(measures: WellFormed) -> str:

@@ -17,9 +17,10 @@ from models.mocap.readers.deepmimic import read_deepmimic
 from models.mocap.readers.motion_file import MotionFileError, numbered_lines
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.bodies import bodies
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget import retarget
-from models.mocap.retargeting.retarget_report import RetargetReport, floor_remarks
+from models.mocap.retargeting.retarget_report import RetargetReport, copy_remarks, floor_remarks
 from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 
@@ -92,8 +93,8 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     Raises
     ------
     MotionFileError
-        If the file cannot be read, its skeleton is not a human's, or it is the figure's own, of which nothing but the
-        frame rate is there to state.
+        If the file cannot be read, its skeleton is not a human's, it has more than one, of which none is chosen, or it
+        is the figure's own, of which nothing but the frame rate is there to state.
     """
     hints, motion = hints or Hints(), read_motion(path)
     if hints.frame_rate is not None:
@@ -103,14 +104,35 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
             what = f"it is on the figure's own skeleton, whatever {' and '.join(estimated)} would state"
             raise MotionFileError(path, 0, what, f"no {' or '.join(estimated)}")
         return Loaded(clip, None)
-    roles = roles_of(motion.joints, motion.parents) if hints.roles is None else stated_roles(hints.roles, motion)
+    people = bodies(motion)
+    if hints.roles is not None:
+        motion, roles = stated_roles(hints.roles, motion, people)
+    else:
+        _check_alone(motion, people)
+        roles = roles_of(motion.joints, motion.parents)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
         expected = "the skeleton of a human, or --roles FILE that says which joint is which"
         raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", expected)
     clip, report = retarget(motion, roles, hints)
-    standing = tuple(floor_remarks(contacts(clip).clearance, clip.fps))
-    return Loaded(clip, report._replace(remarks=report.remarks + standing), motion.loops)
+    copies = [joint for own in people if len(own) > 1 for joint in own] if hints.roles is None else []
+    remarks = (
+        *copy_remarks([motion.joints[joint] for joint in copies], report.taken["pelvis"]),
+        *report.remarks,
+        *floor_remarks(contacts(clip).clearance, clip.fps),
+    )
+    return Loaded(clip, report._replace(remarks=remarks), motion.loops)
+
+
+def _check_alone(motion: SourceMotion, people: Sequence[Sequence[int]]) -> None:
+    """Raise if there are several people in a file."""
+    if len(people) < 2:
+        return
+    hips = [motion.joints[copies[0]] for copies in people]
+    expected = f'one, or --roles FILE whose line pelvis = "{hips[-1]}" says whose motion is taken'
+    if len(set(hips)) < len(hips):
+        expected = "one, or joints of other names for each, so that --roles can tell them apart"
+    raise MotionFileError(motion.path, 1, f"there are {len(people)} people, with the hips {', '.join(hips)}", expected)
 
 
 def read_motion(path: Path) -> SourceMotion:

@@ -17,7 +17,7 @@ from controllers.state import Array, Mask
 
 NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 FEWEST = 5  # frames of a flight: two more than a parabola has coefficients
-SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support is a foot that rolls over; `bounds` in models has the same
+SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support is a foot that rolls over
 
 
 @dataclass(frozen=True)

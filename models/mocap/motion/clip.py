@@ -148,6 +148,10 @@ class Clip:
         joints = np.linalg.norm(gap[3:].reshape(-1, 3), axis=1)
         return bool(max(np.linalg.norm(gap[:3]), joints.max()) <= tolerance)
 
+    def with_next_lap(self) -> "Clip":
+        """The clip, and once more from where it ends: of a closed one, in which a flight over the seam is whole."""
+        return Clip(np.vstack((self.poses, self.displacement.moved(self.poses[1:]))), self.fps, self.name)
+
     def velocities(self) -> Array:
         r"""Tangents (MuJoCo's qvel) by central differences, shape (n, 57).
 

@@ -11,9 +11,6 @@ RESIDUAL, FLYING = 0.05, 0.12
 SEAM = 0.3  # difference of the velocities at a closed clip's ends [rad/s, m/s]
 REST = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
 LIMIT = np.deg2rad(1.0)  # excess over a joint's range: Euler angles and rotation vectors differ by as much near limits
-# [s]: in a shorter gap of support a foot rolls over; as `flight_fit` in controllers defines it. Half of it names other
-# faults in two of 26 clips; with twice of it the embedded run has no flights.
-SHORTEST_FLIGHT = 0.08
 FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
 
 

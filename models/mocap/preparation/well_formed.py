@@ -3,6 +3,7 @@
 The bounds are those of `bounds`; `WellFormed.faults` names the measures that exceed them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,10 @@ import numpy as np
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
-from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import (
     FLATTEST,
     FLIGHT,
@@ -26,7 +25,6 @@ from models.mocap.preparation.bounds import (
     RESIDUAL,
     REST,
     SEAM,
-    SHORTEST_FLIGHT,
     SKATE,
     beyond,
 )
@@ -64,7 +62,7 @@ class WellFormed:
     seam : float
         RMS over the joints of the difference of the ends' velocities if closed, else of the larger velocity [rad/s].
     flights : int
-        How often nothing touches the floor for more than `SHORTEST_FLIGHT`.
+        Number of flights.
     falling : float
         RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
@@ -136,8 +134,17 @@ class WellFormed:
         )
 
 
-def well_formed(clip: Clip) -> WellFormed:
-    """Measure a clip."""
+def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellFormed:
+    """Measure a clip.
+
+    Parameters
+    ----------
+    clip : Clip
+        A motion on the floor.
+    flights : sequence of (float, float)
+        Time of the last contact before each flight and of the first one after it [s]; that is in the next lap where a
+        closed clip flies over its seam.
+    """
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
     closed = clip.closes(CLOSES)
     schedule = stances(clip, smoothed(clip))
@@ -148,11 +155,10 @@ def well_formed(clip: Clip) -> WellFormed:
     low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
     given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     slides = skates(clip, schedule, given.loads)
-    flights, falling = _flights(clip)
     return WellFormed(
         clip.duration, float(low), float(high), _tilt(clip, soles), float(np.quantile(slides, 0.95)),
         float(slides.max()), outliers(clip), closed,
-        _seam(clip, closed), flights, falling,
+        _seam(clip, closed), len(flights), _falling(clip, flights),
         float(beyond_ranges(clip.poses).max()),
         given.residual, given.strain, given.joint,
     )  # fmt: skip
@@ -191,20 +197,16 @@ def _seam(clip: Clip, closed: bool) -> float:
     return float(max(np.sqrt(np.mean(first**2)), np.sqrt(np.mean(last**2))))
 
 
-def _flights(clip: Clip) -> tuple[int, float]:
-    if clip.n_frames < 5:
-        return 0, 0.0
-    flying = ~contacts(clip).supported
-    flights = [(a, b) for a, b in spans(flying) if b - a > SHORTEST_FLIGHT * clip.fps]
+def _falling(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:
     if not flights:
-        return 0, 0.0
-    com = momentum(clip).com
+        return 0.0
+    com = momentum(clip.with_next_lap() if flights[-1][1] > clip.duration else clip).com
     squares: list[float] = []
     for start, end in flights:
-        times = np.arange(end - start) / clip.fps
-        if len(times) < 4:
+        aloft = com[round(start * clip.fps) + 1 : round(end * clip.fps)]
+        if len(aloft) < 4:
             continue
         # A parabola's leading coefficient is half the acceleration, without the noise of second differences.
-        acceleration = 2.0 * np.polyfit(times, com[start:end], 2)[0]
+        acceleration = 2.0 * np.polyfit(np.arange(len(aloft)) / clip.fps, aloft, 2)[0]
         squares.append(float(np.sum((acceleration + np.array([0.0, 0.0, GRAVITY])) ** 2)))
-    return len(flights), float(np.sqrt(np.mean(squares))) if squares else 0.0
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0

@@ -155,7 +155,9 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
                 raise tokens.error(f"joint {quoted(joint.name)} (line {joint.line}) has no OFFSET", "OFFSET x y z")
         else:
             raise tokens.error(f"found {quoted(word)}", "OFFSET, CHANNELS, JOINT, End Site or }")
-    if (word := tokens.next("MOTION")).upper() != "MOTION":
+    if (word := tokens.next("MOTION")).upper() == "ROOT":
+        raise tokens.error("a second ROOT, as of another person", "one skeleton, of one person, in a file")
+    if word.upper() != "MOTION":
         raise tokens.error(f"found {quoted(word)} after the root's }}", "MOTION")
     return joints, n_columns
 

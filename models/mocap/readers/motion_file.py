@@ -43,8 +43,17 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:39] + "…")
 
 
-def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
+def read_text(path: Path, limit: int = FILE_LIMIT, kind: str = "motion file") -> bytes:
     """A text file's content with lines ended by LF alone, from any mixture of LF, CR LF and CR.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    limit : int
+        Largest size [bytes].
+    kind : str
+        What it should be, for errors.
 
     Raises
     ------
@@ -56,14 +65,14 @@ def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
             content = file.read(limit + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MotionFileError(path, 0, f"cannot be opened ({reason})", "a readable motion file") from None
+        raise MotionFileError(path, 0, f"cannot be opened ({reason})", f"a readable {kind}") from None
     if len(content) > limit:
-        raise MotionFileError(path, 0, "file is too large", f"at most {limit // 1_000_000} MB")
+        raise MotionFileError(path, 0, "file is too large", f"a {kind} of at most {limit / 1e6:g} MB")
     if b"\0" in content:
         line = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise MotionFileError(path, line, "binary content (a zero byte)", "a text file")
     if not content.strip():
-        raise MotionFileError(path, 1, "file is empty", "a motion")
+        raise MotionFileError(path, 1, "file is empty", f"a {kind}")
     content = content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if content.count(b"\n") > LINES_LIMIT:
         raise MotionFileError(path, LINES_LIMIT, "file goes on", f"at most {LINES_LIMIT} lines")

@@ -1,7 +1,7 @@
 """A motion on its source skeleton: what the readers return, before any retargeting."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +70,20 @@ class SourceMotion:
         """Frames in which no one of these joints is rotated, though some are in others: the zero pose; shape (n,)."""
         turned = np.abs(self.rotations[:, list(joints), 1:]).max(axis=2, initial=0.0) > _UNTURNED
         return ~turned.any(axis=1) & turned.any()
+
+    def of_joints(self, kept: Sequence[int]) -> "SourceMotion":
+        """The motion of some joints, in their order, each with its parent."""
+        new = {-1: -1} | {joint: k for k, joint in enumerate(kept)}
+        chosen = list(kept)
+        return replace(
+            self,
+            joints=tuple(self.joints[joint] for joint in kept),
+            parents=tuple(new[self.parents[joint]] for joint in kept),
+            offsets=self.offsets[chosen],
+            tips=self.tips[chosen],
+            rotations=self.rotations[:, chosen],
+            translations=self.translations[:, chosen],
+        )
 
     def global_rotations(self) -> Array:
         """Rotation of every joint from the zero pose in the file's axes, shape (frames, joints, 4)."""

@@ -10,6 +10,9 @@ Between the pose and the motion is one step, v₀, that the motion does not go o
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
   interpolation has spread the one step.
 
+The jump is sought in the first quarter of a motion. Where a pose is held without any change, as no living body stands,
+it is sought where that ends, however late; such a pose is told by its zero rotations or its straight limbs alone.
+
 The second and third do not depend on how fast the motion is, nor on its frame rate. |v| is the RMS over the joints that
 segments of the figure follow.
 """
@@ -24,7 +27,10 @@ from models.mocap.retargeting.broken_frames import FEWEST
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 # Half or twice of each of these numbers finds no such pose in 17 captures, none of which has one.
-_SHARE = 0.25  # largest share of a motion that may be such a pose, held
+_SHARE = 0.25  # largest share of a motion that may be such a pose, unless it is held without any change
+_STILL = (
+    1e-5  # largest step of a pose that does not change [rad], RMS over the joints: files have four decimals or more
+)
 _TIMES = 5.0  # least ratio of the jump to the 99th percentile of the steps
 _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns so far in a frame
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
@@ -48,7 +54,8 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
     jumped = _jumped(turns, at_rest, lines)
     begun, ended = _spread(_size(turns), round(_BLENDED * motion.fps))
-    told = ended <= _SHARE * motion.n_frames and (at_rest[: begun + 1].all() or _calibrating(lines))
+    soon = ended <= _SHARE * motion.n_frames or _stands(_size(turns)) == begun
+    told = soon and (at_rest[: begun + 1].all() or _calibrating(lines))
     return max(jumped, ended) if told else jumped
 
 
@@ -56,10 +63,11 @@ def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:
     """Number of frames before a jump from a calibration pose; 0 if there is none."""
     n = len(turns) + 1
     steps = _size(turns)
-    early = steps[: max(1, int(_SHARE * n))]
+    share, stands = max(1, int(_SHARE * n)), _stands(steps)
+    early = steps[: max(share, stands + 1)]
     if early.max() < _TURN:
         return 0
-    if n >= FEWEST:
+    if n >= FEWEST and stands < share:
         jump = int(np.argmax(early))
         usual = float(np.quantile(np.delete(steps, jump), 0.99))
         # The pose is held still; if there is motion before the jump, the jump is a fault of the capture.
@@ -72,6 +80,11 @@ def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:
     as_zero = at_rest[: jump + 1].all() and not at_rest[jump + 1] and leaves > steps[jump + 1]
     as_posed = _calibrating(lines) and leaves > 2.0 * steps[jump + 1 : jump + 4].max()
     return jump + 1 if as_zero or as_posed else 0
+
+
+def _stands(steps: Array) -> int:
+    """The first step of a pose that changes; their number if none does."""
+    return int(np.argmax(np.append(steps > _STILL, True)))
 
 
 def _spread(steps: Array, longest: int) -> tuple[int, int]:

@@ -150,6 +150,13 @@ def frame_remarks(
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
 
 
+def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
+    """Skeletons whose hips are at one place, of which one is taken."""
+    if hips:
+        told = f"{len(hips)} skeletons have their hips at one place ({', '.join(hips)}): that of {taken} is taken"
+        yield f'{told}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
+
+
 def floor_remarks(clearance: Array, fps: float) -> Iterator[str]:
     """Where the body is above the floor for longer than a flight lasts, and where beneath it.
 

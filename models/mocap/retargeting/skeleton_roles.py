@@ -58,10 +58,13 @@ class Roles(NamedTuple):
     spine: tuple[int, ...] = ()
 
 
-def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
-    """The roles of a skeleton's joints; or, where they do not tell a human's, the part that no joint is taken for."""
+def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | None = None) -> Roles | str:
+    """The roles of a skeleton's joints; or, where they do not tell a human's, the part that no joint is taken for.
+
+    The pelvis is found, too, unless it is stated.
+    """
     names = names_of(joints)
-    named: dict[str, int] = {}
+    named: dict[str, int] = {} if pelvis is None else {"pelvis": pelvis}
     for side in ("left", "right"):
         for limb in (_LEG, _ARM):
             named |= _limb(side, limb, names, parents)
@@ -84,6 +87,20 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
             if further := [k for k in joints_below(joint, parents) if not names[k].helper and names[k].bare != own]:
                 return f"{side}_{lower}, though {joints[further[0]]} is below {joints[joint]}"
     return roles
+
+
+def has_legs(top: int, joints: tuple[str, ...], parents: tuple[int, ...]) -> bool:
+    """Whether a thigh and a shank below it, of both sides, are below a joint, by the names there alone."""
+    below = joints_below(top, parents)
+    names = dict(zip(below, names_of(tuple(joints[k] for k in below)), strict=True))
+    legs = set[str]()
+    thighs: dict[int, frozenset[tuple[str, str]]] = {parents[top]: frozenset()}  # side and word of those above
+    for k in below:
+        above, (side, bare, *_) = thighs[parents[k]], names[k]
+        if bare in _LEG["shank"] and any(thigh[0] == side and thigh[1] != bare for thigh in above):
+            legs.add(side)
+        thighs[k] = above | {(side, bare)} if bare in _LEG["thigh"] else above
+    return {"left", "right"} <= legs
 
 
 def names_of(joints: tuple[str, ...]) -> tuple[JointName, ...]:
@@ -216,7 +233,7 @@ def _head(
 
 def _free(named: dict[str, int], parents: tuple[int, ...]) -> list[int]:
     """Joints that neither carry a limb nor belong to one."""
-    limbs = set(named.values())
+    limbs = {joint for part, joint in named.items() if part.startswith(("left", "right"))}
     carrying = {joint for limb in limbs for joint in ancestry(limb, parents)}
     return [k for k in range(len(parents)) if k not in carrying and limbs.isdisjoint(ancestry(k, parents))]
 

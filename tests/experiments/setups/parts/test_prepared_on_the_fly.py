@@ -11,7 +11,7 @@ from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import prepare
 from models.mocap.readers.own_bvh import write_bvh
-from tests.models.mocap.retargeting.rigs import random_rig, write_rig
+from tests.models.mocap.retargeting.rigs import Rig, random_rig, write_rig
 
 
 @pytest.fixture
@@ -67,6 +67,18 @@ def test_raw_takes_the_capture_as_it_is(foreign: Path, calls: list[Path]) -> Non
     (clip,), _ = load_clips([str(foreign)], raw=True)
     np.testing.assert_array_equal(clip.poses, load(foreign).clip.poses)
     assert not calls
+
+
+@pytest.mark.parametrize("raw", [True, False])
+def test_of_a_capture_is_told_what_it_lacks_by_its_name_and_not_every_joint(
+    tmp_path: Path, calls: list[Path], raw: bool
+) -> None:
+    path = tmp_path / "captured.bvh"
+    write_rig(Rig(without=("clavicle",)), embedded("cheer"), path)
+    _, remarks = load_clips([str(path)], raw)
+    assert remarks[0] == "captured.bvh: missing: left_clavicle (follows chest), right_clavicle (follows chest)"
+    assert not any(word in remark for remark in remarks for word in ("taken: ", "unused: ", "axes: ", "unit: "))
+    assert bool(calls) is not raw
 
 
 def test_the_figures_own_files_and_embedded_clips_are_taken_as_they_are(tmp_path: Path, calls: list[Path]) -> None:

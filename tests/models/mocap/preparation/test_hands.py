@@ -82,7 +82,7 @@ def test_a_body_on_toes_and_palms_has_both_in_its_schedule(held):
     found = borne(held, schedule)
     assert found.residual < 2e-3
     assert found.loads.sum(axis=1) == pytest.approx(1.0, abs=5e-3)
-    assert well_formed(held).residual < 2e-3
+    assert well_formed(held, ()).residual < 2e-3
 
 
 @pytest.mark.parametrize("lift", [-0.05, 0.05])

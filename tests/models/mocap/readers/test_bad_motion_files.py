@@ -40,6 +40,10 @@ WRONG_BVH = {
     "unclosed": (BVH[: BVH.index("  JOINT Right")], "x.bvh:11: file ends in the hierarchy; expected }"),
     "nan": (BVH.replace("0 8 1 1", "0 nan 1 1"), "x.bvh:23: 'nan' is not a number"),
     "infinity": (BVH.replace("0 8 1 1", "0 inf 1 1"), "x.bvh:23: 'inf' is not a number"),
+    "two roots": (
+        BVH.replace("MOTION", "ROOT B\nMOTION"),
+        "x.bvh:19: a second ROOT, as of another person; expected one",
+    ),
     "overflow": (BVH.replace("0 8 1 1", "0 1e999 1 1"), "x.bvh:23: number '1e999' is too large"),
     "huge": (BVH.replace("0 8 1 1", "0 1e30 1 1"), "x.bvh:23: number '1e30' is too large"),
     "underscores": (BVH.replace("0 8 1 1", "0 1_000 1 1"), "x.bvh:23: '1_000' is not a number"),

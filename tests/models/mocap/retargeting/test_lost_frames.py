@@ -85,17 +85,46 @@ def test_arms_held_out_before_a_fast_motion_are_left_out(name, fps, drop, tmp_pa
     np.testing.assert_allclose(led.clip.poses, load(tmp_path / "plain.bvh", UP).clip.poses, atol=1e-9)
 
 
+@pytest.mark.parametrize("held", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("zero", ["T", "random"])
+def test_a_pose_that_is_held_without_any_change_is_left_out_however_long(zero, held, tmp_path):
+    """As a multiple of the motion's own duration; zero rotations, whatever the pose is."""
+    clip = at_rate("walk", 30.0)
+    n = round(held * clip.n_frames)
+    write_rig(Rig(zero=zero), clip, tmp_path / "plain.bvh")
+    write_rig(Rig(zero=zero, leading=n), clip, tmp_path / "led.bvh")
+    led = load(tmp_path / "led.bvh")
+    assert led.report.dropped == n
+    assert not any("jumps" in line for line in led.report.notes())
+    np.testing.assert_allclose(led.clip.poses, load(tmp_path / "plain.bvh").clip.poses, atol=1e-9)
+
+
+def test_a_body_that_stands_still_and_then_walks_keeps_its_frames(tmp_path):
+    """Held without any change, but no T-pose, whether it begins to walk slowly or is cut to."""
+    clip = at_rate("walk", 30.0)
+    n = clip.n_frames
+    stood, elsewhere = (np.repeat(clip.poses[k : k + 1], n, axis=0) for k in (0, 5))
+    arms_out, first = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1)), clip.poses[0, 3:].reshape(-1, 4)
+    turned = [quaternions.slerped(arms_out, first, share) for share in np.clip(np.arange(-n, 15) / 15.0, 0.0, 1.0)]
+    lowered = np.array([np.concatenate((clip.poses[0, :3], pose.ravel())) for pose in turned])
+    for before in (stood, elsewhere, lowered):
+        write_rig(Rig(zero="A", seed=5), Clip(np.vstack((before, clip.poses)), clip.fps, "walk"), tmp_path / "r.bvh")
+        assert load(tmp_path / "r.bvh").report.dropped == 0
+
+
+@pytest.mark.parametrize("held", [0.0, 0.5])
 @pytest.mark.parametrize("name", ["walk", "run", "cheer"])
-def test_arms_held_out_that_a_filter_blends_into_the_motion_are_left_out(name, tmp_path):
-    """Over 0.05 s, so that no step is far from the next one."""
+def test_arms_held_out_that_a_filter_blends_into_the_motion_are_left_out(name, held, tmp_path):
+    """Over 0.05 s, so that no step is far from the next one; held before for a multiple of the motion's duration."""
     clip = embedded(name)
     pose, n = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1)), round(0.05 * clip.fps)
     first = clip.poses[0, 3:].reshape(-1, 4)
-    shares = np.sin(np.pi / 2.0 * np.arange(n) / n)
+    shares = np.append(np.zeros(round(held * clip.n_frames)), np.sin(np.pi / 2.0 * np.arange(n) / n))
     blended = [np.concatenate((clip.poses[0, :3], quaternions.slerped(pose, first, s).ravel())) for s in shares]
     write_rig(Rig(zero="random", seed=5), clip, tmp_path / "plain.bvh")
     write_rig(Rig(zero="random", seed=5), Clip(np.vstack((blended, clip.poses)), clip.fps, name), tmp_path / "led.bvh")
     led, plain = load(tmp_path / "led.bvh", UP), load(tmp_path / "plain.bvh", UP).clip
+    n = len(shares)
     assert n - 1 <= led.report.dropped <= n
     kept = led.clip.poses[n - led.report.dropped :]
     assert largest_angle(Clip(kept, clip.fps, name), plain) < 1.0

@@ -87,6 +87,16 @@ def test_a_file_of_another_form_is_refused(rig, tmp_path, text):
         load(rig[1], Hints(roles=tmp_path / "roles.toml"))
 
 
+@pytest.mark.parametrize(("size", "said"), [(None, "a readable role file"), (0, "a role file"),
+                                            (200_000, "a role file of at most 0.1 MB")])  # fmt: skip
+def test_what_is_no_role_file_is_said_to_be_none(rig, tmp_path, size, said):
+    path = tmp_path / "roles.toml"
+    if size is not None:
+        path.write_bytes(b"#" * size)
+    with pytest.raises(MotionFileError, match=rf"roles.toml.*; expected {said}$"):
+        load(rig[1], Hints(roles=path))
+
+
 def test_names_that_two_joints_have_are_refused(rig, tmp_path):
     _, bare, roles = rig
     bare.write_text(bare.read_text().replace(f"{roles['right_shank']}\n", f"{roles['left_shank']}\n"))

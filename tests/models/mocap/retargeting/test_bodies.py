@@ -1,0 +1,117 @@
+"""Files of several people: refused, with the hips of each; a role file chooses one."""
+
+import re
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from models.mocap.library import embedded, load, read_motion
+from models.mocap.motion.clip import Clip
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.retargeting.bodies import bodies
+from models.mocap.retargeting.hints import Hints
+from tests.models.mocap.retargeting.rigs import Rig, random_rig, write_rig
+
+NAME = re.compile(r"(ROOT|JOINT) (\S+)")
+TWO = 'there are 2 people, with the hips A_Hips, B_Hips; expected one, or --roles FILE whose line pelvis = "B_Hips"'
+
+
+def scene(path, *people):
+    """One file of several files, each person's joints with a prefix and its place displaced, under one root."""
+    hierarchies, rows = [], []
+    for file, prefix, displaced in people:
+        hierarchy, motion = file.read_text().split("MOTION\n")
+        _, time, *frames = motion.strip().split("\n")
+        named = NAME.sub(lambda found, prefix=prefix: f"JOINT {prefix}{found[2]}", hierarchy.removeprefix("HIERARCHY"))
+        hierarchies.append(named.strip())
+        values = np.array([frame.split() for frame in frames], dtype=float)
+        values[:, 0] += displaced
+        rows.append(values)
+    n = min(map(len, rows))
+    head = "HIERARCHY\nROOT Scene\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+    table = np.hstack([np.zeros((n, 3)), *(values[:n] for values in rows)])
+    lines = [" ".join(f"{value:.6f}" for value in row) for row in table]
+    path.write_text("\n".join([head + "\n".join(hierarchies), "}", "MOTION", f"Frames: {n}", time, *lines, ""]))
+    return path
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Somebody who stands still, and somebody who walks, on rigs of one kind."""
+    walk = embedded("walk")
+    walking = Clip(walk.poses[::4], walk.fps / 4, "walk")
+    still = Clip(np.repeat(walking.poses[:1], walking.n_frames, axis=0), walking.fps, "still")
+    for clip in (walking, still):
+        write_rig(Rig(), clip, tmp_path / f"{clip.name}.bvh")
+    return tmp_path / "still.bvh", tmp_path / "walk.bvh"
+
+
+def test_two_people_are_refused_by_every_command(files, tmp_path, capsys):
+    both = scene(tmp_path / "both.bvh", (files[0], "A_", 0.0), (files[1], "B_", 100.0))
+    for command in ("convert", "prepare"):
+        assert main([command, str(both), str(tmp_path / "out.bvh")]) == 2
+        assert TWO in capsys.readouterr().err
+    assert main(["track", str(both)]) == 2
+    assert TWO in capsys.readouterr().err
+    assert not (tmp_path / "out.bvh").exists()
+
+
+@pytest.mark.parametrize(("prefix", "which"), [("A_", 0), ("B_", 1)])
+def test_a_role_file_of_the_pelvis_chooses_one(files, tmp_path, prefix, which):
+    both = scene(tmp_path / "both.bvh", (files[0], "A_", 0.0), (files[1], "B_", 100.0))
+    (tmp_path / "roles.toml").write_text(f'pelvis = "{prefix}Hips"\n')
+    loaded, alone = load(both, Hints(roles=tmp_path / "roles.toml")), load(files[which])
+    np.testing.assert_allclose(loaded.clip.poses, alone.clip.poses, atol=1e-6)
+    assert set(loaded.report.taken.values()) == {prefix + joint for joint in alone.report.taken.values()}
+    assert all(joint == "Scene" or joint.startswith(prefix) for joint in loaded.report.unused)
+
+
+def test_a_role_file_of_the_limbs_chooses_one_and_its_head(files, tmp_path):
+    both = scene(tmp_path / "both.bvh", (files[0], "A_", 0.0), (files[1], "B_", 100.0))
+    taken = load(files[1]).report.taken
+    limbs = {role: joint for role, joint in taken.items() if role.startswith(("left", "right"))}
+    (tmp_path / "roles.toml").write_text("".join(f'{role} = "B_{joint}"\n' for role, joint in limbs.items()))
+    assert load(both, Hints(roles=tmp_path / "roles.toml")).report.taken["head"] == f"B_{taken['head']}"
+
+
+def test_a_stated_pelvis_of_one_person_leaves_the_rest_to_the_names(files, tmp_path):
+    (tmp_path / "roles.toml").write_text('pelvis = "Hips"\n')
+    loaded, named = load(files[1], Hints(roles=tmp_path / "roles.toml")), load(files[1])
+    np.testing.assert_array_equal(loaded.clip.poses, named.clip.poses)
+    assert loaded.report.taken == named.report.taken
+
+
+def test_people_of_the_same_names_are_refused(files, tmp_path):
+    both = scene(tmp_path / "both.bvh", (files[0], "", 0.0), (files[1], "", 100.0))
+    with pytest.raises(MotionFileError, match=r"2 people, with the hips Hips, Hips; expected one, or joints of"):
+        load(both)
+
+
+def test_three_people_are_refused(files, tmp_path):
+    three = scene(tmp_path / "s.bvh", (files[0], "A_", 0.0), (files[1], "B_", 100.0), (files[1], "C_", -100.0))
+    with pytest.raises(MotionFileError, match=r"3 people, with the hips A_Hips, B_Hips, C_Hips"):
+        load(three)
+
+
+def test_a_copy_of_a_skeleton_at_its_place_is_said_to_be_left_out(files, tmp_path):
+    loaded = load(scene(tmp_path / "both.bvh", (files[1], "DEF-", 0.0), (files[1], "ORG-", 0.0)))
+    np.testing.assert_allclose(loaded.clip.poses, load(files[1]).clip.poses, atol=1e-6)
+    remark = "2 skeletons have their hips at one place (DEF-Hips, ORG-Hips): that of DEF-Hips is taken"
+    assert any(remark in line for line in loaded.report.notes())
+
+
+def test_one_person_on_any_rig_is_one(tmp_path):
+    """Twist joints, fingers, props, nodes above the hips and joints before the thighs are no other person."""
+    walk = embedded("walk")
+    clip, rng = Clip(walk.poses[::40], walk.fps / 40, "walk"), np.random.default_rng(3)
+    for _ in range(60):
+        write_rig(rig := random_rig(rng), clip, tmp_path / "r.bvh")
+        assert len(bodies(read_motion(tmp_path / "r.bvh"))) == 1, rig
+
+
+def test_one_person_in_every_capture_is_one(mocap):
+    for path in sorted([*mocap.glob("*/*.bvh"), *mocap.glob("*_amc/*.amc")]):
+        people = bodies(read_motion(path))
+        assert len(people) <= 1, path
+        assert all(len(copies) == 1 for copies in people), path
