@@ -12,7 +12,7 @@ from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
 SECONDS = 20.0  # default duration of a trial
-FALLEN = 1.0  # distance of the root from its reference that counts as a fall [m]
+ROOT_LOST = 1.0  # distance of the root from its reference that counts as a fall [m]
 
 
 class Followed(NamedTuple):
@@ -23,7 +23,7 @@ class Followed(NamedTuple):
     residual : float
         RMS of the residual force while the reference stands, until the end of a clip that is not repeated [weights].
     fell : float or None
-        Time at which it first fell, or its root was `FALLEN` from its reference [s]; None if it did not fall.
+        Time at which it first fell, or its root was `ROOT_LOST` from its reference [s]; None if it did not fall.
     seconds : float
         Duration of the trial [s].
     cost : float
@@ -71,5 +71,5 @@ def followed(
     cost = (process_time() - began) / seconds
     away = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
     told = report(motion)
-    fallen = [*motion.reference.times[away > FALLEN][:1].tolist(), *told.falls[:1]]
+    fallen = [*motion.reference.times[away > ROOT_LOST][:1].tolist(), *told.falls[:1]]
     return Followed(told.stance.force_rms, min(fallen, default=None), seconds, cost)
