@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from controllers.certificates.loop.executed import Seen, looked_at
+from controllers.certificates.loop.executed import Seen, looked_about, looked_at
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
@@ -42,9 +42,9 @@ def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, c
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
     """A verdict on a program after a check: refuted if the program is unstable at a state about the curve of `main`."""
-    found = looked_at(program, main, NEAR * reach, hands.hands())
-    far = looked_at(program, main, reach, hands.hands(), FAST)
-    figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": found.strongest}
+    looked = [looked_at(program, main, NEAR * reach, hands.hands()), looked_about(program, main, hands.hands())]
+    found, strongest = max(looked, key=lambda it: it.radius), max(it.strongest for it in looked)
+    figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": strongest}
     if found.radius >= 1.0:
         speed = float(np.linalg.norm(found.v))
         reason = (
@@ -53,8 +53,13 @@ def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: H
         )
         return Verdict("refuted", reason, None, verdict.assumptions, _example(found), figures)
     peak = ForceLimiter(main.sampling.period).peak
-    cut = f", its force up to {found.strongest:.3g} N, which the limiter cuts" if found.strongest > peak else ""
-    told = f"stable at each of {found.states} states of the program that were looked at{cut}"
+    cut = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
+    abrupt = [at for it in looked for at in it.abrupt]
+    judged = sum(it.states for it in looked) - len(abrupt)
+    told = f"stable at each of {judged} states of the program that were looked at{cut}"
+    if abrupt:
+        told += f"; its force jumps or bends near {len(abrupt)} more, as at p = {abrupt[0]} m, which are not judged"
+    far = looked_at(program, main, reach, hands.hands(), FAST)
     if far.radius >= 1.0:
         off = 1e3 * float(np.linalg.norm(far.p - main.curve.point(far.phase)))
         speed = float(np.linalg.norm(far.v))
