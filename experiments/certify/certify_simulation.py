@@ -63,8 +63,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
     The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, and with
-    a force limit. Any other law makes the verdicts unknown and is named. With user-defined laws and with such others the
-    executed program is linearised at states about the curve, and stability is refuted if one of them is unstable.
+    a force limit. Any other law makes the verdicts unknown and is named. With user-defined laws and with such others
+    the executed program is linearised at states about the curve, and stability is refuted if one of them is unstable.
 
     Parameters
     ----------
@@ -88,22 +88,23 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
     own, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
-    for law in own if curve else ():
-        executed(law, curve)
+    for law in own if curve is not None else ():
+        executed(law, curve)  # pyright: ignore[reportArgumentType]
     try:
         parts = _parts_of(sim.field)
         river = _river(sim, parts.leading, delay)
         cases = [certified_cases(law, river.curve) for law in parts.added]
         rivers, assumed = rivers_with(river, cases), _assumed(sim.field, cases)
         stability = switched_stability(rivers, parts.drag, hands.hands())
-        passive = passivity(rivers[0])
+        passive = passivity(rivers[0] if len(rivers) == 1 else river)
     except ControllerError as error:
         unknown = Verdict("unknown", str(error))
         return SimulationCertificate(_seen(sim, curve, delay, unknown, hands), unknown, inputs)
     if own:
         stability = stability if stability.verdict == "refuted" else _seen(sim, curve, delay, stability, hands)
-        # Its condition is of springs and dampers of the river.
-        passive = leaving_out(passive, [law.place for law in own])
+        # The condition of passivity is of the river's spring and damper alone.
+        if passive.verdict == "certified" or len(rivers) > 1:
+            passive = leaving_out(passive, [law.place for law in own])
     return SimulationCertificate(_assuming(stability, assumed), _assuming(passive, assumed), inputs)
 
 

@@ -50,12 +50,16 @@ def _uncommon(
         loops = [SampledLoop(river.still(hand), river.sampling) for river in (*rivers, *acting)]
         maps = np.stack([loop.frozen(rivers[0].k_r, rivers[0].b_d) for loop in loops], axis=1)
         last: Array | None = None
-        for phase, at in zip(rivers[0].phases().tolist(), maps, strict=True):
-            # Mostly the function of the phase before is one here, too.
-            if last is not None and contraction(last, list(at)) < 1.0:
+        for phase, at, basis in zip(rivers[0].phases().tolist(), maps, loops[0].across[0], strict=True):
+            # Mostly the function of the phase before is one here, too, in the coordinates of this phase.
+            if last is not None and contraction(_symmetric(basis.T @ last @ basis), list(at)) < 1.0:
                 continue
             found = common_lyapunov(list(at))
             if found is None:
                 return phase, hand
-            last = found.p
+            last = basis @ found.p @ basis.T
     return None
+
+
+def _symmetric(p: Array) -> Array:
+    return 0.5 * (p + p.T)

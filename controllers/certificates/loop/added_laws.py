@@ -10,10 +10,14 @@ from controllers.certificates.loop.case_hull import slopes_of
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.law_cases import MOST_CASES, Cases
 from controllers.certificates.loop.laws import Law
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import PHASES, River
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.errors import ControllerError
 from controllers.state import Array
+
+# Hands on the curve from which a law is seen, a phase each: 20 times as many as those of the loop, since a case may
+# hold on a short part of the curve.
+REFERENCES = 20 * PHASES
 
 
 def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
@@ -40,7 +44,7 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
         return [river]
     if river.k_r <= 0.0:
         raise ControllerError("a certificate of laws of one's own needs a stiffness k_r above zero beside them")
-    phases = river.phases()
+    phases = river.phases(REFERENCES)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     # At rest on the curve, and at its own pace: the states about which the loop is linearised.
     references = np.hstack([np.vstack([points, points]), np.vstack([0.0 * velocity, velocity])])

@@ -13,12 +13,14 @@ with the law (absolute stability; Boyd et al., *Linear Matrix Inequalities in Sy
 """
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi
 import numpy as np
 from scipy.optimize import linprog
 
+from controllers.certificates.loop.followed_number import Condition
 from controllers.certificates.loop.law_cases import Case, Cases
 from controllers.errors import ControllerError
 from controllers.state import Array
@@ -97,20 +99,27 @@ def _affine(cases: Cases, case: Case) -> Affine:
             f"{cases.law.place} has cases whose force is not linear in the hand's position and velocity; stability is "
             "certified of one smooth expression, or of cases that are linear"
         )
+    given = Affine(_numbers(slope, x).reshape(3, 6), _numbers(case.force, x), *_region(case.conditions, x))
+    if not (np.isfinite(given.slope).all() and np.isfinite(given.offset).all()):
+        raise ControllerError(f"{cases.law.place} has a case whose force is no number")
+    return given
+
+
+def _region(conditions: Sequence[Condition], x: casadi.SX) -> tuple[Array, Array]:
+    """The linear ones of some conditions as A x ≤ b."""
     rows: list[Array] = []
-    for condition in case.conditions:
-        normal = casadi.jacobian(condition.gap, x)
-        at_zero = np.append(*(_numbers(expression, x) for expression in (normal, condition.gap))) \
-            if normal.is_constant() else np.zeros(7)  # fmt: skip
-        size = np.linalg.norm(at_zero[:6])
-        if size > 0.0 and np.isfinite(at_zero).all():
-            # gap ≤ 0 where it holds and gap ≥ 0 where it does not; both where they are equal, none where they are not.
-            signs = (
-                ([1.0, -1.0] if condition.holds else []) if condition.kind == "==" else [2.0 * condition.holds - 1.0]
-            )
-            rows += [sign / size * at_zero for sign in signs]
+    for gap, kind, holds in conditions:
+        normal = casadi.jacobian(gap, x)
+        if not normal.is_constant():
+            continue
+        row = np.concatenate([_numbers(normal, x), _numbers(gap, x)])
+        size = float(np.linalg.norm(row[:6]))
+        if size > 0.0 and np.isfinite(row).all():
+            # gap ≤ 0 where it holds and gap ≥ 0 where it does not; both where it is zero, neither where it is not.
+            signs = ((1.0, -1.0) if holds else ()) if kind == "==" else (1.0 if holds else -1.0,)
+            rows += [sign / size * row for sign in signs]
     table = np.array(rows).reshape(-1, 7)
-    return Affine(_numbers(slope, x).reshape(3, 6), _numbers(case.force, x), table[:, :6], -table[:, 6])
+    return table[:, :6], -table[:, 6]
 
 
 def _numbers(expression: casadi.SX, x: casadi.SX) -> Array:
@@ -142,9 +151,8 @@ def _slopes_between(cases: Cases, here: Affine, there: Affine, references: Array
         below = at_curve.min() >= -nothing and there.most(row[:6], float(row[6])) <= nothing
         if not (above or below):
             raise ControllerError(
-                f"the force of {cases.law.place} jumps between its cases, or differs between them by up to "
-                f"{np.linalg.norm(excess, axis=1).max():.3g} N as they go on to the curve, which no stiffness and "
-                "damping bound; stability is certified of cases that meet without a jump"
+                f"no stiffness and damping, as seen from the curve, bound the force of {cases.law.place} where it "
+                "changes between its cases, as where it jumps; stability is certified of cases that meet without a jump"
             )
         choices.append((0.0 * part, part))
     return [here.slope + sum(chosen) for chosen in itertools.product(*choices)]

@@ -142,25 +142,34 @@ def looked_about(program: Program, river: River, hands: Sequence[HandImpedance])
 
 
 def _worst(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
-    """The worst of several sets of states beside the same phases, with every hand."""
+    """The worst of several sets of states beside the same phases, with every hand; those out of reach are left out."""
     plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
-    first, count = states[0], sum(len(of.p) for of in states)
-    worst = Seen(0.0, float(first.phases[0]), first.p[0], first.v[0], hands[0], count, 0.0)
+    worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
     strongest, abrupt = 0.0, list[Array]()
-    for phases, p, v in states:
+    for phases, asked, v in states:
+        reached = np.array([_reaches(river, place) for place in asked])
+        p = np.where(reached[:, None], asked, river.curve.point(phases))
         law, smooth = differenced(plants[0][1], program, river, p, v)
-        abrupt += list(p[~smooth])
+        abrupt += list(p[reached & ~smooth])
         fresh = program.fresh_memory()
         forces = [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)]
-        strongest = max(strongest, float(np.linalg.norm(forces, axis=1).max()))
+        strongest = max(strongest, float(np.linalg.norm(forces, axis=1)[reached].max(initial=0.0)))
+        worst = worst._replace(states=worst.states + int(reached.sum()))
         for hand, plant in plants:
             loop = SampledLoop(replace(plant, unit_theta=law.unit_theta, unit_omega=law.unit_omega), river.sampling)
             values = np.linalg.eigvals(loop.frozen(1.0, 0.0))
             radius = np.where(np.abs(np.angle(values)) > _SWINGS, np.abs(values), 0.0).max(axis=1)
-            radius = np.where(smooth, radius, 0.0)
+            radius = np.where(reached & smooth, radius, 0.0)
             at = int(radius.argmax())
             if radius[at] > worst.radius:
-                worst = worst._replace(
-                    radius=float(radius[at]), phase=float(phases[at]), p=p[at], v=v[at], hand=hand
-                )  # fmt: skip
+                worst = worst._replace(radius=float(radius[at]), phase=float(phases[at]), p=p[at], v=v[at], hand=hand)
     return worst._replace(strongest=strongest, abrupt=tuple(abrupt))
+
+
+def _reaches(river: River, place: Array) -> bool:
+    """Whether the device reaches a place [m]."""
+    try:
+        river.device.angles(place)
+    except ValueError:  # the base of the errors of devices
+        return False
+    return True

@@ -6,6 +6,7 @@ conditions, are the function (symbolic execution: King, *Symbolic execution and 
 """
 
 from collections.abc import Callable, Sequence
+from functools import partialmethod
 from numbers import Real
 from typing import Any, ClassVar, Literal, NamedTuple, NoReturn
 
@@ -46,29 +47,37 @@ class Condition(NamedTuple):
         return true if self.holds else casadi.logic_not(true)
 
 
+_TRUE = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
+
+
 class Way:
-    """One way through a function: the first decisions are given, each further comparison is taken to hold."""
+    """One way through a function: the first decisions are given, each further comparison is taken to hold.
+
+    What earlier comparisons of the same two numbers leave no choice of is not decided again.
+    """
 
     def __init__(self, given: Sequence[bool]) -> None:
         self.given = tuple(given)
         self.conditions: list[Condition] = []
         self.lost: str | None = None
-        self._known: dict[tuple[str, str], bool] = {}
+        self._signs: dict[str, frozenset[int]] = {}  # that a gap may still have
 
     def decide(self, left: Any, right: Any, kind: Literal["<", "<=", "=="]) -> bool:
         """Truth of ``left kind right`` on this way."""
-        gap = casadi.SX(left - right)
+        gap, true = casadi.SX(left - right), _TRUE[kind]
         if gap.is_constant():
-            value = float(gap)
-            return {"<": value < 0.0, "<=": value <= 0.0, "==": value == 0.0}[kind]
-        asked = (str(gap), kind)
-        if asked not in self._known:
-            at = len(self.conditions)
-            if at >= MOST_CONDITIONS:
-                self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
-            self._known[asked] = self.given[at] if at < len(self.given) else True
-            self.conditions.append(Condition(gap, kind, self._known[asked]))
-        return self._known[asked]
+            return (float(gap) > 0.0) - (float(gap) < 0.0) in true and float(gap) == float(gap)
+        signs = self._signs.get(str(gap), frozenset((-1, 0, 1)))
+        if signs <= true or not signs & true:
+            return signs <= true
+        at = len(self.conditions)
+        if at >= MOST_CONDITIONS:
+            self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
+        holds = self.given[at] if at < len(self.given) else True
+        left_over = signs & true if holds else signs - true
+        self._signs |= {str(gap): left_over, str(-gap): frozenset(-sign for sign in left_over)}
+        self.conditions.append(Condition(gap, kind, holds))
+        return holds
 
     def lose(self, why: str) -> NoReturn:
         """Give the function up; it is remembered, since the function may catch what is raised."""
@@ -77,9 +86,13 @@ class Way:
 
 
 _PLAIN = (
-    "it makes a plain number of one of the hand, as float(), the functions of math and entries of an array of floats "
-    "do; expected those of NumPy, as np.hypot or np.sqrt, and np.array([...]) of the hand's numbers"
+    "it makes a plain number of one of the hand's, as float(), the functions of math and an array of floats do; "
+    "expected functions of NumPy, as np.sqrt, np.hypot, np.linalg.norm(hand.p), and np.array([...]) of such numbers"
 )
+
+
+def _hypot(a: Symbol, b: Symbol) -> Symbol:
+    return casadi.sqrt(a * a + b * b)
 
 
 class FollowedNumber:
@@ -178,35 +191,20 @@ class FollowedNumber:
     def _mapped(self, function: Callable[[Symbol], Symbol]) -> "FollowedNumber":
         return FollowedNumber(function(self.symbol), self.way)
 
-    def sqrt(self) -> "FollowedNumber":
-        return self._mapped(casadi.sqrt)
-
-    def exp(self) -> "FollowedNumber":
-        return self._mapped(casadi.exp)
-
-    def log(self) -> "FollowedNumber":
-        return self._mapped(casadi.log)
-
-    def sin(self) -> "FollowedNumber":
-        return self._mapped(casadi.sin)
-
-    def cos(self) -> "FollowedNumber":
-        return self._mapped(casadi.cos)
-
-    def tan(self) -> "FollowedNumber":
-        return self._mapped(casadi.tan)
-
-    def tanh(self) -> "FollowedNumber":
-        return self._mapped(casadi.tanh)
-
-    def arctan(self) -> "FollowedNumber":
-        return self._mapped(casadi.atan)
-
-    def arctan2(self, other: object) -> Any:
-        return self._with(other, casadi.atan2)
-
-    def hypot(self, other: object) -> Any:
-        return self._with(other, lambda a, b: casadi.sqrt(a * a + b * b))
+    sqrt = partialmethod(_mapped, casadi.sqrt)
+    exp = partialmethod(_mapped, casadi.exp)
+    log = partialmethod(_mapped, casadi.log)
+    sin = partialmethod(_mapped, casadi.sin)
+    cos = partialmethod(_mapped, casadi.cos)
+    tan = partialmethod(_mapped, casadi.tan)
+    arcsin = partialmethod(_mapped, casadi.asin)
+    arccos = partialmethod(_mapped, casadi.acos)
+    arctan = partialmethod(_mapped, casadi.atan)
+    sinh = partialmethod(_mapped, casadi.sinh)
+    cosh = partialmethod(_mapped, casadi.cosh)
+    tanh = partialmethod(_mapped, casadi.tanh)
+    arctan2 = partialmethod(_with, made=casadi.atan2)
+    hypot = partialmethod(_with, made=_hypot)
 
 
 class FollowedVector(npt.NDArray[Any]):

@@ -48,3 +48,9 @@ def hands_about(curve: Trajectory) -> list[HandState]:
             )
         )  # fmt: skip
     return found
+
+
+def told(p: Array, v: Array | None = None) -> str:
+    """Position, and velocity, of a hand for messages."""
+    place = f"p = ({', '.join(f'{1e3 * x:.3g}' for x in p)}) mm"
+    return place if v is None else f"{place}, v = ({', '.join(f'{x:.3g}' for x in v)}) m/s"

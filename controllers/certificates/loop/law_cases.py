@@ -9,7 +9,7 @@ import numpy as np
 
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.followed_number import Condition, FollowedNumber, FollowedVector, NotFollowed, Way
-from controllers.certificates.loop.hands_about import hands_about
+from controllers.certificates.loop.hands_about import hands_about, told
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.program import evaluate
@@ -22,6 +22,11 @@ MOST_CASES = 16  # ways through a function that are followed: as many as four co
 # where numbers cancel.
 _AGREES = 1e-9
 _NO_FORCE = 1e-12  # [N] below any force
+# Operations of CasADi without a derivative somewhere in the middle of their domain.
+_BENT = frozenset(
+    (casadi.OP_FABS, casadi.OP_SIGN, casadi.OP_FMIN, casadi.OP_FMAX, casadi.OP_FLOOR, casadi.OP_CEIL, casadi.OP_FMOD,
+     casadi.OP_IF_ELSE_ZERO, casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_COPYSIGN)
+)  # fmt: skip
 
 
 class Case(NamedTuple):
@@ -85,8 +90,7 @@ class Cases:
         if wrong.any():
             at = hands[int(np.argmax(wrong))]
             raise ControllerError(
-                f"the force of {self.law.place} has no derivative for a hand on the curve, at p = {at[:3]} m, "
-                f"v = {at[3:]} m/s"
+                f"the force of {self.law.place} has no derivative for a hand on the curve, at {told(at[:3], at[3:])}"
             )
 
     def force(self, p: Symbol, v: Symbol) -> Symbol:
@@ -119,6 +123,8 @@ def cases_of(law: FunctionLaw) -> Cases:
         left += [(*taken[:at], not taken[at]) for at in range(len(given), len(taken))]
         found.append(Case(vector(wrench[:3]), vector(wrench[3:]), tuple(way.conditions)))
     _check_inputs(law, found, symbols)
+    if any(_bends(case, casadi.vertcat(*symbols.values())) for case in found):
+        raise ControllerError(f"the force of {law.place} bends where nothing is compared, as √x² does; expected abs(x)")
     return Cases(law, symbols["p"], symbols["v"], tuple(found))
 
 
@@ -132,7 +138,8 @@ def _followed(law: FunctionLaw, way: Way, symbols: dict[str, Symbol]) -> list[Sy
     t, switch = (FollowedNumber(symbols[name], way) for name in ("t", "s"))
     hand = HandState(t, given("p"), given("q"), given("v"), given("w"), switch)  # pyright: ignore[reportArgumentType]
     try:
-        numbers = list(law.function(hand, **law.parameters))  # pyright: ignore[reportArgumentType,reportCallIssue]
+        # An entry may be an array of no dimension, as np.where gives.
+        numbers = [np.asarray(item, dtype=object).item() for item in law.function(hand, **law.parameters)]  # pyright: ignore[reportGeneralTypeIssues]
         wrench = [item.symbol if isinstance(item, FollowedNumber) else casadi.SX(float(item)) for item in numbers]
     except Exception as error:  # whatever a user's function raises
         why = way.lost or (str(error) if isinstance(error, NotFollowed) else f"{type(error).__name__}: {error}")
@@ -141,6 +148,12 @@ def _followed(law: FunctionLaw, way: Way, symbols: dict[str, Symbol]) -> list[Sy
         if why is None:
             return wrench + [casadi.SX(0.0)] * (6 - len(wrench))
     raise ControllerError(f"{law.place} cannot be followed on symbols: {why}")
+
+
+def _bends(case: Case, x: Symbol) -> bool:
+    """Whether an expression of a case bends or jumps within it, as CasADi's simplification of √x² to |x| does."""
+    function = casadi.Function("case", [x], [case.force])
+    return any(function.instruction_id(i) in _BENT for i in range(function.n_instructions()))
 
 
 def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol]) -> None:
@@ -174,7 +187,7 @@ def executed(law: FunctionLaw, curve: Trajectory) -> Array:
             raise
         except Exception as error:  # whatever a user's function raises
             raise ParameterError(
-                f"{law.place} raised {type(error).__name__}: {error}; for a hand at p = {hand.p} m, v = {hand.v} m/s"
+                f"{law.place} raised {type(error).__name__}: {error}; for a hand at {told(hand.p, hand.v)}"
             ) from error
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
     return wrenches
@@ -196,7 +209,7 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
     size = _AGREES * np.linalg.norm(force, axis=1) + _NO_FORCE
 
     def differs(other: Array) -> Mask:
-        return ~(np.linalg.norm(other - force, axis=1) <= size)  # so that NaN differs
+        return np.logical_not(np.linalg.norm(other - force, axis=1) <= size)  # so that NaN differs
 
     _refuse(law, curve, differs(executed(law, curve)[:, :3]), "another force when it is asked again")
     cases, hands = cases_of(law), hands_about(curve)
@@ -210,6 +223,6 @@ def _refuse(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> None
     if wrong.any():
         hand = hands_about(curve)[int(np.argmax(wrong))]
         raise ControllerError(
-            f"{law.place} gives {what}, as for a hand at p = {hand.p} m, v = {hand.v} m/s; a certificate is of a "
+            f"{law.place} gives {what}, as for a hand at {told(hand.p, hand.v)}; a certificate is of a "
             "function of the hand alone"
         )
