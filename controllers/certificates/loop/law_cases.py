@@ -209,7 +209,8 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
     size = _AGREES * np.linalg.norm(force, axis=1) + _NO_FORCE
 
     def differs(other: Array) -> Mask:
-        return np.logical_not(np.linalg.norm(other - force, axis=1) <= size)  # so that NaN differs
+        apart = np.linalg.norm(other - force, axis=1)
+        return np.isnan(apart) | (apart > size)
 
     _refuse(law, curve, differs(executed(law, curve)[:, :3]), "another force when it is asked again")
     cases, hands = cases_of(law), hands_about(curve)
