@@ -205,7 +205,7 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
         As `executed`.
     """
     force = executed(law, curve)[:, :3]
-    _refuse(law, curve, ~np.isfinite(force).all(axis=1), "numbers that are not finite")
+    _refuse(law, curve, np.asarray(~np.isfinite(force).all(axis=1), dtype=np.bool_), "numbers that are not finite")
     size = _AGREES * np.linalg.norm(force, axis=1) + _NO_FORCE
 
     def differs(other: Array) -> Mask:
