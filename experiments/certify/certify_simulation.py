@@ -1,19 +1,21 @@
 """Certificates of a simulation made in Python: of its own field, including user-defined laws."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from controllers.certificates.loop.added_laws import exert_moments, with_added
-from controllers.certificates.loop.governed import governed_stability
+from controllers.certificates.loop.added_laws import rivers_with
 from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
-from controllers.certificates.report import Verdict, hash_of
+from controllers.certificates.report import Verdict, hash_of, leaving_out
 from controllers.checks import checked, of_kind
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Law
@@ -23,7 +25,8 @@ from controllers.fields.governor import Governor
 from controllers.fields.orientation import Orientation
 from controllers.fields.own.function_law import FunctionLaw
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.executed_field import seen
+from experiments.certify.executed_field import REACH, seen
+from experiments.certify.switched_stability import switched_stability
 from experiments.config.run_config import phantom_of
 from experiments.files.device_files import linkage_of
 from experiments.runs.simulation import Simulation
@@ -60,8 +63,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
     The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, and with
-    a force limit. Any other law makes the verdicts unknown and is named; the executed program is then linearised at
-    states about the curve, and stability is refuted if one of them is unstable.
+    a force limit. Any other law makes the verdicts unknown and is named. With user-defined laws and with such others
+    the executed program is linearised at states about the curve, and stability is refuted if one of them is unstable.
 
     Parameters
     ----------
@@ -75,8 +78,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     Raises
     ------
     ParameterError
-        If an argument is of another kind, the delay is negative or not finite, or its hand is a replayed one, which
-        feels no force.
+        If an argument is of another kind, the delay is negative or not finite, its hand is a replayed one, which feels
+        no force, or a user-defined law raises or does not return three or six numbers.
     """
     of_kind("sim", sim, Simulation)
     of_kind("hands", hands, HandRange | None)
@@ -84,31 +87,45 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
+    own, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
+    for law in own if curve is not None else ():
+        executed(law, curve)  # pyright: ignore[reportArgumentType]
     try:
-        river, drag, assumed = _river(sim, delay)
+        parts = _parts_of(sim.field)
+        river = _river(sim, parts.leading, delay)
+        cases = [certified_cases(law, river.curve) for law in parts.added]
+        rivers, assumed = rivers_with(river, cases), _assumed(sim.field, cases)
+        stability = switched_stability(rivers, parts.drag, hands.hands())
+        passive = passivity(rivers[0] if len(rivers) == 1 else river)
     except ControllerError as error:
         unknown = Verdict("unknown", str(error))
-        return SimulationCertificate(_seen(sim, delay, unknown, hands), unknown, inputs)
-    return SimulationCertificate(
-        _assuming(governed_stability(river, drag, hands.hands()), assumed), _assuming(passivity(river), assumed), inputs
-    )
+        return SimulationCertificate(_seen(sim, curve, delay, unknown, hands), unknown, inputs)
+    if own:
+        stability = stability if stability.verdict == "refuted" else _seen(sim, curve, delay, stability, hands)
+        # The condition of passivity is of the river's spring and damper alone.
+        if passive.verdict == "certified" or len(rivers) > 1:
+            passive = leaving_out(passive, [law.place for law in own])
+    return SimulationCertificate(_assuming(stability, assumed), _assuming(passive, assumed), inputs)
 
 
-def _seen(sim: Simulation, delay: float, unknown: Verdict, hands: HandRange) -> Verdict:
-    """An unknown verdict, checked with the executed program about the map's curve."""
-    around, reach = (getattr(sim.haptic_map, name, None) for name in ("around", "reach"))
-    if around is None or reach is None:
-        return unknown
+def _curve_of(sim: Simulation) -> Trajectory | None:
+    """The curve about which a field is examined: that of a law along one, or the map's; None if there is none."""
+    curves = [law.curve for law in sim.field.program().laws if isinstance(law, Follow | Bunny)]
+    return next(iter(curves), getattr(sim.haptic_map, "around", None))
+
+
+def _seen(sim: Simulation, curve: Trajectory | None, delay: float, verdict: Verdict, hands: HandRange) -> Verdict:
+    """A verdict checked with the executed program about a curve."""
+    if curve is None:
+        return verdict
+    reach = getattr(sim.haptic_map, "reach", REACH)
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
-    place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), around, phantom_device(linkage_of(sim.device)), sampling)
-    return seen(sim.field.program(), place, reach, unknown, hands)
+    place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), curve, phantom_device(linkage_of(sim.device)), sampling)
+    return seen(sim.field.program(), place, reach, verdict, hands)
 
 
-def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]]:
-    parts, assumed = _parts_of(sim.field)
-    if parts.added:
-        assumed += ("the critical gain is one by which the whole field is scaled, laws of one's own included",)
-    law, curve = parts.leading, parts.leading.curve
+def _river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
+    """The law that leads along a curve, in the form that is certified."""
     if isinstance(law, Follow):
         base = PARALLEL_LAW if law.parallel else FOLLOW_LAW
         k_r, b_d, width = law.k_r, law.b_d, law.epsilon
@@ -118,23 +135,16 @@ def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]
             # Near a bunny that pulls along the curve, the field is that of FOLLOW to first order.
             base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
-    device = phantom_device(linkage_of(sim.device))
-    made = River(with_added(base, parts.added, k_r), k_r, b_d, width, curve, device, sampling)
-    return made, parts.drag, assumed
+    return River(base, k_r, b_d, width, law.curve, phantom_device(linkage_of(sim.device)), sampling)
 
 
-def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:
-    program, assumed = field.program(), list[str]()
-    for what, numbers in program.composition():
-        if what is Join.LIMIT:
-            assumed.append(f"the field stays below the {numbers[0]:g} N and {numbers[1]:g} N m to which it is cut")
-        elif what in (Join.GATE, Join.BLEND):
-            raise ControllerError("no certificate is known of a field that is gated or blended by a weight")
+def _parts_of(field: Law) -> _Parts:
+    program = field.program()
+    if any(what in (Join.GATE, Join.BLEND) for what, _ in program.composition()):
+        raise ControllerError("no certificate is known of a field that is gated or blended by a weight")
     leading = [law for law in program.laws if isinstance(law, Follow | Bunny)]
     added = tuple(law for law in program.laws if isinstance(law, FunctionLaw))
     governors = [law for law in program.laws if isinstance(law, Governor)]
-    if any(isinstance(law, Orientation) for law in program.laws) or exert_moments(added):
-        assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
     known = (Follow, Bunny, FunctionLaw, Governor, Orientation)
     others = [type(law).__name__ for law in program.laws if not isinstance(law, known)]
     if len(leading) != 1 or others or len(governors) > 1:
@@ -142,7 +152,22 @@ def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:
         raise ControllerError(f"a certificate is of one FOLLOW or bunny, and laws of one's own; the field has {names}")
     if governors and not np.array_equal(governors[0].curve.packed(), leading[0].curve.packed()):
         raise ControllerError("a governor is certified on the curve of the law beside it; it has another one")
-    return _Parts(leading[0], added, sum(law.drag for law in governors)), tuple(assumed)
+    return _Parts(leading[0], added, sum(law.drag for law in governors))
+
+
+def _assumed(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
+    """What a certificate of a field assumes because of its limits, its moments and its user-defined laws."""
+    program = field.program()
+    assumed = [
+        f"the field stays below the {numbers[0]:g} N and {numbers[1]:g} N m to which it is cut"
+        for what, numbers in program.composition()
+        if what is Join.LIMIT
+    ]
+    if any(isinstance(law, Orientation) for law in program.laws) or any(cases.exerts_moment for cases in added):
+        assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
+    if added:
+        assumed.append("the critical gain is one by which the whole field is scaled, laws of one's own included")
+    return tuple(assumed)
 
 
 def _assuming(verdict: Verdict, assumed: tuple[str, ...]) -> Verdict:

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from controllers.certificates.loop.executed import Seen, looked_at
+from controllers.certificates.loop.executed import Seen, looked_about, looked_at
 from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.hands_about import told as told_at
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program
@@ -42,24 +43,30 @@ def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, c
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
     """A verdict on a program after a check: refuted if the program is unstable at a state about the curve of `main`."""
-    found = looked_at(program, main, NEAR * reach, hands.hands())
-    far = looked_at(program, main, reach, hands.hands(), FAST)
-    figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": found.strongest}
+    looked = [looked_at(program, main, NEAR * reach, hands.hands()), looked_about(program, main, hands.hands())]
+    found, strongest = max(looked, key=lambda it: it.radius), max(it.strongest for it in looked)
+    figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": strongest}
     if found.radius >= 1.0:
-        speed = float(np.linalg.norm(found.v))
         reason = (
-            f"unstable, by a factor of {found.radius:.4g} a period, for a hand at phase {found.phase:.3g} s with "
-            f"{speed:.3g} m/s; {verdict.reason}"
+            f"unstable, by a factor of {found.radius:.4g} a period, for a hand {_told(main, found)}; {verdict.reason}"
         )
         return Verdict("refuted", reason, None, verdict.assumptions, _example(found), figures)
     peak = ForceLimiter(main.sampling.period).peak
-    cut = f", its force up to {found.strongest:.3g} N, which the limiter cuts" if found.strongest > peak else ""
-    told = f"stable at each of {found.states} states of the program that were looked at{cut}"
+    cut = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
+    abrupt = [at for it in looked for at in it.abrupt]
+    judged = sum(it.states for it in looked) - len(abrupt)
+    told = f"stable at {judged} states of the program that were looked at{cut}" if judged else "no state can be judged"
+    if abrupt:
+        told += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
+    far = looked_at(program, main, reach, hands.hands(), FAST)
     if far.radius >= 1.0:
-        off = 1e3 * float(np.linalg.norm(far.p - main.curve.point(far.phase)))
-        speed = float(np.linalg.norm(far.v))
-        told += f", but not for a hand {off:.0f} mm off the curve at phase {far.phase:.3g} s with {speed:.3g} m/s"
+        told += f", but not for a hand {_told(main, far)}"
     return replace(verdict, reason=f"{verdict.reason}; {told}", figures=figures)
+
+
+def _told(main: River, found: Seen) -> str:
+    off, speed = 1e3 * np.linalg.norm(found.p - main.curve.point(found.phase)), np.linalg.norm(found.v)
+    return f"{off:.2g} mm off the curve at phase {found.phase:.3g} s with {speed:.3g} m/s"
 
 
 def _example(found: Seen) -> dict[str, object]:

@@ -1,88 +1,74 @@
 """User-defined laws on CasADi symbols, added to the law that drives along a curve."""
 
-from typing import Any
+import itertools
+from collections.abc import Sequence
 
 import casadi
+import numpy as np
 
+from controllers.certificates.loop.case_hull import slopes_of
 from controllers.certificates.loop.device import Symbol, vector
+from controllers.certificates.loop.law_cases import MOST_CASES, Cases
 from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.stability import PHASES, River
+from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.errors import ControllerError
-from controllers.fields.own.function_law import FunctionLaw
-from controllers.state import HandState
+from controllers.state import Array
+
+# Hands on the curve from which a law is seen, a phase each: 20 times as many as those of the loop, since a case may
+# hold on a short part of the curve.
+REFERENCES = 20 * PHASES
 
 
-def with_added(base: Law, added: tuple[FunctionLaw, ...], k_r: float) -> Law:
-    """A law plus the forces of user-defined functions of the hand's position and velocity.
+def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
+    """A river with user-defined laws: one linear loop, or several between which the laws' cases switch.
 
-    Since a law must be linear in its gains, the added forces are scaled with the stiffness, F + (k/k_r) Σ F_i: at the
-    field's own gains this is the field itself, and the search for a critical gain scales all of it.
+    A law of one expression is added as it is. A law that has cases is replaced by each of the slopes between which it
+    lies as seen from the curve (`case_hull`). Laws have to be linear in their gains, so that the added forces are
+    scaled with the stiffness, F + (k/k_r) Σ F_i: at the field's own gains this is the field itself, and the search for
+    a critical gain scales all of it.
 
     Parameters
     ----------
-    base : Law
-        The law that drives along the curve.
-    added : tuple of FunctionLaw
+    river : River
+        The law that drives along the curve, with its gains.
+    added : sequence of Cases
         User-defined laws.
-    k_r : float
-        Stiffness of the field [N/m].
 
     Raises
     ------
     ControllerError
-        If the stiffness is zero, a function cannot be evaluated on symbols, as when it branches on the hand, or its
-        force depends on anything but the hand's position and velocity.
+        If the stiffness is zero, a force has no derivative on the curve, or no slopes bound it.
     """
     if not added:
-        return base
-    if k_r <= 0.0:
+        return [river]
+    if river.k_r <= 0.0:
         raise ControllerError("a certificate of laws of one's own needs a stiffness k_r above zero beside them")
-    # Evaluated once beforehand, so that a function of which nothing can be certified raises at once.
-    for law in added:
-        _check(law)
+    phases = river.phases(REFERENCES)
+    points, velocity = river.curve.point(phases), river.curve.velocity(phases)
+    # At rest on the curve, and at its own pace: the states about which the loop is linearised.
+    references = np.hstack([np.vstack([points, points]), np.vstack([0.0 * velocity, velocity])])
+    smooth, switched = ([cases for cases in added if cases.smooth is it] for it in (True, False))
+    for cases in smooth:
+        cases.check_slopes(references)
+    hulls = [slopes_of(cases, references) for cases in switched]
+    if np.prod([len(hull) for hull in hulls]) > MOST_CASES:
+        raise ControllerError(f"the laws of one's own have more than {MOST_CASES} cases together")
+    together = [sum(slopes, np.zeros((3, 6))) for slopes in itertools.product(*hulls)]
+    return [river._replace(law=_with(river, smooth, switched, slope)) for slope in together]
+
+
+def _with(river: River, smooth: Sequence[Cases], switched: Sequence[Cases], slope: Array) -> Law:
+    """The river's law, plus F_i of the smooth laws, plus F_i(x_0) + G (x − x_0) of the others for one slope G."""
+    base, k_r = river.law, river.k_r
 
     def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-        return base.force(p, v, piece, u, k, b_d, width) + k / k_r * _force(added, p, v)
+        at, moves = vector(piece_point.py_func(piece, 0, u)), vector(piece_velocity.py_func(piece, 0, u))
+        given = casadi.DM(slope) @ casadi.vertcat(p - at, v - moves)
+        for cases in smooth:
+            given += cases.force(p, v)
+        for cases in switched:
+            given += cases.force(at, moves)
+        return base.force(p, v, piece, u, k, b_d, width) + k / k_r * given
 
     return base._replace(force=force)
-
-
-def exert_moments(added: tuple[FunctionLaw, ...]) -> bool:
-    """Whether a function returns a moment that is not zero for every hand.
-
-    Raises
-    ------
-    ControllerError
-        If a function cannot be evaluated on symbols.
-    """
-    hand, _ = _symbolic_hand()
-    return any(not casadi.SX(number).is_zero() for law in added for number in law.expression(hand)[3:])
-
-
-def _symbolic_hand() -> tuple[HandState, dict[str, Symbol]]:
-    """A hand of which every number is a symbol, and those that a certificate knows nothing of, by their name."""
-    sym = casadi.SX.sym
-    time, q, w, switch = sym("t"), sym("q", 4), sym("w", 3), sym("switch")
-    hand: Any = HandState(time, _tuple(sym("p", 3)), _tuple(q), _tuple(sym("v", 3)), _tuple(w), switch)  # pyright: ignore[reportArgumentType]
-    return hand, {"the time": time, "the orientation": q, "the angular velocity": w, "the switch": switch}
-
-
-def _check(law: FunctionLaw) -> None:
-    hand, unknown = _symbolic_hand()
-    force = vector(law.expression(hand)[:3])
-    found = [name for name, symbol in unknown.items() if casadi.depends_on(force, symbol)]
-    if found:
-        raise ControllerError(
-            f"the force of {law.place} depends on {' and '.join(found)} of the hand; a certificate is of forces that "
-            "depend on its position and velocity alone"
-        )
-
-
-def _tuple(symbol: Symbol) -> tuple[Symbol, ...]:
-    return tuple(symbol[i] for i in range(symbol.numel()))
-
-
-def _force(added: tuple[FunctionLaw, ...], p: Symbol, v: Symbol) -> Symbol:
-    # `_check` has shown that no force depends on the other numbers of this hand.
-    hand, _ = _symbolic_hand()
-    hand = hand._replace(p=_tuple(p), v=_tuple(v))
-    return sum((vector(law.expression(hand)[:3]) for law in added), vector((0.0, 0.0, 0.0)))

@@ -2,6 +2,7 @@ r"""Linearisation of an executed program of laws by finite differences, for laws
 
 The torques τ(θ, ω) = J(θ)ᵀ F(p(θ), J(θ) ω) come from the compiled program itself; their derivatives are central
 differences at a state of the hand, with memory and phase fixed. They replace the symbolic derivatives in `LinearLoop`.
+Where a force jumps or bends, differences ahead and behind, or of two steps, differ: there is no derivative to judge by.
 This can refute stability but not prove it, since only the given states are examined.
 """
 
@@ -12,14 +13,20 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.hands_about import States, states_about
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
-from controllers.state import Array, HandState
+from controllers.state import Array, HandState, Mask
 
 _STEP = 1e-6  # [rad], [rad/s] of the differences
+# Differences ahead and behind, of two steps, of a force that has a derivative there. That of a Gaussian of 1 mm width
+# changes by 0.01 % within a step; a jump makes one of them ten times another, a bend makes two sides differ.
+_STEPS = (_STEP, -_STEP, 0.1 * _STEP, -0.1 * _STEP)
+_AGREES = 0.01  # share of the largest derivative within which they agree
+_NO_SLOPE = 1e-6  # [N m/rad], [N m s/rad] below any derivative that matters, above rounding over a step
 _SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
 _DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
@@ -41,6 +48,9 @@ class Seen(NamedTuple):
         Number of examined states.
     strongest : float
         Largest force of the program at any of them [N].
+    abrupt : tuple of Array
+        Positions [m] of those states where the force jumps, bends or is not finite: it has no derivative there, and
+        they are not judged.
     """
 
     radius: float
@@ -50,6 +60,14 @@ class Seen(NamedTuple):
     hand: HandImpedance
     states: int
     strongest: float
+    abrupt: tuple[Array, ...] = ()
+
+
+class Differenced(NamedTuple):
+    """A linear loop with the derivatives of a program, and at which of its n states they exist, shape (n,)."""
+
+    loop: LinearLoop
+    smooth: Mask
 
 
 def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> Array:
@@ -60,12 +78,14 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
     return wrench[:3].copy()
 
 
-def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v: Array) -> LinearLoop:
+def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v: Array) -> Differenced:
     """The linear loop of `river` with the program's derivatives at hands p, v (n, 3); use it with k_r = 1, b_d = 0.
 
-    `linear` has the plant at the same phases; p and v need not be on the curve.
+    `linear` has the plant at the same phases; p and v need not be on the curve. Where the force has no derivative,
+    that is zero.
     """
     by_theta, by_omega = np.zeros((2, *linear.weight_theta.shape)), np.zeros((2, *linear.weight_theta.shape))
+    smooth = np.ones(len(p), dtype=np.bool_)
     numbers = river.device.numbers
     for i, (place, velocity, phase) in enumerate(zip(p, v, linear.phases, strict=True)):
         theta = np.array(river.device.angles(place))
@@ -80,10 +100,25 @@ def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v:
             at, jacobian = numbers(theta)
             return jacobian.T @ force_at(program, memory, at, jacobian @ omega, phase)
 
-        for k, step in enumerate(_STEP * np.eye(3)):
-            by_theta[0, i, :, k] = (torque(theta + step, omega) - torque(theta - step, omega)) / (2.0 * _STEP)
-            by_omega[0, i, :, k] = (torque(theta, omega + step) - torque(theta, omega - step)) / (2.0 * _STEP)
-    return replace(linear, unit_theta=by_theta, unit_omega=by_omega)
+        here, unit = torque(theta, omega), np.eye(3)
+        found = (
+            _slope([torque(theta + step * axis, omega) - here for axis in unit for step in _STEPS]),
+            _slope([torque(theta, omega + step * axis) - here for axis in unit for step in _STEPS]),
+        )
+        smooth[i] = all(slope is not None for slope in found)
+        for slopes, slope in zip((by_theta, by_omega), found, strict=True):
+            slopes[0, i] = 0.0 if slope is None or not smooth[i] else slope
+    return Differenced(replace(linear, unit_theta=by_theta, unit_omega=by_omega), smooth)
+
+
+def _slope(changes: Sequence[Array]) -> Array | None:
+    """Derivative (3, 3) of torques by changes of theirs for `_STEPS` along each axis; None where there is none."""
+    slopes = np.array(changes).reshape(3, len(_STEPS), 3) / np.array(_STEPS)[:, None]
+    # Central, of the larger step: its error is of the second order.
+    central = 0.5 * (slopes[:, 0] + slopes[:, 1])
+    apart = np.abs(slopes - central[:, None]).max()
+    # Written so that NaN is no derivative.
+    return central.T if apart <= _AGREES * np.abs(central).max() + _NO_SLOPE else None
 
 
 def looked_at(
@@ -96,19 +131,45 @@ def looked_at(
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     away = [reach * (np.cos(a) * plane[:, 0] + np.sin(a) * plane[:, 1]) for a in angles]
-    states = [(points, 0.0 * velocity), *((points + off, pace * velocity) for off in (0.0 * points, *away))]
-    plants = [(hand, river.still_at(phases, hand)) for hand in hands]
-    worst, strongest = Seen(0.0, 0.0, points[0], velocity[0], hands[0], n * len(states), 0.0), 0.0
-    for p, v in states:
-        law = differenced(plants[0][1], program, river, p, v)
+    offs, paces = (0.0 * points, 0.0 * points, *away), (0.0, *[pace] * (1 + _DIRECTIONS))
+    states = [States(phases, points + off, share * velocity) for off, share in zip(offs, paces, strict=True)]
+    return _worst(program, river, states, hands)
+
+
+def looked_about(program: Program, river: River, hands: Sequence[HandImpedance]) -> Seen:
+    """The worst of the states about the curve (`states_about`), of which no law of one's own knows beforehand."""
+    return _worst(program, river, [states_about(river.curve)], hands)
+
+
+def _worst(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
+    """The worst of several sets of states beside the same phases, with every hand; those out of reach are left out."""
+    plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
+    worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
+    strongest, abrupt = 0.0, list[Array]()
+    for phases, asked, v in states:
+        reached = np.array([_reaches(river, place) for place in asked])
+        p = np.where(reached[:, None], asked, river.curve.point(phases))
+        law, smooth = differenced(plants[0][1], program, river, p, v)
+        abrupt += list(p[reached & ~smooth])
         fresh = program.fresh_memory()
         forces = [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)]
-        strongest = max(strongest, float(np.linalg.norm(forces, axis=1).max()))
+        strongest = max(strongest, float(np.linalg.norm(forces, axis=1)[reached].max(initial=0.0)))
+        worst = worst._replace(states=worst.states + int(reached.sum()))
         for hand, plant in plants:
             loop = SampledLoop(replace(plant, unit_theta=law.unit_theta, unit_omega=law.unit_omega), river.sampling)
             values = np.linalg.eigvals(loop.frozen(1.0, 0.0))
             radius = np.where(np.abs(np.angle(values)) > _SWINGS, np.abs(values), 0.0).max(axis=1)
+            radius = np.where(reached & smooth, radius, 0.0)
             at = int(radius.argmax())
             if radius[at] > worst.radius:
-                worst = Seen(float(radius[at]), float(phases[at]), p[at], v[at], hand, n * len(states), 0.0)
-    return worst._replace(strongest=strongest)
+                worst = worst._replace(radius=float(radius[at]), phase=float(phases[at]), p=p[at], v=v[at], hand=hand)
+    return worst._replace(strongest=strongest, abrupt=tuple(abrupt))
+
+
+def _reaches(river: River, place: Array) -> bool:
+    """Whether the device reaches a place [m]."""
+    try:
+        river.device.angles(place)
+    except ValueError:  # the base of the errors of devices
+        return False
+    return True

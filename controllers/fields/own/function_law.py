@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ParameterError
 from controllers.fields.algebra.description import code_digest
 from controllers.fields.algebra.law import Law
 from controllers.state import Array, HandState, Wrench
@@ -73,7 +73,13 @@ class FunctionLaw(Law):
 
     def six_numbers(self, hand: HandState) -> Array:
         """Force [N] and moment [N m] of the function at a hand state, shape (6,); a moment not returned is zero."""
-        numbers = np.asarray(self.function(hand, **self.parameters), dtype=np.float64)
+        given = self.function(hand, **self.parameters)
+        try:
+            numbers = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"{self.place} gave {given!r}; expected a force of three numbers [N], or six with the moment [N m]"
+            ) from None
         if numbers.shape not in ((3,), (6,)):
             raise ParameterError(
                 f"{self.place} gave numbers of shape {numbers.shape}; expected a force of three [N], or six with the "
@@ -93,31 +99,6 @@ class FunctionLaw(Law):
         if np.isfinite(hand.vector()).all() and not np.isfinite(np.concatenate(wrench)).all():
             raise ParameterError(f"{self.place} gave {wrench.force} N and {wrench.torque} N m; expected finite numbers")
         return wrench
-
-    def expression(self, hand: HandState, **parameters: Any) -> tuple[Any, ...]:
-        """The function evaluated on symbols (for example CasADi's) instead of numbers.
-
-        Parameters
-        ----------
-        hand : HandState
-            Made of symbols; vectors may be tuples of them.
-        **parameters
-            Symbols for some of the parameters; the others keep their values.
-
-        Raises
-        ------
-        ControllerError
-            If the function cannot be evaluated on symbols, as when it branches on the hand.
-        """
-        try:
-            given: Any = self.function(hand, **{**self.parameters, **parameters})
-        except (RuntimeError, TypeError, NotImplementedError) as error:
-            said = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise ControllerError(
-                f"{self.place} cannot be evaluated on symbols ({said}); expected no branch on the hand or a parameter: "
-                "np.maximum and np.minimum instead of if, max and min"
-            ) from None
-        return tuple(given)
 
     def description(self) -> dict[str, object]:
         """Name, parameters by name, and a hash of the code that runs."""

@@ -3,12 +3,11 @@
 import math
 import threading
 
-import casadi
 import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ParameterError
 from controllers.fields.algebra.description import code_digest
 from controllers.fields.algebra.weights import Weight
 from controllers.fields.follow import Follow
@@ -184,26 +183,6 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
     assert other["parameters"]["curve"] != first["parameters"]["curve"]
 
 
-def test_the_code_that_runs_is_evaluated_on_symbols():
-    own, mode = law(compiled=True)(smooth_floor), casadi.GlobalOptions.getNumpyMode()
-    casadi.GlobalOptions.setNumpyMode(1)
-    p, v, k = (casadi.SX.sym(name, size) for name, size in (("p", 3), ("v", 3), ("k", 1)))
-    upright, still = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    force = own.expression(HandState(0.0, casadi.vertsplit(p), upright, casadi.vertsplit(v), still), k=k)
-    casadi.GlobalOptions.setNumpyMode(mode)
-    symbolic = casadi.Function("force", [p, v, k], [casadi.vertcat(*force)])
-    for hand in hands(30):
-        np.testing.assert_allclose(
-            own(k=300.0).wrench(hand).force, np.ravel(symbolic(hand.p, hand.v, 300.0)), rtol=1e-13
-        )  # fmt: skip
-
-
-def test_a_branch_on_the_hand_is_no_expression_and_says_so():
-    symbols = casadi.vertsplit(casadi.SX.sym("p", 3))
-    with pytest.raises(ControllerError, match=r"law floor .*test_own_law.py, line .*expected no branch on the hand"):
-        law(floor).expression(HandState(0.0, symbols, (1.0, 0.0, 0.0, 0.0), symbols, symbols))
-
-
 @pytest.mark.parametrize(
     ("make", "says"),
     [
@@ -216,6 +195,7 @@ def test_a_branch_on_the_hand_is_no_expression_and_says_so():
         (lambda: law(lambda hand, k=np.nan: (0, 0, 0)), "must be a finite number, got nan"),
         (lambda: law(floor)(stiffness=3.0), "no parameter stiffness; there are k, b"),
         (lambda: law(floor)(k=np.inf), r"k of law floor \(.*test_own_law.py, line \d+\) must be a finite number"),
+        (lambda: law(lambda hand: ("a", 0, 0)).wrench(HandState.at([0, 0, 0])), r"gave \('a', 0, 0\); expected"),
         (lambda: law(lambda hand: (0, 0)).wrench(HandState.at([0, 0, 0])), r"numbers of shape \(2,\)"),
         (lambda: law(compiled=True)(lambda hand: (0, 0)), "expected a tuple of three numbers"),
         (lambda: law(compiled=True)(lambda hand: np.zeros(3)), r"returns array\(float64, 1d, C\); expected a tuple"),

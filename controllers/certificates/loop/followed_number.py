@@ -1,0 +1,224 @@
+"""Numbers of the hand with which a law's own function is followed: CasADi symbols whose comparisons are decided.
+
+A Python function that compares numbers of the hand takes one of several ways. Every comparison asks a `Way` for its
+truth; the way answers with the decisions that it was given, and records what was decided. All ways together, with their
+conditions, are the function (symbolic execution: King, *Symbolic execution and program testing*, CACM 19(7), 1976).
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partialmethod
+from numbers import Real
+from typing import Any, ClassVar, Literal, NamedTuple, NoReturn
+
+import casadi
+import numpy as np
+import numpy.typing as npt
+
+from controllers.certificates.loop.device import Symbol
+from controllers.errors import ControllerError
+
+MOST_CONDITIONS = 64  # decisions on one way: more is a loop that does not end on symbols
+
+
+class NotFollowed(ControllerError):
+    """A function that cannot be followed on symbols."""
+
+
+class Condition(NamedTuple):
+    """One decided comparison.
+
+    Attributes
+    ----------
+    gap : Symbol
+        Left side minus right side.
+    kind : {"<", "<=", "=="}
+        Comparison of the gap with zero.
+    holds : bool
+        What was decided.
+    """
+
+    gap: Symbol
+    kind: Literal["<", "<=", "=="]
+    holds: bool
+
+    def symbol(self) -> Symbol:
+        """1 where the gap is as it was decided, 0 elsewhere (NaN included, if it was decided to hold)."""
+        true = {"<": self.gap < 0.0, "<=": self.gap <= 0.0, "==": self.gap == 0.0}[self.kind]
+        return true if self.holds else casadi.logic_not(true)
+
+
+_TRUE = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
+
+
+class Way:
+    """One way through a function: the first decisions are given, each further comparison is taken to hold.
+
+    What earlier comparisons of the same two numbers leave no choice of is not decided again.
+    """
+
+    def __init__(self, given: Sequence[bool]) -> None:
+        self.given = tuple(given)
+        self.conditions: list[Condition] = []
+        self.lost: str | None = None
+        self._signs: dict[str, frozenset[int]] = {}  # that a gap may still have
+
+    def decide(self, left: Any, right: Any, kind: Literal["<", "<=", "=="]) -> bool:
+        """Truth of ``left kind right`` on this way."""
+        gap, true = casadi.SX(left - right), _TRUE[kind]
+        if gap.is_constant():
+            return (float(gap) > 0.0) - (float(gap) < 0.0) in true and float(gap) == float(gap)
+        signs = self._signs.get(str(gap), frozenset((-1, 0, 1)))
+        if signs <= true or not signs & true:
+            return signs <= true
+        at = len(self.conditions)
+        if at >= MOST_CONDITIONS:
+            self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
+        holds = self.given[at] if at < len(self.given) else True
+        left_over = signs & true if holds else signs - true
+        self._signs |= {str(gap): left_over, str(-gap): frozenset(-sign for sign in left_over)}
+        self.conditions.append(Condition(gap, kind, holds))
+        return holds
+
+    def lose(self, why: str) -> NoReturn:
+        """Give the function up; it is remembered, since the function may catch what is raised."""
+        self.lost = self.lost or why
+        raise NotFollowed(why)
+
+
+_PLAIN = (
+    "it makes a plain number of one of the hand's, as float(), the functions of math and an array of floats do; "
+    "expected functions of NumPy, as np.sqrt, np.hypot, np.linalg.norm(hand.p), and np.array([...]) of such numbers"
+)
+
+
+def _hypot(a: Symbol, b: Symbol) -> Symbol:
+    return casadi.sqrt(a * a + b * b)
+
+
+class FollowedNumber:
+    """A number of the hand, or what a function made of it, on one `Way`."""
+
+    __slots__ = ("symbol", "way")
+    __hash__: ClassVar[None]  # pyright: ignore[reportIncompatibleMethodOverride]
+
+    def __init__(self, symbol: Symbol, way: Way) -> None:
+        self.symbol = symbol
+        self.way = way
+
+    def _with(self, other: object, made: Callable[[Symbol, Symbol], Symbol]) -> Any:
+        """A number made of this and another one; what is neither is left to Python, and arrays to NumPy."""
+        if isinstance(other, FollowedNumber):
+            return FollowedNumber(made(self.symbol, other.symbol), self.way)
+        if isinstance(other, Real | np.bool_):
+            return FollowedNumber(made(self.symbol, float(other)), self.way)
+        return NotImplemented
+
+    def _asked(self, other: object, kind: Literal["<", "<=", "=="], swapped: bool = False) -> Any:
+        if isinstance(other, FollowedNumber):
+            value: Any = other.symbol
+        elif isinstance(other, Real | np.bool_):
+            value = float(other)
+        else:
+            return NotImplemented
+        return self.way.decide(value, self.symbol, kind) if swapped else self.way.decide(self.symbol, value, kind)
+
+    def __add__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: a + b)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: a - b)
+
+    def __rsub__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: b - a)
+
+    def __mul__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: a * b)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: a / b)
+
+    def __rtruediv__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: b / a)
+
+    def __pow__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: a**b)
+
+    def __rpow__(self, other: object) -> Any:
+        return self._with(other, lambda a, b: b**a)
+
+    def __neg__(self) -> "FollowedNumber":
+        return FollowedNumber(-self.symbol, self.way)
+
+    def __pos__(self) -> "FollowedNumber":
+        return self
+
+    def __abs__(self) -> "FollowedNumber":
+        return self if self >= 0.0 else -self
+
+    def __lt__(self, other: object) -> Any:
+        return self._asked(other, "<")
+
+    def __le__(self, other: object) -> Any:
+        return self._asked(other, "<=")
+
+    def __gt__(self, other: object) -> Any:
+        return self._asked(other, "<", swapped=True)
+
+    def __ge__(self, other: object) -> Any:
+        return self._asked(other, "<=", swapped=True)
+
+    def __eq__(self, other: object) -> Any:
+        return self._asked(other, "==")
+
+    def __ne__(self, other: object) -> Any:
+        equal = self._asked(other, "==")
+        return equal if equal is NotImplemented else not equal
+
+    def __bool__(self) -> bool:
+        return not self.way.decide(self.symbol, 0.0, "==")
+
+    def _plain(self, *_: object) -> NoReturn:
+        self.way.lose(_PLAIN)
+
+    __float__ = __int__ = __index__ = __complex__ = __round__ = __floor__ = __ceil__ = __trunc__ = _plain
+
+    # NumPy calls these methods of an object for its functions of the same names.
+
+    def _mapped(self, function: Callable[[Symbol], Symbol]) -> "FollowedNumber":
+        return FollowedNumber(function(self.symbol), self.way)
+
+    sqrt = partialmethod(_mapped, casadi.sqrt)
+    exp = partialmethod(_mapped, casadi.exp)
+    log = partialmethod(_mapped, casadi.log)
+    sin = partialmethod(_mapped, casadi.sin)
+    cos = partialmethod(_mapped, casadi.cos)
+    tan = partialmethod(_mapped, casadi.tan)
+    arcsin = partialmethod(_mapped, casadi.asin)
+    arccos = partialmethod(_mapped, casadi.acos)
+    arctan = partialmethod(_mapped, casadi.atan)
+    sinh = partialmethod(_mapped, casadi.sinh)
+    cosh = partialmethod(_mapped, casadi.cosh)
+    tanh = partialmethod(_mapped, casadi.tanh)
+    arctan2 = partialmethod(_with, made=casadi.atan2)
+    hypot = partialmethod(_with, made=_hypot)
+
+
+class FollowedVector(npt.NDArray[Any]):
+    """A vector of the hand as an array of `FollowedNumber`, whose Euclidean norm is one, too."""
+
+    @staticmethod
+    def of(symbols: Symbol, way: Way) -> "FollowedVector":
+        """Vector of a column of symbols."""
+        numbers = np.empty(symbols.numel(), dtype=object)
+        numbers[:] = [FollowedNumber(symbols[i], way) for i in range(symbols.numel())]
+        return numbers.view(FollowedVector)
+
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        # NumPy's own makes floats of the numbers.
+        if func is np.linalg.norm and len(args) == 1 and not kwargs and args[0].ndim == 1:
+            return np.sqrt(sum(number * number for number in args[0]))
+        return super().__array_function__(func, types, args, kwargs)

@@ -1,0 +1,229 @@
+"""Cases of a law of one's own: its function followed on symbols, with the conditions under which each case holds."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+
+from controllers.certificates.loop.device import Symbol, vector
+from controllers.certificates.loop.followed_number import Condition, FollowedNumber, FollowedVector, NotFollowed, Way
+from controllers.certificates.loop.hands_about import hands_about, told
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.algebra.program import evaluate
+from controllers.fields.own.compiled_law import CompiledLaw
+from controllers.fields.own.function_law import FunctionLaw
+from controllers.state import Array, HandState, Mask
+
+MOST_CASES = 16  # ways through a function that are followed: as many as four comparisons have
+# Share of the largest force by which two orders of the same operations differ: rounding, with what it is magnified by
+# where numbers cancel.
+_AGREES = 1e-9
+_NO_FORCE = 1e-12  # [N] below any force
+# Operations of CasADi without a derivative somewhere in the middle of their domain.
+_BENT = frozenset(
+    (casadi.OP_FABS, casadi.OP_SIGN, casadi.OP_FMIN, casadi.OP_FMAX, casadi.OP_FLOOR, casadi.OP_CEIL, casadi.OP_FMOD,
+     casadi.OP_IF_ELSE_ZERO, casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_COPYSIGN)
+)  # fmt: skip
+
+
+class Case(NamedTuple):
+    """Force F [N] and moment [N m] of a law as expressions (3,), under all of some conditions."""
+
+    force: Symbol
+    moment: Symbol
+    conditions: tuple[Condition, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """A law in the form that is certified: its cases, of which exactly one holds for any hand.
+
+    Attributes
+    ----------
+    law : FunctionLaw
+    p, v : Symbol
+        Position [m] and velocity [m/s] of the hand in the expressions, (3,) each.
+    cases : tuple of Case
+    """
+
+    law: FunctionLaw
+    p: Symbol
+    v: Symbol
+    cases: tuple[Case, ...]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the force is one expression for every hand."""
+        return len({str(case.force) for case in self.cases}) == 1
+
+    @property
+    def exerts_moment(self) -> bool:
+        """Whether there is a moment that is not zero for every hand."""
+        return not all(case.moment.is_zero() for case in self.cases)
+
+    @cached_property
+    def wrench(self) -> Any:
+        """CasADi function (p, v) → force and moment (6,), NaN where no case holds, and the number of the case."""
+        wrench, which = casadi.SX(np.full(6, np.nan)), casadi.SX(-1.0)
+        for number, case in enumerate(self.cases):
+            holds = casadi.SX(1.0)
+            for condition in case.conditions:
+                holds = casadi.logic_and(holds, condition.symbol())
+            given = casadi.vertcat(case.force, case.moment)
+            wrench, which = casadi.if_else(holds, given, wrench), casadi.if_else(holds, number, which)
+        return casadi.Function("wrench", [self.p, self.v], [wrench, which])
+
+    def check_slopes(self, hands: Array) -> None:
+        """Check that the force can be differentiated at hands (p, v), shape (n, 6), if it is `smooth`.
+
+        Raises
+        ------
+        ControllerError
+            If a derivative is not finite, as that of a distance is where it is zero.
+        """
+        x = casadi.vertcat(self.p, self.v)
+        slope = casadi.Function("slope", [x], [casadi.densify(casadi.jacobian(self.cases[0].force, x))])
+        wrong = ~np.isfinite(np.array([np.array(slope(hand)) for hand in hands])).all(axis=(1, 2))
+        if wrong.any():
+            at = hands[int(np.argmax(wrong))]
+            raise ControllerError(
+                f"the force of {self.law.place} has no derivative for a hand on the curve, at {told(at[:3], at[3:])}"
+            )
+
+    def force(self, p: Symbol, v: Symbol) -> Symbol:
+        """Force [N] as an expression of other symbols."""
+        whole = self.cases[0].force if self.smooth else self.wrench(self.p, self.v)[0][:3]
+        return casadi.Function("force", [self.p, self.v], [whole])(p, v)
+
+
+def cases_of(law: FunctionLaw) -> Cases:
+    """Follow a law's function on symbols along every way that its comparisons leave.
+
+    Raises
+    ------
+    ControllerError
+        If it cannot be followed, has more than `MOST_CASES` ways, or its force depends on anything but the hand's
+        position and velocity.
+    """
+    sym = casadi.SX.sym
+    symbols = {name: sym(name, size) for name, size in (("t", 1), ("p", 3), ("q", 4), ("v", 3), ("w", 3), ("s", 1))}
+    found, left = list[Case](), [tuple[bool, ...]()]
+    while left:
+        given = left.pop()
+        if len(found) == MOST_CASES:
+            raise ControllerError(
+                f"{law.place} has more than {MOST_CASES} cases; a certificate follows the comparisons of so many"
+            )
+        way = Way(given)
+        wrench = _followed(law, way, symbols)
+        taken = [condition.holds for condition in way.conditions]
+        left += [(*taken[:at], not taken[at]) for at in range(len(given), len(taken))]
+        found.append(Case(vector(wrench[:3]), vector(wrench[3:]), tuple(way.conditions)))
+    _check_inputs(law, found, symbols)
+    if any(_bends(case, casadi.vertcat(*symbols.values())) for case in found):
+        raise ControllerError(f"the force of {law.place} bends where nothing is compared, as √x² does; expected abs(x)")
+    return Cases(law, symbols["p"], symbols["v"], tuple(found))
+
+
+def _followed(law: FunctionLaw, way: Way, symbols: dict[str, Symbol]) -> list[Symbol]:
+    """The six numbers of a law along one way; as in a run, vectors of the hand are arrays, or tuples if compiled."""
+
+    def given(name: str) -> Any:
+        numbers = FollowedVector.of(symbols[name], way)
+        return tuple(numbers) if isinstance(law, CompiledLaw) else numbers
+
+    t, switch = (FollowedNumber(symbols[name], way) for name in ("t", "s"))
+    hand = HandState(t, given("p"), given("q"), given("v"), given("w"), switch)  # pyright: ignore[reportArgumentType]
+    try:
+        # An entry may be an array of no dimension, as np.where gives.
+        numbers = [np.asarray(item, dtype=object).item() for item in law.function(hand, **law.parameters)]  # pyright: ignore[reportGeneralTypeIssues]
+        wrench = [item.symbol if isinstance(item, FollowedNumber) else casadi.SX(float(item)) for item in numbers]
+    except Exception as error:  # whatever a user's function raises
+        why = way.lost or (str(error) if isinstance(error, NotFollowed) else f"{type(error).__name__}: {error}")
+    else:
+        why = way.lost or (None if len(wrench) in (3, 6) else f"it gives {len(wrench)} numbers; expected three or six")
+        if why is None:
+            return wrench + [casadi.SX(0.0)] * (6 - len(wrench))
+    raise ControllerError(f"{law.place} cannot be followed on symbols: {why}")
+
+
+def _bends(case: Case, x: Symbol) -> bool:
+    """Whether an expression of a case bends or jumps within it, as CasADi's simplification of √x² to |x| does."""
+    function = casadi.Function("case", [x], [case.force])
+    return any(function.instruction_id(i) in _BENT for i in range(function.n_instructions()))
+
+
+def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol]) -> None:
+    names = {"t": "the time", "q": "the orientation", "w": "the angular velocity", "s": "the switch"}
+    read = casadi.vertcat(
+        *(casadi.vertcat(case.force, *(condition.gap for condition in case.conditions)) for case in cases)
+    )
+    found = [told for name, told in names.items() if casadi.depends_on(read, symbols[name])]
+    if found:
+        raise ControllerError(
+            f"the force of {law.place} depends on {' and '.join(found)} of the hand; a certificate is of forces that "
+            "depend on its position and velocity alone"
+        )
+
+
+def executed(law: FunctionLaw, curve: Trajectory) -> Array:
+    """Six numbers of a law as a run evaluates it, at the hands about a curve, shape (n, 6).
+
+    Raises
+    ------
+    ParameterError
+        If the function raises, or does not return three or six numbers.
+    """
+    program, hands = law.program(), hands_about(curve)
+    wrenches = np.empty((len(hands), 6))
+    for hand, wrench in zip(hands, wrenches, strict=True):
+        memory = program.fresh_memory()
+        try:
+            program.feed(memory, hand)
+        except ParameterError:
+            raise
+        except Exception as error:  # whatever a user's function raises
+            raise ParameterError(
+                f"{law.place} raised {type(error).__name__}: {error}; for a hand at {told(hand.p, hand.v)}"
+            ) from error
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
+    return wrenches
+
+
+def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
+    """Cases of a law, compared with the law as a run evaluates it at the hands about a curve.
+
+    Raises
+    ------
+    ControllerError
+        If the law cannot be followed (`cases_of`), or it gives numbers that are not finite, others when it is asked
+        again, or others than its cases.
+    ParameterError
+        As `executed`.
+    """
+    force = executed(law, curve)[:, :3]
+    _refuse(law, curve, np.asarray(~np.isfinite(force).all(axis=1), dtype=np.bool_), "numbers that are not finite")
+    size = _AGREES * np.linalg.norm(force, axis=1) + _NO_FORCE
+
+    def differs(other: Array) -> Mask:
+        apart = np.linalg.norm(other - force, axis=1)
+        return np.isnan(apart) | (apart > size)
+
+    _refuse(law, curve, differs(executed(law, curve)[:, :3]), "another force when it is asked again")
+    cases, hands = cases_of(law), hands_about(curve)
+    places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
+    symbolic = np.array(cases.wrench.map(len(hands))(places, velocities)[0]).T
+    _refuse(law, curve, differs(symbolic[:, :3]), "another force in a run than on symbols")
+    return cases
+
+
+def _refuse(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> None:
+    if wrong.any():
+        hand = hands_about(curve)[int(np.argmax(wrong))]
+        raise ControllerError(
+            f"{law.place} gives {what}, as for a hand at {told(hand.p, hand.v)}; a certificate is of a "
+            "function of the hand alone"
+        )

@@ -1,0 +1,253 @@
+"""Certificates of laws of one's own: of every case of a law, never of one that shakes, and with a true reason."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hvf
+from controllers.certificates.loop.case_hull import slopes_of
+from controllers.certificates.loop.hand import NO_HANDS
+from controllers.certificates.loop.law_cases import cases_of, certified_cases
+from controllers.errors import ControllerError, ParameterError
+from controllers.state import HandState
+
+CURVE = hvf.circle(radius=0.0477, lap=4.0)
+ON_CURVE = np.hstack([CURVE.point(np.linspace(0.0, 3.9, 40)), CURVE.velocity(np.linspace(0.0, 3.9, 40))])
+
+
+def simulation(law):
+    return hvf.Simulation(
+        field=hvf.Follow(CURVE, k_r=300.0, b_d=8.0) + law,
+        haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=CURVE),
+        figure=hvf.Figure(kind="none"),
+    )
+
+
+def stability(function, compiled=False, hands=NO_HANDS):
+    law = hvf.law(compiled=True)(function) if compiled else hvf.law(function)
+    return hvf.certify(simulation(law), hands).stability
+
+
+def rail(hand, k=2e4):
+    r = math.hypot(hand.p[0], hand.p[1])
+    return (0.0, 0.0, -k * hand.p[2]) if 0.04 < r < 0.06 else (0.0, 0.0, 0.0)
+
+
+def numpy_rail(hand, k=2e4):
+    r = np.hypot(hand.p[0], hand.p[1])
+    return (0.0, 0.0, -k * hand.p[2]) if 0.04 < r < 0.06 else (0.0, 0.0, 0.0)
+
+
+def cut(hand, k=2e4):
+    return 0.0, 0.0, max(-5.0, min(5.0, -k * float(hand.p[2])))
+
+
+def swallowing(hand, k=2e4):
+    try:
+        z = float(hand.p[2])
+    except Exception:
+        z = 0.0
+    return 0.0, 0.0, -k * z
+
+
+def of_floats(hand, k=2e4):
+    return (0.0, 0.0, -k * hand.p[2]) if isinstance(hand.p[2], float) else (0.0, 0.0, 0.0)
+
+
+def beside(hand, k=2e4):
+    return (0.0, 0.0, -k * hand.p[2]) if abs(hand.p[2]) > 1e-4 else (0.0, 0.0, 0.0)
+
+
+def hidden(hand, k=2e4):
+    """Without stiffness on the curve, with all of it a few hundredths of a millimetre off."""
+    return 0.0, 0.0, -k * hand.p[2] * (1.0 - np.exp(-((hand.p[2] / 1e-5) ** 2)))
+
+
+def relay(hand, c=1.0):
+    return 0.0, 0.0, (-c if hand.p[2] > 0.0 else c)
+
+
+def dry(hand, c=0.5):
+    return 0.0, 0.0, -c * np.sign(hand.v[2])
+
+
+def damped(hand, b=100.0):
+    return -b * hand.v
+
+
+def floor(hand, k=500.0, b=3.0):
+    depth = -1e-3 - hand.p[2]
+    return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
+
+
+def sticking_floor(hand, k=500.0, b=3.0):
+    depth = -1e-3 - hand.p[2]
+    return (0, 0, k * depth - b * hand.v[2]) if depth > 0 else (0, 0, 0)
+
+
+def step(hand):
+    return (0.1 if hand.p[0] > 0 else 0.0), 0, 0
+
+
+def flip(hand, k=900.0):
+    return (0, 0, -k * hand.p[2]) if hand.p[2] * hand.v[2] > 0 else (0, 0, 0.25 * k * hand.p[2])
+
+
+# What shakes is never certified.
+
+
+@pytest.mark.parametrize("function", [rail, cut, swallowing, of_floats, numpy_rail, beside, hidden, relay, dry, damped])
+def test_a_law_that_shakes_in_a_run_is_not_certified(function):
+    assert "It oscillates" in str(simulation(hvf.law(function)).run(1.0))
+    assert stability(function).verdict != "certified"
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_law_that_makes_plain_numbers_of_the_hand_is_not_followed_but_seen_to_shake(compiled):
+    found = stability(rail, compiled)
+    assert found.verdict == "refuted"
+    assert "mm off the curve at phase" in found.reason
+    assert "makes a plain number" in found.reason
+    assert "np.hypot" in found.reason
+    # Seen only; a soft one is stable at all states, of which nothing follows.
+    soft = hvf.certify(simulation(hvf.law(rail)(k=100.0)), NO_HANDS).stability
+    assert soft.verdict == "unknown"
+    assert "makes a plain number" in soft.reason
+
+
+def test_an_expression_that_differs_from_the_law_that_runs_is_no_certificate():
+    with pytest.raises(ControllerError, match="another force in a run than on symbols, as for a hand at p = "):
+        certified_cases(hvf.law(of_floats), CURVE)
+    with pytest.raises(ControllerError, match="numbers that are not finite"):
+        certified_cases(hvf.law(lambda hand: (math.nan, 0, 0)), CURVE)
+    kept = [0.0]
+
+    def filtered(hand):
+        kept[0] = 0.9 * kept[0] + 0.1 * hand.p[2]
+        return 0, 0, -kept[0]
+
+    with pytest.raises(ControllerError, match="another force when it is asked again"):
+        certified_cases(hvf.law(filtered), CURVE)
+
+
+# A jump is no slope.
+
+
+def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
+    found = stability(step)
+    assert found.verdict == "unknown"
+    assert "where it jumps" in found.reason
+    assert "its force jumps, bends or is no number" in found.reason
+
+
+# Every case of a law.
+
+
+@pytest.mark.slow
+def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
+    found = hvf.certify(simulation(hvf.law(floor))).stability
+    assert found.verdict == "certified"
+    assert "the least of 2 cases" in found.reason
+    plain = hvf.certify(hvf.Simulation(
+        field=hvf.Follow(CURVE, k_r=300.0, b_d=8.0), haptic_map=simulation(hvf.law(floor)).haptic_map,
+        figure=hvf.Figure(kind="none"),
+    ))  # fmt: skip
+    assert found.margin < 0.7 * plain.stability.margin
+
+
+def test_a_floor_is_as_stable_as_its_hardest_case():
+    assert stability(floor).verdict == "certified"
+    hard = hvf.certify(simulation(hvf.law(floor)(k=2e4)), NO_HANDS).stability
+    assert hard.verdict == "refuted"
+    assert "in one of 2 cases" in hard.reason
+
+
+@pytest.mark.slow
+def test_cases_that_are_stable_one_by_one_are_not_certified_if_switching_between_them_is_not():
+    found = hvf.certify(simulation(hvf.law(flip))).stability
+    assert found.verdict == "unknown"
+    assert "switching between them is not certified" in found.reason
+
+
+def test_the_slopes_of_a_law_bound_its_force_as_seen_from_the_curve():
+    kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, beside: 2, numpy_rail: 2}
+    for function, count in kinds.items():
+        cases = cases_of(hvf.law(function))
+        if not count:
+            with pytest.raises(ControllerError, match="no stiffness and damping"):
+                slopes_of(cases, ON_CURVE)
+            continue
+        assert len(slopes_of(cases, ON_CURVE)) == count
+    soft, stiff = sorted(slopes_of(cases_of(hvf.law(floor)), ON_CURVE), key=lambda slope: np.abs(slope).max())
+    rng = np.random.default_rng(1)
+    for off in rng.normal(scale=(3e-3,) * 3 + (0.05,) * 3, size=(200, 6)):
+        hand = ON_CURVE[0] + off
+        force = hvf.law(floor).wrench(HandState.at(hand[:3], hand[3:])).force[2]
+        ends = sorted((float(soft[2] @ off), float(stiff[2] @ off)))
+        assert ends[0] - 1e-12 <= force <= ends[1] + 1e-12
+
+
+def test_vectors_are_arrays_as_in_a_run():
+    def spring(hand, k=50.0, b=1.0):
+        return -k * hand.p - b * hand.v
+
+    def dragged(hand, b=1.0):
+        return -b * hand.v * hand.v.dot(hand.v)
+
+    def pulled(hand, k=10.0):
+        return -k * np.linalg.norm(hand.p), 0.0, 0.0
+
+    for function in (spring, dragged, pulled):
+        assert stability(function).verdict == "certified", function
+
+
+def test_a_distance_that_has_no_derivative_on_the_curve_is_unknown():
+    found = stability(lambda hand: (0, 0, -300.0 * np.sqrt(hand.p[2] ** 2)))
+    assert found.verdict == "unknown"
+    assert "bends where nothing is compared" in found.reason
+
+
+def test_all_ways_through_a_function_are_followed_and_none_that_no_number_takes():
+    assert len(cases_of(hvf.law(dry)).cases) == 3
+    assert len(cases_of(hvf.law(floor)).cases) == 3
+    with pytest.raises(ControllerError, match="more than 16 cases"):
+        cases_of(hvf.law(lambda hand: np.clip(-300.0 * hand.p, -1.0, 1.0)))
+    with pytest.raises(ControllerError, match="compares numbers of the hand more than"):
+        cases_of(hvf.law(_endless))
+    with pytest.raises(ControllerError, match="depends on the switch"):
+        cases_of(hvf.law(lambda hand: (0, 0, 1.0) if hand.switch else (0, 0, 0)))
+
+
+def _endless(hand):
+    x = hand.p[0]
+    while x < 1.0:
+        x = x + 1e-3
+    return x, 0, 0
+
+
+# A law that is none.
+
+
+def _boom(hand):
+    raise ValueError("boom")
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (_boom, r"law _boom \(.*\) raised ValueError: boom"),
+        (lambda hand: (1.0, 2.0), r"numbers of shape \(2,\)"),
+        (lambda hand: None, "expected a force of three"),
+        (lambda hand: ("a", 0, 0), r"gave \('a', 0, 0\)"),
+        (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
+    ],
+)
+def test_a_law_that_raises_or_gives_another_shape_is_an_error_that_names_it(function, says):
+    with pytest.raises(ParameterError, match=says):
+        stability(function)
+
+
+def test_the_reasons_hold_no_path_of_a_library():
+    for function in (rail, step):
+        assert ".cpp" not in stability(function).reason
