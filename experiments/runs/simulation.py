@@ -20,7 +20,7 @@ from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
 from experiments.config.part import to_dict
-from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
+from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
@@ -171,6 +171,8 @@ class Simulation:
 
     def __post_init__(self) -> None:
         _check_kinds(self)
+        self.figure.check(leads=False)
+        check_seed(self.device, self.seed)
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
             raise ParameterError(SIMULATED_TOO)
