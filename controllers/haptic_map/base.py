@@ -6,8 +6,16 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
+from controllers.curves.stylus import stylus_path
 from controllers.errors import ParameterError
-from controllers.haptic_map.own_map import OWN, Asked, checked_pose, finite_differences
+from controllers.haptic_map.own_map import (
+    OWN,
+    Asked,
+    check_derivative,
+    checked_jacobian,
+    checked_pose,
+    finite_differences,
+)
 from controllers.state import Array, Pose
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
@@ -51,8 +59,8 @@ class HapticMap(ABC):
                 pose[7:11] = np.cos(5 * x[0]), 0, np.sin(5 * x[0]), 0
                 return pose
 
-    Its configurations are then root position, root quaternion and joint quaternions; its derivative is computed by
-    finite differences, and the tick calls it in Python.
+    Its configurations are then root position, root quaternion and joint quaternions; the tick calls it in Python. Its
+    derivative is computed by finite differences; a `jacobian` of its own is compared with them before a run.
     """
 
     _asked: ClassVar[Asked | None] = None
@@ -99,6 +107,21 @@ class HapticMap(ABC):
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
         return finite_differences(self.pose, np.asarray(x, dtype=np.float64))
+
+    def check_jacobian(self, points: Array) -> None:
+        """Compare a user-defined `jacobian` with finite differences of the pose at points (n, 3) of the upright stylus.
+
+        Raises
+        ------
+        ParameterError
+            If its shape is not (nv, 6), a number is not finite, or it is not the derivative where the map is smooth.
+        """
+        if type(self).jacobian is HapticMap.jacobian:
+            return
+        nq, nv = self.nq, self.nv
+        for x in stylus_path(np.asarray(points, dtype=np.float64)):
+            given = checked_jacobian(self.jacobian(x), nv)
+            check_derivative(given, lambda moved: checked_pose(self.pose(moved), nq), x)
 
     def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
         """Push-forward h_* ẋ, shape (nv,), of a stylus velocity at x to rates of the target.

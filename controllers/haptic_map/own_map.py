@@ -20,6 +20,7 @@ OWN = 8
 _NUMBERS = ctypes.POINTER(ctypes.c_double)
 _CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
 _STEP = 1e-5  # [m, rad] of central differences: cube root of the rounding error, for lengths of some centimetres
+_AGREE = 1e-3  # share of the largest entry: a slip of sign, unit, frame or column errs by more, differences by 1e-7
 
 
 @intrinsic
@@ -68,7 +69,7 @@ class Asked:
                     place = np.ctypeslib.as_array(x, (7,)).copy()
                     self._last = checked_pose(pose(place), nq)
                     if rows:
-                        np.ctypeslib.as_array(derivative, (rows, 6))[:] = jacobian(place)
+                        np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(jacobian(place), rows)
             except Exception as error:  # no exception may leave a C callback
                 self.error = error
             np.ctypeslib.as_array(target, (nq,))[:] = self._last
@@ -92,6 +93,50 @@ def checked_pose(pose: Any, nq: int) -> Pose:
     return numbers
 
 
+def checked_jacobian(jacobian: Any, nv: int) -> Array:
+    """A derivative (nv, 6) of finite numbers.
+
+    Raises
+    ------
+    ParameterError
+        If the derivative has another shape or a number that is not finite.
+    """
+    numbers = np.asarray(jacobian, dtype=np.float64)
+    if numbers.shape != (nv, 6):
+        raise ParameterError(
+            f"a map of one's own gave a jacobian of shape {numbers.shape}; expected ({nv}, 6), or none: "
+            "it is then computed by finite differences"
+        )
+    if not np.isfinite(numbers).all():
+        raise ParameterError(
+            "a map of one's own gave a jacobian with a number that is not finite; expected finite ones"
+        )
+    return numbers
+
+
+def check_derivative(jacobian: Array, pose: Callable[[Array], Pose], x: Array) -> None:
+    """Compare a derivative (nv, 6) at a stylus pose (7,) with finite differences of the pose.
+
+    Where differences of two steps do not agree, the map is not smooth, and nothing is compared.
+
+    Raises
+    ------
+    ParameterError
+        If an entry differs by more than a thousandth of the largest one.
+    """
+    expected, coarse = finite_differences(pose, x), finite_differences(pose, x, 10.0 * _STEP)
+    allowed = _AGREE * max(float(np.abs(expected).max()), _AGREE)
+    wrong = np.abs(jacobian - expected)
+    if wrong.max() <= allowed or np.abs(coarse - expected).max() > allowed:
+        return
+    row, column = np.unravel_index(np.argmax(wrong), wrong.shape)
+    raise ParameterError(
+        f"the jacobian of a map of one's own is {jacobian[row, column]:.4g} in row {row}, column {column} at p = "
+        f"{np.round(x[:3], 4).tolist()}, and its pose changes by {expected[row, column]:.4g} there; expected the same, "
+        "linear before angular velocity in the columns, or no jacobian: it is then computed by finite differences"
+    )
+
+
 def difference(before: Pose, after: Pose) -> Array:
     """The tangent that leads from one configuration to another in unit time, shape (nv,).
 
@@ -104,12 +149,12 @@ def difference(before: Pose, after: Pose) -> Array:
     return np.concatenate(parts)
 
 
-def finite_differences(pose: Callable[[Array], Pose], x: Array) -> Array:
-    """Derivative of a map at a stylus pose (7,) by central differences, shape (nv, 6)."""
+def finite_differences(pose: Callable[[Array], Pose], x: Array, of: float = _STEP) -> Array:
+    """Derivative of a map at a stylus pose (7,) by central differences of a step [m, rad], shape (nv, 6)."""
     columns: list[Array] = []
     for k in range(6):
-        before, after = (_moved(x, k, step) for step in (-_STEP, _STEP))
-        columns.append(difference(pose(before), pose(after)) / (2.0 * _STEP))
+        before, after = (_moved(x, k, step) for step in (-of, of))
+        columns.append(difference(pose(before), pose(after)) / (2.0 * of))
     return np.stack(columns, axis=1)
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
+from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, part
 
 
@@ -26,7 +27,7 @@ class OrientationMoment:
 
 @part
 class SpeedGovernor:
-    """Force on a hand that goes too slowly or too fast for the flights of the animation; rivers are gated instead.
+    """Force on a hand that goes too slowly or too fast for the flights of the animation; rivers are gated.
 
     Parameters
     ----------
@@ -35,6 +36,17 @@ class SpeedGovernor:
     """
 
     governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+
+
+NO_DRAG = (
+    "--governor-drag has no meaning with --mode rivers, whose governor gates each river; it belongs to --crossing sum, "
+    "and to --mode follow, bunny"
+)
+
+
+def gates(crossing: str) -> bool:
+    """Whether a governor of rivers gates them, rather than being a drag."""
+    return crossing != "sum"
 
 
 @part
@@ -132,7 +144,8 @@ class Rivers:
     crossing : {"smooth", "discrete", "sum"}
         How rivers share a hand where they cross.
     orientation, governor, walls
-        What is added, if anything.
+        What is added, if anything. With a governor each river is gated: it takes no hand that is too slow or too fast
+        for its flights; only where the rivers' forces are summed, there is a drag instead.
     """
 
     kind: Literal["rivers"] = "rivers"
@@ -143,6 +156,10 @@ class Rivers:
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
     walls: JointWalls | None = None
+
+    def __post_init__(self) -> None:
+        if self.governor not in (None, SpeedGovernor()) and gates(self.crossing):
+            raise ParameterError(NO_DRAG)
 
 
 @part

@@ -1,10 +1,11 @@
 """The configuration of a run: pure data, that goes to and from one JSON file and lies beside the results."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
 from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
 from controllers.errors import ParameterError
@@ -75,16 +76,35 @@ class User:
         return self.does == "trace" or self.does in PERSONAL
 
 
-_FILTERED, _RESIDUAL = ("smoothing", "blend"), ("residual_force", "residual_moment")
+_ANIMATED, _RESIDUAL = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
+_SIZE: dict[FigureKind, tuple[str, ...]] = {"physical": (), "kinematic": ("mass",), "none": ("stature", "mass")}
 MEANINGLESS: dict[FigureKind, tuple[str, ...]] = {
-    "physical": (), "kinematic": _RESIDUAL, "none": (*_FILTERED, *_RESIDUAL)
+    "physical": (), "kinematic": _RESIDUAL, "none": (*_ANIMATED, *_RESIDUAL)
 }  # fmt: skip
-"""Numbers of a figure that have no meaning for its kind."""
+"""Numbers of a figure that have no meaning for its kind, whatever is played."""
+
+
+def meaningless(kind: str, leads: bool) -> tuple[str, ...]:
+    """Numbers of a figure that have no meaning for its kind; that of one that is led always has its size."""
+    one = cast(FigureKind, kind)
+    return MEANINGLESS.get(one, ()) + (() if leads else _SIZE.get(one, ()))
+
+
+def no_meaning(name: str, value: object, kind: str) -> ParameterError:
+    """The error that a number of a figure has no meaning for its kind, and for which it has."""
+    others = [other for other in MEANINGLESS if name not in meaningless(other, leads=False)]
+    return ParameterError(
+        f"--{name.replace('_', '-')} {value} has no meaning with --figure {kind}; "
+        f"it belongs to --figure {', '.join(others)}"
+    )
 
 
 @part
 class Figure:
-    """The figure that plays the animation.
+    """The figure that plays the animation; its numbers have a meaning as far as its kind has what they are about.
+
+    A kinematic figure has no mass and no residual; where there is none, nothing has a size, is filtered or updated. The
+    numbers of a figure that is led always include its size, by which the floor is scaled.
 
     Parameters
     ----------
@@ -117,14 +137,31 @@ class Figure:
     residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
 
     def __post_init__(self) -> None:
-        for name in MEANINGLESS[self.kind]:
+        self.check(leads=True)
+
+    def check(self, leads: bool) -> None:
+        """Refuse what has no meaning for the kind of figure, where a figure is led or is not.
+
+        Raises
+        ------
+        ParameterError
+            The number, and the kinds of figure that have it.
+        """
+        for name in meaningless(self.kind, leads):
             value = getattr(self, name)
             if value != FIGURE_DEFAULTS[name]:
-                others = ", ".join(kind for kind, names in MEANINGLESS.items() if name not in names)
-                raise ParameterError(
-                    f"--{name.replace('_', '-')} {value:g} has no meaning with --figure {self.kind}; "
-                    f"it belongs to --figure {others}"
-                )
+                raise no_meaning(name, f"{value:g}", self.kind)
+
+    def become(self, kind: FigureKind, leads: bool) -> "Figure":
+        """The same figure as another kind; what has no meaning for that is left at its default."""
+        return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless(kind, leads)})
+
+    @model_serializer(mode="wrap")
+    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """What a file holds: nothing that has no meaning for the kind."""
+        idle = meaningless(self.kind, leads=False)
+        held = cast(dict[str, Any], plain(self))
+        return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
 
 
 FIGURE_DEFAULTS = {name: field.default for name, field in cast(Any, Figure).__pydantic_fields__.items()}
@@ -152,7 +189,7 @@ class Phantom:
 class Replay:
     """The hand of a recording in place of a device: it moves as it was recorded, whatever the force.
 
-    The run begins where that hand was; the seed has no effect.
+    The run begins where that hand was, so that it has no seed.
 
     Parameters
     ----------
@@ -204,7 +241,16 @@ class Clock:
 
 
 SIMULATED_TOO = "a replayed hand has no simulated user; leave out the user and what it does, or the replay"
+SEED = 1
+"""Seed of a run that is given none."""
+NO_SEED = "a replayed hand begins where it was recorded, whatever the seed; leave out the seed, or the replay"
 NOBODY_LED = "the mode lead with the figure none: nobody to lead; expected another figure"
+
+
+def check_seed(device: Device, seed: int) -> None:
+    """Refuse a seed beside a replayed hand."""
+    if isinstance(device, Replay) and seed != SEED:
+        raise ParameterError(NO_SEED)
 
 
 @part
@@ -222,7 +268,7 @@ class RunConfig:
     seconds : float
         Simulated time [s].
     seed : int
-        Of where exactly the hand lets go of the stylus at the start.
+        Of where exactly the hand lets go of the stylus at the start; a replayed hand has none.
     """
 
     mode: Mode = Follow()
@@ -232,7 +278,7 @@ class RunConfig:
     device: Device = Phantom()
     clock: Clock = Clock()
     seconds: float = above(0.0, default=20.0, unit="s")
-    seed: int = whole(0, default=1)
+    seed: int = whole(0, default=SEED)
 
     def __post_init__(self) -> None:
         if self.leads != isinstance(self.map, Led):
@@ -241,6 +287,8 @@ class RunConfig:
             raise ParameterError(
                 f"the user {self.user.does!r} and the mode {self.mode.kind!r}: a hand leads in the mode lead only"
             )
+        self.figure.check(self.leads)
+        check_seed(self.device, self.seed)
         if isinstance(self.device, Replay):
             if self.user != User(does="lead" if self.leads else "relaxed"):
                 raise ParameterError(SIMULATED_TOO)

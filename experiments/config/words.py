@@ -15,9 +15,9 @@ import tyro
 
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
-from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
+from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates
 from experiments.config.run_config import (
-    MEANINGLESS,
+    NO_SEED,
     NOBODY_LED,
     PERSONAL,
     Clock,
@@ -27,9 +27,10 @@ from experiments.config.run_config import (
     RunConfig,
     User,
     load_config,
+    meaningless,
+    no_meaning,
 )
 from sim.users.person.population import PERSONAS, persona
-from sim.world.world import FigureKind
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
@@ -145,6 +146,7 @@ def run_config(
         map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
     if mode != "lead" and user and user not in _USERS:
         raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
+    _refuse_idle(given, mode, figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
     taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
     mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
@@ -171,6 +173,17 @@ def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> N
             raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
     for name in sorted({"around", "does", "file", "run"} & words.keys()):
         raise _unknown(f"--{name}")
+
+
+def _refuse_idle(given: Mapping[str, object], mode: str, figure: str, replay: str) -> None:
+    """Refuse words that change nothing beside what is chosen, also if their value is the default."""
+    for name in meaningless(figure, mode == "lead"):
+        if name in given:
+            raise no_meaning(name, given[name], figure)
+    if replay and "seed" in given:
+        raise ParameterError(NO_SEED)
+    if mode == "rivers" and "governor_drag" in given and gates(str(given.get("crossing", ""))):
+        raise ParameterError(NO_DRAG)
 
 
 def _unknown(option: str) -> ParameterError:
@@ -315,10 +328,10 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     if leads:
         left |= {"user", "pushes", "turns", "grabs"}
     if words.get("replay"):
-        left |= _HAND | _names(Phantom)
-    figure = words.get("figure", config.figure.kind)
-    if figure != config.figure.kind:
-        left |= set(MEANINGLESS.get(cast(FigureKind, figure), ()))
+        left |= _HAND | _names(Phantom) | {"seed"}
+    if mode == "rivers" and gates(str(words.get("crossing", kept.get("crossing")))):
+        left.add("governor_drag")
+    left |= set(meaningless(str(words.get("figure", config.figure.kind)), mode == "lead"))
     kept = {name: value for name, value in kept.items() if name not in left}
     return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
 
@@ -339,6 +352,12 @@ def words_of(config: RunConfig) -> dict[str, object]:
         part = getattr(config.mode, name, None)
         if part is not None:
             words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
+    idle = set(meaningless(config.figure.kind, config.leads))
+    if isinstance(config.mode, Rivers) and gates(config.mode.crossing):
+        idle.add("governor_drag")
+    if isinstance(config.device, Replay):
+        idle.add("seed")
+    words = {name: value for name, value in words.items() if name not in idle}
     if isinstance(config.map, MapFile):
         words["map"] = config.map.file
     if isinstance(config.device, Replay):

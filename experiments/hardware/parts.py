@@ -32,7 +32,7 @@ def served(config: RunConfig) -> RunConfig:
     neither of the two.
     """
     clock = Clock(servo_period=config.clock.servo_period, physics_step=config.clock.servo_period)
-    return replace(config, figure=replace(config.figure, kind="none"), clock=clock)
+    return replace(config, figure=config.figure.become("none", config.leads), clock=clock)
 
 
 def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: float = SILENT_PERIODS) -> Session:

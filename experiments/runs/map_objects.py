@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -14,8 +14,12 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted as LiftedMap
 from experiments.config.maps import MapFile
 from experiments.files.map_files import load_figure_map
+from experiments.runs.short_text import short_text
 from experiments.setups.figure_maps import (
+    CORNERS,
+    PARTS,
     Place,
+    check_clips,
     composite_parts,
     cylindrical_parts,
     for_size_of,
@@ -37,9 +41,12 @@ class FigureMap(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class _AboutCurve:
     """What maps about a curve are made of; see `Cylindrical`."""
+
+    most: ClassVar[int]
+    """Number of clips that the map takes."""
 
     clips: Sequence[Clip]
     around: Trajectory = field(repr=False)
@@ -50,6 +57,11 @@ class _AboutCurve:
         check_kinds(self)
         if not 0.0 < self.reach < np.inf:
             raise ParameterError(f"reach is {self.reach:g}; expected more than 0 m, and finite")
+        check_clips(self.clips, self.most, type(self).__name__.lower())
+        self._place().radii()
+
+    def __repr__(self) -> str:
+        return short_text(self)
 
     def _place(self) -> Place:
         curve = reached(self.around)
@@ -57,7 +69,7 @@ class _AboutCurve:
         return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), self.reach, self.expressive)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Cylindrical(_AboutCurve):
     """Cylindrical map: the angle sets the frame, radius and height blend four clips (the paper's Fig. 3).
 
@@ -71,14 +83,23 @@ class Cylindrical(_AboutCurve):
         Half width of the domain about the curve, in radius and in height [m].
     expressive : bool
         Whether the figure's gaze and lean follow the orientation of the stylus.
+
+    Raises
+    ------
+    ParameterError
+        If there is no clip, or more than four, or the domain reaches the axis.
+    SimError
+        If the Phantom does not reach the curve.
     """
+
+    most = CORNERS
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Composite(_AboutCurve):
     """Composite map: the lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
 
@@ -88,7 +109,14 @@ class Composite(_AboutCurve):
         Lower body, upper body inside, upper body outside; if there are fewer, they are repeated.
     around, reach, expressive
         As in `Cylindrical`.
+
+    Raises
+    ------
+    ParameterError, SimError
+        As `Cylindrical`, of three clips.
     """
+
+    most = PARTS
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""

@@ -161,11 +161,13 @@ def _simulate(
     first = servo.plant.period * servo.figure_ticks
     rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
     loop.run(first)
+    session.haptic_map.check()
     first_tick = time.perf_counter() - started
     with simulating(console, seconds) as reached:
 
         def progress(t: float) -> None:
             reached(t)
+            session.haptic_map.check()  # a user-defined map that has failed ends the run at once
             if view:
                 clock.wait_until(t)
 

@@ -140,8 +140,12 @@ class Run:
         ------
         ModelError
             If the file exists and is not to be overwritten.
+        SimError
+            If the run has no figure.
         """
         of_kind("path", path, str | Path)
+        if not self._session.world.has_figure:
+            raise SimError('the run has no figure, and so no animation; expected a run with another figure than "none"')
         target = Path(path)
         if target.exists() and not overwrite:
             raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")

@@ -20,12 +20,13 @@ from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
 from experiments.config.part import to_dict
-from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay
+from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
 from experiments.runs.map_objects import FigureMap
 from experiments.runs.run_result import Run
+from experiments.runs.short_text import short_text
 from experiments.setups.figure_maps import (
     own_parts,
     reached,
@@ -49,7 +50,7 @@ from sim.world.world import World
 _MINUTE = 60.0  # [s]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class User:
     """The simulated hand: relaxed or tracing a curve, with pushes, turns and grabs at given times.
 
@@ -74,6 +75,9 @@ class User:
 
     def __post_init__(self) -> None:
         check_kinds(self)
+
+    def __repr__(self) -> str:
+        return short_text(self)
 
     @property
     def acts(self) -> bool:
@@ -131,7 +135,7 @@ class Tick(NamedTuple):
     figure: Array
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Simulation:
     """A hand, a field, a haptic map and a figure, with the device and the clock: all that determines a run.
 
@@ -171,9 +175,14 @@ class Simulation:
 
     def __post_init__(self) -> None:
         _check_kinds(self)
+        self.figure.check(leads=False)
+        check_seed(self.device, self.seed)
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
             raise ParameterError(SIMULATED_TOO)
+
+    def __repr__(self) -> str:
+        return short_text(self)
 
     @property
     def scene(self) -> SceneConfig:

@@ -12,6 +12,7 @@ from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
 from experiments.runs.run_result import Run
+from experiments.runs.short_text import name_of
 from experiments.runs.simulation import Simulation
 
 
@@ -92,7 +93,7 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     """The same part with one parameter set, which may be nested."""
     if isinstance(part, Program):
         law = _owner(part, names, path)
-        rest = names if len(names) == 1 or _name(law) != names[0] else names[1:]
+        rest = names if len(names) == 1 or name_of(law) != names[0] else names[1:]
         return part.with_law(law, cast(Law, _set(law, rest, value, path)))
     if isinstance(part, FunctionLaw) and len(names) == 1:
         return part(**{names[0]: value})
@@ -111,17 +112,12 @@ def _owner(program: Program, names: Sequence[str], path: str) -> Law:
     wanted = names[0]
     found = [
         law for law in program.laws
-        if (_name(law) == wanted if len(names) > 1 else _has(law, wanted))
+        if (name_of(law) == wanted if len(names) > 1 else _has(law, wanted))
     ]  # fmt: skip
     if len(found) != 1:
-        laws = ", ".join(_name(law) for law in program.laws)
+        laws = ", ".join(name_of(law) for law in program.laws)
         raise ParameterError(f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}")
     return found[0]
-
-
-def _name(law: Law) -> str:
-    """Name of a law: of a user-defined one that of its function, otherwise that of its class."""
-    return law.name if isinstance(law, FunctionLaw) else type(law).__name__
 
 
 def _has(law: Law, number: str) -> bool:

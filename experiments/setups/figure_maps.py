@@ -1,6 +1,6 @@
 """Map parts by kind of map: cylindrical, composite, rivers' clips, and maps from files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -66,6 +66,8 @@ from sim.compilation.sources import kept_folder
 
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
+CORNERS, PARTS = 4, 3  # clips of a cylindrical and of a composite map
+_COMPARED = 5  # places of a lap at which a user-defined derivative is compared: few symmetries of a map have all five
 _MOST_LAPS = 4  # in a round: with more, a hand waits long for a change, and there are many changes to compute
 LIFTED_CARRY = 0.3  # factor on the default hand's distances on a lifted map, whose curves are near each other
 
@@ -131,7 +133,7 @@ def cylindrical_parts(
     ControllerError
         If there are none, or more than four, or they do not fit together.
     """
-    motions, reach = _motions(clips, 4, "cylindrical"), place.reach
+    motions, reach = _motions(clips, CORNERS, "cylindrical"), place.reach
     radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
 
     def with_legs_of(owner: int) -> CylindricalMap:
@@ -167,7 +169,7 @@ def composite_parts(
     ControllerError
         If there are none, or more than three, or they do not fit together.
     """
-    lower, red, blue = _motions(clips, 3, "composite")
+    lower, red, blue = _motions(clips, PARTS, "composite")
     legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
     apart = _out_of_step(clips, 3, lap)
@@ -213,11 +215,13 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
     Raises
     ------
     ParameterError
-        If its poses are not poses of the figure.
+        If its poses are not poses of the figure, or its derivative is not that of its poses.
     """
     if haptic_map.nq != N_POSE:
         name = type(haptic_map).__name__
         raise ParameterError(f"poses of {name} have {haptic_map.nq} numbers; the figure's have {N_POSE}")
+
+    haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _COMPARED, endpoint=False)))
 
     def none(*_: object) -> Any:
         raise ParameterError("a map of one's own has no rivers; expected another field")
@@ -311,10 +315,21 @@ def _about_circle(
     )  # fmt: skip
 
 
+def check_clips(clips: Sequence[Clip], most: int, name: str) -> None:
+    """Refuse more clips than a map takes, or none.
+
+    Raises
+    ------
+    ParameterError
+        The map, and how many it takes.
+    """
+    if not 1 <= len(clips) <= most:
+        raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; expected so many --clips")
+
+
 def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:
     """Poses and frame rates of as many motions as a map takes; if there are fewer clips, they are repeated."""
-    if not 1 <= len(clips) <= most:
-        raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
+    check_clips(clips, most, name)
     return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
 
 

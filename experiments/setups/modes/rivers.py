@@ -10,7 +10,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.safety.energy_tank import river_power
-from experiments.config.modes import Rivers
+from experiments.config.modes import Rivers, gates
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.parts.budget import fastest
@@ -42,7 +42,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "rivers"."""
     stiffness, damping = river_gains(mode)
     course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
-    if mode.governor is not None and mode.crossing != "sum":
+    if mode.governor is not None and gates(mode.crossing):
         law = law_of(mode, gated(choice, maps), GATE)
     else:
         law, urged = governed(mode.governor, law_of(mode, choice), course, maps)

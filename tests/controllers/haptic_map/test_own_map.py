@@ -1,5 +1,7 @@
 """A map of one's own says a pose: its size, its derivative and its kernel follow from that."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -46,12 +48,70 @@ def test_the_kernel_asks_the_map() -> None:
     assert kernel_of(made, X, 0)[0].tolist() == pose.tolist()  # without the derivative
 
 
-def test_a_derivative_that_is_given_is_taken() -> None:
+def given(jacobian: Callable[[np.ndarray], object]) -> HapticMap:
+    """The same map with a derivative of its own."""
+
     class Given(Turned):
         def jacobian(self, x, memory=None):
-            return np.full((9, 6), 7.0)
+            return jacobian(x)
 
-    assert np.all(kernel_of(Given(), X, 9)[1] == 7.0)
+    return Given()
+
+
+def test_a_derivative_that_is_given_is_taken() -> None:
+    rounded = given(lambda x: np.round(Turned().jacobian(x), 6))
+    rounded.check_jacobian(X[None, :3])
+    _, taken = kernel_of(rounded, X, 9)
+    rounded.check()
+    np.testing.assert_array_equal(taken, rounded.jacobian(X))
+
+
+SHAPES = [
+    (lambda x: np.zeros((3, 3)), r"a jacobian of shape \(3, 3\); expected \(9, 6\), or none"),
+    (lambda x: np.zeros(6), r"a jacobian of shape \(6,\); expected \(9, 6\)"),
+    (lambda x: 0.0, r"a jacobian of shape \(\); expected \(9, 6\)"),
+    (lambda x: np.full((9, 6), np.nan), "a jacobian with a number that is not finite"),
+]
+
+
+@pytest.mark.parametrize(("jacobian", "said"), SHAPES)
+def test_a_derivative_of_another_shape_or_not_finite_is_refused_before_a_run_and_in_a_tick(jacobian, said: str) -> None:
+    wrong = given(jacobian)
+    with pytest.raises(ParameterError, match=said):
+        wrong.check_jacobian(X[None, :3])
+    kernel_of(wrong, X, 9)
+    with pytest.raises(ParameterError, match=said):
+        wrong.check()
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "said"),
+    [
+        (
+            lambda x: -Turned().jacobian(x),
+            r"is -3 in row 5, column 0 at p = \[0\.04, -0\.01, 0\.02\], and its pose .* 3 ",
+        ),
+        (lambda x: np.roll(Turned().jacobian(x), 3, axis=1), "linear before angular velocity in the columns"),
+        (lambda x: 1.01 * Turned().jacobian(x), r"is 3\.03 in row 5, column 0"),
+    ],
+)
+def test_a_derivative_that_is_not_that_of_the_poses_is_refused(jacobian, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        given(jacobian).check_jacobian(X[None, :3])
+
+
+def test_a_derivative_is_not_compared_where_the_map_has_a_kink() -> None:
+    class Kinked(Turned):
+        def pose(self, x):
+            return super().pose(np.concatenate([np.abs(x[:3] - X[:3]) + X[:3], x[3:]]))
+
+        def jacobian(self, x, memory=None):
+            return Turned().jacobian(x)
+
+    beside = np.array([2e-5, 2e-5, 2e-5])
+    Kinked().check_jacobian(X[None, :3] + beside)
+    with pytest.raises(ParameterError, match="its pose changes by"):
+        Kinked().check_jacobian(X[None, :3] - 100 * beside)
 
 
 def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:

@@ -95,6 +95,18 @@ def test_the_message_says_what_would_be_right(make: Any, said: str) -> None:
     assert said in str(error.value)
 
 
+@pytest.mark.parametrize(("kind", "most"), [(hvf.Cylindrical, 4), (hvf.Composite, 3)])
+def test_a_map_refuses_when_it_is_made_what_it_cannot_be_of(kind: Any, most: int) -> None:
+    for number in (0, most + 1):
+        with pytest.raises(hvf.ParameterError, match=f"map takes 1 to {most} clips, got {number}"):
+            kind([DANCE] * number, around=CURVE)
+    assert kind([DANCE] * most, around=CURVE).parts
+    with pytest.raises(hvf.ParameterError, match=r"reach is 0\.05 m about a curve of radius 0\.0477 m; expected less"):
+        kind([DANCE], around=CURVE, reach=0.05)
+    with pytest.raises(hvf.SimError, match="beyond the Phantom's stops"):
+        kind([DANCE], around=hvf.circle(radius=0.5))
+
+
 def test_a_panel_of_many_is_no_more_than_a_study() -> None:
     users = (hvf.User(),) * 3
     with pytest.raises(hvf.SimError, match="500000 candidates, 3 users are too many; expected at most 1000000 trials"):

@@ -145,6 +145,23 @@ def test_a_map_that_fails_in_a_tick_says_so_itself_and_leaves_no_folder(monkeypa
     assert not list(tmp_path.iterdir())
 
 
+class Unlike(hvf.HapticMap):
+    """A map with a derivative of another shape."""
+
+    def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+        return hvf.rest_pose()
+
+    def jacobian(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+        return np.zeros((3, 3))
+
+
+def test_a_map_with_a_derivative_of_another_shape_is_refused() -> None:
+    field = hvf.Follow(CURVE, k_r=300, b_d=8)
+    sim = hvf.Simulation(field=field, haptic_map=Unlike(), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(hvf.ParameterError, match=r"gave a jacobian of shape \(3, 3\); expected \(57, 6\)"):
+        sim.run(0.1)
+
+
 def test_what_cannot_be_swept_tuned_or_recorded_is_refused_before_it_begins() -> None:
     sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
     with pytest.raises(hvf.ParameterError, match="threads is 0"):
@@ -257,6 +274,13 @@ def test_a_channel_is_looked_for_as_in_any_mapping() -> None:
     assert run.ticks.get("forces") is None
     with pytest.raises(hvf.SimError, match=r"^no channel 'forces'; ticks has .*force, .*tank"):
         run.ticks["forces"]
+
+
+def test_a_run_without_a_figure_has_no_animation_to_write(tmp_path: Path) -> None:
+    run = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), figure=hvf.Figure(kind="none")).run(0.1)
+    with pytest.raises(hvf.SimError, match="the run has no figure, and so no animation; expected a run with another f"):
+        run.to_bvh(tmp_path / "mine.bvh")
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_is_printed_of_a_field_and_of_a_certificate_is_read_at_a_glance() -> None:

@@ -42,7 +42,7 @@ def replayed(recorded: hvf.Run, k_r: float, **parts: Any) -> hvf.Simulation:
 
 
 def test_in_its_own_field_a_replayed_hand_moves_as_recorded_and_feels_the_same_force(recorded: hvf.Run) -> None:
-    again = replayed(recorded, 300.0, seed=5).run(SECONDS)
+    again = replayed(recorded, 300.0).run(SECONDS)
     for name in (*HAND, "force", "distance"):
         np.testing.assert_array_equal(again.ticks[name], recorded.ticks[name], err_msg=name)
     assert not again.ticks["user"].any()
@@ -64,10 +64,19 @@ def test_whose_hand_it_was_is_told_in_every_mode(recorded: hvf.Run) -> None:
         assert "The figure was led." in told.lines()
 
 
-def test_a_run_begins_where_the_recorded_hand_was_whatever_the_seed(recorded: hvf.Run) -> None:
-    session = replayed(recorded, 300.0, seed=5).session(SECONDS)
+def test_a_run_begins_where_the_recorded_hand_was(recorded: hvf.Run) -> None:
+    session = replayed(recorded, 300.0).session(SECONDS)
     tip = session.world.data.site("phantom/tip").xpos
     np.testing.assert_allclose(tip - session.static()["p_WH"], recorded.ticks["p"][0], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_a_seed_beside_a_recorded_hand_is_refused(seed: int) -> None:
+    with pytest.raises(hvf.ParameterError, match="whatever the seed; leave out the seed, or the replay"):
+        run_config(replay="runs/mine", seed=seed)
+    with pytest.raises(hvf.ParameterError, match="whatever the seed; leave out the seed, or the replay"):
+        simulation(follow(300.0), device=hvf.Replay("runs/mine"), seed=7)
+    assert changed(run_config(seed=7), {"replay": "runs/mine"}).seed == 1
 
 
 def test_a_stepped_simulation_ends_with_the_recorded_hand(recorded: hvf.Run) -> None:
