@@ -73,7 +73,7 @@ def slopes_of(cases: Cases, references: Array) -> list[Array]:
         If a case is not linear in the hand's position and velocity, or an excess is bounded by no slope.
     """
     affine = [_affine(cases, case) for case in cases.cases]
-    which = np.array(cases.wrench.map(len(references))(references[:, :3].T, references[:, 3:].T)[1])
+    which = np.array(cases.chosen.map(len(references))(references[:, :3].T, references[:, 3:].T)[1])
     if which.min() < 0.0:
         raise ControllerError(f"{cases.law.place} has no case for some hands on the curve")
     found: list[Array] = []

@@ -65,16 +65,15 @@ class Cases:
         return not all(case.moment.is_zero() for case in self.cases)
 
     @cached_property
-    def wrench(self) -> Any:
-        """CasADi function (p, v) → force and moment (6,), NaN where no case holds, and the number of the case."""
-        wrench, which = casadi.SX(np.full(6, np.nan)), casadi.SX(-1.0)
+    def chosen(self) -> Any:
+        """CasADi function (p, v) → force (3,), NaN where no case holds, and the number of the case."""
+        force, which = casadi.SX(np.full(3, np.nan)), casadi.SX(-1.0)
         for number, case in enumerate(self.cases):
             holds = casadi.SX(1.0)
             for condition in case.conditions:
                 holds = casadi.logic_and(holds, condition.symbol())
-            given = casadi.vertcat(case.force, case.moment)
-            wrench, which = casadi.if_else(holds, given, wrench), casadi.if_else(holds, number, which)
-        return casadi.Function("wrench", [self.p, self.v], [wrench, which])
+            force, which = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, which)
+        return casadi.Function("chosen", [self.p, self.v], [force, which])
 
     def check_slopes(self, hands: Array) -> None:
         """Check that the force can be differentiated at hands (p, v), shape (n, 6), if it is `smooth`.
@@ -95,7 +94,7 @@ class Cases:
 
     def force(self, p: Symbol, v: Symbol) -> Symbol:
         """Force [N] as an expression of other symbols."""
-        whole = self.cases[0].force if self.smooth else self.wrench(self.p, self.v)[0][:3]
+        whole = self.cases[0].force if self.smooth else self.chosen(self.p, self.v)[0]
         return casadi.Function("force", [self.p, self.v], [whole])(p, v)
 
 
@@ -215,8 +214,8 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
     _refuse(law, curve, differs(executed(law, curve)[:, :3]), "another force when it is asked again")
     cases, hands = cases_of(law), hands_about(curve)
     places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
-    symbolic = np.array(cases.wrench.map(len(hands))(places, velocities)[0]).T
-    _refuse(law, curve, differs(symbolic[:, :3]), "another force in a run than on symbols")
+    symbolic = np.array(cases.chosen.map(len(hands))(places, velocities)[0]).T
+    _refuse(law, curve, differs(symbolic), "another force in a run than on symbols")
     return cases
 
 

@@ -195,11 +195,17 @@ def test_a_certificate_is_of_the_very_field() -> None:
     assert len({c.inputs_hash for c in (alone, both, stiff)}) == 3
 
 
+@hvf.law
+def soft_floor(hand, k=500.0):
+    return 0.0, 0.0, k * hand.p[2] ** 2 if hand.p[2] < 0 else 0.0
+
+
 def test_what_cannot_be_certified_is_unknown_and_named() -> None:
-    branching = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + floor)).stability
+    curved = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + soft_floor)).stability
     gated = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8).gated(hvf.Weight.constant(0.5)))).stability
-    assert (branching.verdict, gated.verdict) == ("unknown", "unknown")
-    assert "law floor" in branching.reason
+    assert (curved.verdict, gated.verdict) == ("unknown", "unknown")
+    assert "law soft_floor" in curved.reason
+    assert "has cases whose force is not linear" in curved.reason
     assert "gated" in gated.reason
 
 
