@@ -29,9 +29,7 @@ from controllers.safety.energy_tank import EnergyTank
 from controllers.state import HandState, Wrench
 from experiments.certify.certify_simulation import certify
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
-from experiments.lifting.lift_file import lift_into as lift
-from experiments.preparation.command import prepare_file as prepare
-from experiments.public import circle, clips, load, version
+from experiments.public import circle, clips, lift, load, prepare, version
 from experiments.runs.map_objects import Composite, Cylindrical, Lifted
 from experiments.runs.run_result import Run
 from experiments.runs.run_words import run

@@ -6,6 +6,9 @@ from pathlib import Path
 
 from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
+from experiments.config.keywords import in_keywords, keywords
+from experiments.lifting.lift_file import lift_into
+from experiments.preparation.command import prepare_file
 from experiments.preparation.prepared_clip import prepared_clips
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
@@ -22,6 +25,7 @@ def clips(*names: str) -> tuple[Clip, ...]:
     return tuple(embedded(name) for name in names or embedded_names())
 
 
+@in_keywords()
 def load(path: str | Path, raw: bool = False) -> Clip:
     """The motion in a BVH, AMC or DeepMimic file on the figure, prepared once as by ``hvf prepare``.
 
@@ -43,8 +47,12 @@ def load(path: str | Path, raw: bool = False) -> Clip:
     of_kind("raw", raw, bool)
     found = prepared_clips([Path(path)], raw)[0]
     if not found.feasible:
-        warnings.warn(found.remarks[-1], stacklevel=2)
+        warnings.warn(keywords(found.remarks[-1]), stacklevel=3)
     return found.clip
+
+
+lift = in_keywords()(lift_into)
+prepare = in_keywords()(prepare_file)
 
 
 def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:

@@ -12,6 +12,7 @@ from controllers.checks import check_kinds
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted as LiftedMap
+from experiments.config.keywords import in_keywords
 from experiments.config.maps import MapFile
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
@@ -53,6 +54,7 @@ class _AboutCurve:
     reach: float = 0.025
     expressive: bool = False
 
+    @in_keywords()
     def __post_init__(self) -> None:
         check_kinds(self)
         if not 0.0 < self.reach < np.inf:
@@ -148,6 +150,7 @@ class Lifted:
     curve: str = ""
     expressive: bool = False
 
+    @in_keywords()
     def __post_init__(self) -> None:
         check_kinds(self)
         _ = self.around

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from controllers.checks import of_kind
 from controllers.state import Array
+from experiments.config.keywords import keywords
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.json_text import json_text
@@ -121,7 +122,7 @@ class Run:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What was said before the run."""
-        return self._session.remarks
+        return tuple(map(keywords, self._session.remarks))
 
     @property
     def ticks(self) -> Channels:

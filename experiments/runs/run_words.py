@@ -8,6 +8,7 @@ from rich.console import Console
 
 from controllers.checks import of_kind
 from controllers.errors import ParameterError
+from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, load_config
 from experiments.config.words import changed, run_config
@@ -17,6 +18,7 @@ from experiments.runs.run_result import Run
 from experiments.setups.wiring import wire
 
 
+@in_keywords(out="record")
 def run(
     config: str | Path | None = None, *, record: str | Path | None = None, overwrite: bool = False, **words: Any
 ) -> Run:

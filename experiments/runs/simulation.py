@@ -19,6 +19,7 @@ from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
+from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
@@ -73,6 +74,7 @@ class User:
     person: Person | None = None
     intent: PersonIntent | None = None
 
+    @in_keywords()
     def __post_init__(self) -> None:
         check_kinds(self)
 
@@ -173,6 +175,7 @@ class Simulation:
     seed: int = 1
     tank: EnergyTank | None = None
 
+    @in_keywords()
     def __post_init__(self) -> None:
         _check_kinds(self)
         self.figure.check(leads=False)
@@ -190,6 +193,7 @@ class Simulation:
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
+    @in_keywords()
     def session(self, seconds: float | None = None) -> Session:
         """The simulation put together for at most `seconds` [s]; compiles what it needs.
 
@@ -232,6 +236,7 @@ class Simulation:
             handled=((0.0, np.inf),) if self.user.traces is not None else handled,
         )  # fmt: skip
 
+    @in_keywords(out="record")
     def run(self, seconds: float, record: str | Path | None = None, overwrite: bool = False) -> Run:
         """Run from the start and return the result.
 

@@ -284,7 +284,7 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
             followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), _flows_parallel(config))
             parts = replace(parts, refined=followed)
     elif part.curve:
-        raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+        raise ParameterError("only a lifted map has curves by name; leave out --curve, or name a lifted map")
     else:
         parts = _about_circle(_place(part), made, clips)
     remark = f"the clips are those of the map: {', '.join(made.names)}"

@@ -47,7 +47,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
         If there is not one clip, or it does not travel on foot.
     """
     if len(clips) != 1:
-        raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
+        raise ParameterError(f"one clip is led, got {len(clips)}; expected --clips of one, such as walk or run")
     made, gait = led_map(clips[0], figure)
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,

@@ -61,8 +61,8 @@ def test_what_clips_are_not_fit_for_is_said_with_the_run() -> None:
     ("words", "said"),
     [
         ({"mode": "flow"}, "no mode 'flow'"),
-        ({"lapp": 2.0}, "--lapp is not known"),
-        ({"flow": "constant", "mode": "bunny"}, "--flow has no meaning"),
+        ({"lapp": 2.0}, "^lapp is not known"),
+        ({"flow": "constant", "mode": "bunny"}, "^flow has no meaning"),
         ({"clips": [3]}, "clips"),
         ({"clips": "walk"}, "clips"),
         ({"config": 3}, "config is 3"),
