@@ -20,11 +20,6 @@ CURVE = hvf.circle(lap=2.0)
 
 
 @hvf.law
-def floor(hand, k=500.0):
-    return (0, 0, -k * (hand.p[2] + 1e-3)) if hand.p[2] < -1e-3 else (0, 0, 0)
-
-
-@hvf.law
 def level(hand, k=50.0):
     return (0.0, 0.0, -k * hand.p[2])
 
