@@ -87,7 +87,7 @@ def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
 
 
 def _number(value: object) -> object:
-    if value == INFINITE:
+    if isinstance(value, str) and value == INFINITE:
         return np.inf
     if isinstance(value, str | bytes | bool | np.bool_):
         raise PydanticCustomError("number", "expected a number")

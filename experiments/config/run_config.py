@@ -158,9 +158,15 @@ class Figure:
     @model_serializer(mode="wrap")
     def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What a file holds: nothing that has no meaning for the kind."""
+        return self._meant(cast(dict[str, Any], plain(self)))
+
+    def _meant(self, held: Mapping[str, Any]) -> dict[str, Any]:
+        """Those of the numbers that have a meaning; the size is one of a figure that is led, where it was given."""
         idle = meaningless(self.kind, leads=False)
-        held = cast(dict[str, Any], plain(self))
         return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
+
+    def __repr__(self) -> str:
+        return f"Figure({', '.join(f'{name}={value!r}' for name, value in self._meant(vars(self)).items())})"
 
 
 FIGURE_DEFAULTS = {name: field.default for name, field in cast(Any, Figure).__pydantic_fields__.items()}
