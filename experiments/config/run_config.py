@@ -166,7 +166,8 @@ class Figure:
         return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
 
     def __repr__(self) -> str:
-        return f"Figure({', '.join(f'{name}={value!r}' for name, value in self._meant({name: getattr(self, name) for name in FIGURE_DEFAULTS}).items())})"
+        meant = self._meant({name: getattr(self, name) for name in FIGURE_DEFAULTS})
+        return f"Figure({', '.join(f'{name}={value!r}' for name, value in meant.items())})"
 
 
 FIGURE_DEFAULTS = {name: field.default for name, field in cast(Any, Figure).__pydantic_fields__.items()}
