@@ -26,6 +26,7 @@ from experiments.console.welcome import WELCOME, next_step
 from models.errors import ModelError
 from sim.errors import SimError
 
+_DESCRIPTION = f"{__doc__} hvf --version prints the version."
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
 
 
@@ -114,7 +115,7 @@ def parsed(words: Sequence[str]) -> Any:
     )  # fmt: skip
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(choice, prog=prog, args=rest, description=None if named else __doc__, config=_STYLE)
+            return tyro.cli(choice, prog=prog, args=rest, description=None if named else _DESCRIPTION, config=_STYLE)
     except SystemExit as ended:
         if ended.code in (0, None):
             raise

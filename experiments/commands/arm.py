@@ -1,12 +1,9 @@
 """``hvf arm``: a robot arm in the place of the figure."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-import tyro
-
-from experiments.config.run_config import ArmConfig
+from experiments.config.arm_options import Options, arm_config_of_options
 from experiments.console.output import Json, say
 
 
@@ -14,9 +11,7 @@ from experiments.console.output import Json, say
 class Command:
     """Let the field lead a robot arm of seven joints instead of the figure, and write what happened into a folder."""
 
-    config: Annotated[ArmConfig, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="run")] = field(
-        default_factory=ArmConfig
-    )
+    options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
     out: Path = Path("runs/arm")
     """Folder to write."""
@@ -28,5 +23,5 @@ class Command:
         """Run."""
         from experiments.runs.run_arm import run_arm
 
-        say(run_arm(self.config, self.out, self.overwrite), self.json)
+        say(run_arm(arm_config_of_options(self.options), self.out, self.overwrite), self.json)
         return 0

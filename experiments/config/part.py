@@ -5,6 +5,7 @@ A part is given by keyword. One that is wrong raises `ParameterError`: the optio
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, TypeVar, cast, dataclass_transform, get_args, get_origin
 
 import numpy as np
@@ -13,11 +14,14 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from controllers.errors import ParameterError
+from sim.errors import SimError
 
 _Part = TypeVar("_Part")
 MOST = 1e15
 """No number of a part is larger, in SI units: its square, and that of a difference, is still a number."""
-_CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
+INFINITE = "Infinity"
+"""How JSON, which has no infinite number, spells one: pydantic's word."""
+_CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="strings", arbitrary_types_allowed=True)
 
 
 def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
@@ -83,6 +87,8 @@ def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
 
 
 def _number(value: object) -> object:
+    if isinstance(value, str) and value == INFINITE:
+        return np.inf
     if isinstance(value, str | bytes | bool | np.bool_):
         raise PydanticCustomError("number", "expected a number")
     return value
@@ -116,6 +122,23 @@ def from_json(cls: type[_Part], text: str | bytes, where: str) -> _Part:
         return TypeAdapter(cls).validate_json(text)
     except ValidationError as error:
         raise ParameterError(f"{where}: {one_line(error, cls)}") from None
+
+
+def from_file(cls: type[_Part], path: Path) -> _Part:
+    """A part from a JSON file.
+
+    Raises
+    ------
+    ParameterError
+        If it holds none; the message begins with the file.
+    SimError
+        If it cannot be read.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise SimError(f"{path}: cannot be read ({error.strerror}); expected the JSON of a configuration") from None
+    return from_json(cls, text, str(path))
 
 
 def from_dict(cls: type[_Part], values: Mapping[str, object], where: str) -> _Part:

@@ -11,11 +11,10 @@ from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFF
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Led, Map
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
-from experiments.config.part import above, at_least, from_json, part, whole
+from experiments.config.part import above, at_least, from_file, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
-from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
 from sim.world.world import FigureKind
@@ -159,9 +158,16 @@ class Figure:
     @model_serializer(mode="wrap")
     def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What a file holds: nothing that has no meaning for the kind."""
+        return self._meant(cast(dict[str, Any], plain(self)))
+
+    def _meant(self, held: Mapping[str, Any]) -> dict[str, Any]:
+        """Those of the numbers that have a meaning; the size is one of a figure that is led, where it was given."""
         idle = meaningless(self.kind, leads=False)
-        held = cast(dict[str, Any], plain(self))
         return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
+
+    def __repr__(self) -> str:
+        meant = self._meant({name: getattr(self, name) for name in FIGURE_DEFAULTS})
+        return f"Figure({', '.join(f'{name}={value!r}' for name, value in meant.items())})"
 
 
 FIGURE_DEFAULTS = {name: field.default for name, field in cast(Any, Figure).__pydantic_fields__.items()}
@@ -362,17 +368,5 @@ class ArmConfig:
 
 
 def load_config(path: Path) -> RunConfig:
-    """The configuration in a JSON file.
-
-    Raises
-    ------
-    ParameterError
-        If it holds none.
-    SimError
-        If it cannot be read.
-    """
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise SimError(f"{path}: cannot be read ({error.strerror}); expected the JSON of a configuration") from None
-    return from_json(RunConfig, text, str(path))
+    """The configuration in a JSON file; see `experiments.config.part.from_file`."""
+    return from_file(RunConfig, path)

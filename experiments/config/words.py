@@ -49,7 +49,7 @@ class Word:
     parts: tuple[type, ...]
 
 
-def _parameters(cls: type) -> dict[str, str]:
+def parameters(cls: type) -> dict[str, str]:
     """What the parameters of a part mean, by name, from its docstring."""
     described = docstring_parser.parse(cls.__doc__ or "")
     found: dict[str, str] = {}
@@ -63,7 +63,7 @@ def _vocabulary() -> dict[str, Word]:
     """All options by name."""
     words: dict[str, Word] = {}
     for cls in (*MODES, *ADDED.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
-        hints, help_of = get_type_hints(cls), _parameters(cls)
+        hints, help_of = get_type_hints(cls), parameters(cls)
         for option in fields(cast(Any, cls)):
             if option.name in _NOT_WORDS:
                 continue
@@ -72,7 +72,7 @@ def _vocabulary() -> dict[str, Word]:
             known = words.get(option.name)
             if known is None:
                 shown = f" Default: {_shown(default)}." if default not in (None, "", False) else ""
-                words[option.name] = Word(_plain(hints[option.name]), said + shown, (cls,))
+                words[option.name] = Word(plain(hints[option.name]), said + shown, (cls,))
             else:
                 words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
     return words
@@ -82,7 +82,7 @@ def _shown(default: object) -> str:
     return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
 
 
-def _plain(hint: Any) -> Any:
+def plain(hint: Any) -> Any:
     """The type of a word that need not be given."""
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(inner for inner in get_args(hint) if inner is not type(None))
@@ -266,15 +266,19 @@ def _kind(cls: type) -> str:
     return f"{what} {kind.default}" if kind is not None and cls is not Led else "--mode lead"
 
 
+def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
+    """Field of a dataclass of options: its name, its type with what the help shows of it, and its default."""
+    shown = tyro.conf.arg(help=text, help_behavior_hint="", metavar=_metavar(kind))
+    return name, Annotated[kind, shown], field(default=default)
+
+
+CONFIG_HELP = "A configuration in a JSON file; other options change it."
+
+
 def _options() -> Iterator[tuple[str, Any, Any]]:
     """Fields of the options' dataclass."""
-
-    def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
-        shown = tyro.conf.arg(help=text, help_behavior_hint="", metavar=_metavar(kind))
-        return name, Annotated[kind, shown], field(default=default)
-
-    top = _parameters(RunConfig)
-    yield option("config", Path | None, "A configuration in a JSON file; other options change it.", None)
+    top = parameters(RunConfig)
+    yield option("config", Path | None, CONFIG_HELP, None)
     yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
     yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")

@@ -10,13 +10,22 @@ import numpy.typing as npt
 from rich.console import Console
 
 from controllers.curves.trajectory import Trajectory
-from experiments.config.part import to_dict
+from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import ArmConfig
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
 from experiments.console.progress import simulating
 from experiments.files.json_text import json_text
-from experiments.results.folder import RECORDING, REPORT, SUMMARY, arm_config_of, check_folder, check_holds, claimed
+from experiments.results.folder import (
+    CONFIG,
+    RECORDING,
+    REPORT,
+    SUMMARY,
+    arm_config_of,
+    check_folder,
+    check_holds,
+    claimed,
+)
 from experiments.results.measures.arm_summary import ArmSummary, arm_summary
 from experiments.results.pages.arm_figure import arm_figure
 from experiments.results.pages.figures import STYLE
@@ -38,7 +47,7 @@ _TARGET = Target(ROBOT, "robot arm", "h(p, R)", 1.6)
 
 
 def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
-    """Run, and write recording, summary, figure and page into a folder.
+    """Run, and write recording, configuration, summary, figure and page into a folder.
 
     Raises
     ------
@@ -51,8 +60,9 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     servo, world, curve = wire_arm(config, lambda units: compile_once(console, units))
     with claimed(out):
         check_holds(out, overwrite)
-        for name in (RECORDING, SUMMARY, REPORT, FIGURE):
+        for name in (RECORDING, SUMMARY, REPORT, CONFIG, FIGURE):
             (out / name).unlink(missing_ok=True)
+        (out / CONFIG).write_text(to_json(config), encoding="utf-8")
         summary = _recorded(config, servo, world, curve, out, console)
         (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
         write_arm_report(out, world, summary.lines())

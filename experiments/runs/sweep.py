@@ -7,13 +7,17 @@ from dataclasses import fields, is_dataclass
 from dataclasses import replace as replaced
 from typing import Any, NamedTuple, cast
 
-from controllers.checks import of_kind
+from controllers.checks import checked, of_kind
 from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import OP_CODE, OP_PARAMETERS, Join
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
 from experiments.runs.run_result import Run
 from experiments.runs.short_text import name_of
 from experiments.runs.simulation import Simulation
+
+_LIMITED = "limited"  # the operation `Law.limited`
+_BOUNDS = {"force": "N", "torque": "N m"}  # its numbers, in order
 
 
 class Swept(NamedTuple):
@@ -43,7 +47,8 @@ def sweep(
     values : mapping of str to sequence
         Values by path of the parameter: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a
         composed field a name must belong to one law only; ``field.Follow.k_r`` names the law too. The parameters of a
-        user-defined law are reached in the same way, under the name of its function: ``field.floor.k``.
+        user-defined law are reached in the same way, under the name of its function: ``field.floor.k``; the bounds of
+        a field that is ``limited`` once as ``field.limited.force`` and ``field.limited.torque``.
     seconds : float
         Simulated time of each run [s].
     threads : int
@@ -91,6 +96,8 @@ def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
 
 def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     """The same part with one parameter set, which may be nested."""
+    if isinstance(part, Program) and names[0] == _LIMITED:
+        return _with_bound(part, names, value, path)
     if isinstance(part, Program):
         law = _owner(part, names, path)
         rest = names if len(names) == 1 or name_of(law) != names[0] else names[1:]
@@ -107,6 +114,19 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     return replaced(part, **{names[0]: new})
 
 
+def _with_bound(program: Program, names: Sequence[str], value: Any, path: str) -> Program:
+    """The same field with a bound of its one limit set."""
+    limits = [row[OP_PARAMETERS] for row in program.ops.tolist() if row[OP_CODE] == Join.LIMIT]
+    if len(names) != 2 or names[1] not in _BOUNDS or len(limits) != 1:
+        expected = " or ".join(f"{_LIMITED}.{bound}" for bound in _BOUNDS)
+        raise ParameterError(
+            f"{path}: the field is limited {len(limits)} times; expected {expected} of one that is once"
+        )
+    params, place = program.params.copy(), list(_BOUNDS).index(names[1])
+    params[limits[0] + place] = checked(path, value, _BOUNDS[names[1]], infinite=True)
+    return replaced(program, params=params)
+
+
 def _owner(program: Program, names: Sequence[str], path: str) -> Law:
     """The one law of a composed field to which a path refers."""
     wanted = names[0]
@@ -116,7 +136,10 @@ def _owner(program: Program, names: Sequence[str], path: str) -> Law:
     ]  # fmt: skip
     if len(found) != 1:
         laws = ", ".join(name_of(law) for law in program.laws)
-        raise ParameterError(f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}")
+        bounds = f", or {_LIMITED}" if (program.ops[:, OP_CODE] == Join.LIMIT).any() else ""
+        raise ParameterError(
+            f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}{bounds}"
+        )
     return found[0]
 
 

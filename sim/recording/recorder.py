@@ -7,15 +7,16 @@ is described in `sim.recording.recording`, which reads it.
 """
 
 import json
+import math
 import os
 import platform
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self
+from typing import Self, cast
 
 import h5py
 import numpy as np
@@ -135,10 +136,21 @@ class _Stream:
         self._written, self._filled = total, 0
 
 
+def _spelled(value: object) -> object:
+    """Plain data in which an infinite number, which JSON lacks, is the text "Infinity", with its sign."""
+    if isinstance(value, float) and math.isinf(value):
+        return "Infinity" if value > 0.0 else "-Infinity"
+    if isinstance(value, Mapping):
+        return {key: _spelled(inner) for key, inner in cast(Mapping[object, object], value).items()}
+    if isinstance(value, list | tuple):
+        return [_spelled(inner) for inner in cast(Sequence[object], value)]
+    return value
+
+
 def _write_header(
     file: h5py.File, config: Mapping[str, object], seed: int, static: Mapping[str, npt.ArrayLike | str]
 ) -> None:
-    file["config"] = json.dumps(config)
+    file["config"] = json.dumps(_spelled(config), allow_nan=False)
     made_by = {"python": platform.python_version(), "processor": get_host_cpu_name()}
     file["versions"] = json.dumps(made_by | {p: version(p) for p in _PACKAGES})
     file["seed"] = seed

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
+from experiments.config.part import from_file
 from experiments.config.run_config import ArmConfig
 from experiments.setups.robot_arm import HOME, SCALE, wire_arm
 from models.world.scene import PEDESTAL
@@ -48,6 +49,7 @@ def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> N
 
 @pytest.mark.slow
 def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert from_file(ArmConfig, folder / "config.json") == ArmConfig(seconds=8.0)
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 8000 ticks" in capsys.readouterr().out
     page = (folder / "report.html").read_text(encoding="utf-8")

@@ -378,6 +378,7 @@ def test_an_option_that_means_nothing_for_the_kind_of_figure_is_refused_also_at_
 def test_a_file_holds_no_number_that_means_nothing_and_may_hold_its_default() -> None:
     held = to_dict(run_config(figure="none"))
     assert held["figure"] == json.loads(to_json(run_config(figure="none")))["figure"] == {"kind": "none"}
+    assert repr(Figure(kind="none")) == "Figure(kind='none')"
     kinematic = to_dict(run_config(figure="kinematic"))["figure"]
     assert kinematic == {"kind": "kinematic"} | {name: FIGURE_DEFAULTS[name] for name in (
         "stature", "smoothing", "figure_ticks", "blend")}  # fmt: skip

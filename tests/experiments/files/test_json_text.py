@@ -2,11 +2,17 @@
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 
+from controllers.errors import ParameterError
 from experiments.cli import main
+from experiments.config.run_config import load_config
+from experiments.config.words import run_config
 from experiments.files.json_text import json_text
+from experiments.results.folder import config_of
+from sim.recording.recording import Recording
 
 
 def strictly(text: str) -> object:
@@ -25,6 +31,29 @@ def test_a_number_that_is_not_finite_is_null_wherever_it_is() -> None:
         "b": [1.5, [None, "Infinity"]],
         "c": {"d": None, "e": 2, "f": None},
     }
+
+
+def test_an_infinite_number_of_a_configuration_is_json_in_every_file_of_a_run(tmp_path) -> None:
+    words = ["--figure", "none", "--walls", "--joint-speed", "inf", "--tube", "inf", "--seconds", "0.1"]
+    assert main(["run", *words, "--out", str(tmp_path)]) == 0
+    config = run_config(figure="none", walls=True, joint_speed=np.inf, tube=np.inf, seconds=0.1, flow="curve")
+    text = (tmp_path / "config.json").read_text(encoding="utf-8")
+    assert strictly(text)["mode"]["tube"] == "Infinity"  # pyright: ignore
+    assert load_config(tmp_path / "config.json") == config
+    strictly((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert strictly(file["config"][()].decode())["mode"] == strictly(text)["mode"]  # pyright: ignore
+        strictly(bytes(file["summary"][:]).decode())  # pyright: ignore
+    with Recording(tmp_path / "run.h5") as recording:
+        assert config_of(recording) == config
+
+
+def test_a_file_of_another_program_may_have_its_own_word_for_an_infinite_number(tmp_path) -> None:
+    (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "tube": Infinity}}', encoding="utf-8")
+    assert load_config(tmp_path / "mine.json") == run_config(tube=np.inf)
+    (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "stiffness": "Infinity"}}', encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"--stiffness is inf; expected .* finite"):
+        load_config(tmp_path / "mine.json")
 
 
 @pytest.mark.slow

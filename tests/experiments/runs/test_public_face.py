@@ -71,6 +71,32 @@ def test_a_parameter_of_a_law_of_ones_own_is_such_a_number(path: str) -> None:
         with_values(sim, {"field.level.b": 1.0})
 
 
+def test_a_bound_of_a_limited_field_is_such_a_number() -> None:
+    sim = simulation((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0))
+    hand = hvf.HandState.at([0.1, 0.0, -0.01])
+    for path, bounds in (("force", (2.0,)), ("torque", (8.0, 0.1))):
+        by_hand = (hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(*bounds)
+        other = with_values(sim, {f"field.limited.{path}": bounds[-1]})
+        np.testing.assert_array_equal(other.field.program().params, by_hand.params)
+        np.testing.assert_array_equal(other.field.wrench(hand).force, by_hand.wrench(hand).force)
+    assert np.linalg.norm(sim.field.wrench(hand).force) == pytest.approx(8.0)
+    for field, path, said in (
+        (
+            level + level,
+            "limited.force",
+            r"^field.limited.force: .* limited 0 times; expected limited.force or",
+        ),
+        (level.limited(1.0).limited(2.0), "limited.force", "is limited 2 times"),
+        (level.limited(1.0), "limited.power", "expected limited.force or limited.torque"),
+        (level.limited(1.0), "limited", "expected limited.force or limited.torque"),
+        (level.limited(1.0), "force", "0 laws of the field have 'force'; expected one among level, or limited$"),
+    ):
+        with pytest.raises(hvf.ParameterError, match=said):
+            with_values(simulation(field), {f"field.{path}": 1.0})
+    with pytest.raises(hvf.ParameterError, match=r"field.limited.force must be at least 0 N, got -1"):
+        with_values(sim, {"field.limited.force": -1.0})
+
+
 @pytest.mark.parametrize(
     ("path", "said"),
     [
@@ -251,6 +277,19 @@ def test_clips_and_version_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert "walk" in capsys.readouterr().out
     assert main(["--version"]) == 0
     assert hvf.__version__ in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "hvf --version prints the version" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_package_of_commands_is_run_as_a_module() -> None:
+    root = Path(__file__).resolve().parents[3]
+    command = [sys.executable, "-m", "experiments", "--version"]
+    assert (
+        subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
+        == f"hvf {hvf.__version__}\n"
+    )
 
 
 @pytest.mark.slow
