@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from experiments import commands as hvf_commands
-from experiments.studies.row_spread import README, said
+from experiments.studies.row_spread import README, stated_residuals
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
 FALLS = ["hvf run --clips backflip --governor"]  # pages say so beside them
@@ -72,7 +72,9 @@ def in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.C
 def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None:
     stands = [line for line, measured in ROW.findall(README.read_text(encoding="utf-8")) if "stands" in measured]
     assert len(stands) >= 8
-    assert [shlex.join(shlex.split(line)) for line in stands] == list(said(README.read_text(encoding="utf-8")))
+    assert [shlex.join(shlex.split(line)) for line in stands] == list(
+        stated_residuals(README.read_text(encoding="utf-8"))
+    )
 
 
 @pytest.mark.commands
@@ -81,7 +83,7 @@ def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> N
     for file, source in GIVEN.items():
         shutil.copy(ROOT / source, tmp_path / file)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    residuals, late = said(page.read_text(encoding="utf-8")), []
+    residuals, late = stated_residuals(page.read_text(encoding="utf-8")), []
     for line in EARLIER.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
         shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none
