@@ -20,7 +20,7 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "model
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SAID = {  # what the blocks of a page print, where a sentence of the page says so
-    "README.md": ["{'field.k_r': 400}", "law floor"],  # the law branches, so nothing is certain of it
+    "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # of the law's cases
     "docs/tutorials/your-own-study.md": ["48 trials"],
     "docs/tutorials/your-own-law.md": [
         "k = 100 N/m: pushed down by 6.2 mm",

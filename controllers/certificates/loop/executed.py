@@ -17,6 +17,7 @@ from controllers.certificates.loop.hands_about import States, states_about
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
+from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
 from controllers.state import Array, HandState, Mask
@@ -27,6 +28,7 @@ _STEP = 1e-6  # [rad], [rad/s] of the differences
 _STEPS = (_STEP, -_STEP, 0.1 * _STEP, -0.1 * _STEP)
 _AGREES = 0.01  # share of the largest derivative within which they agree
 _NO_SLOPE = 1e-6  # [N m/rad], [N m s/rad] below any derivative that matters, above rounding over a step
+_CUT = 0.999  # share of a limit from which a force is cut
 _SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
 _DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
@@ -142,18 +144,26 @@ def looked_about(program: Program, river: River, hands: Sequence[HandImpedance])
 
 
 def _worst(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
-    """The worst of several sets of states beside the same phases, with every hand; those out of reach are left out."""
+    """The worst of several sets of states beside the same phases, with every hand.
+
+    States out of reach are left out, and those at which the program's own limit cuts its force: a certificate assumes
+    that it does not.
+    """
     plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
     worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
     strongest, abrupt = 0.0, list[Array]()
+    limit = min((numbers[0] for what, numbers in program.composition() if what is Join.LIMIT), default=np.inf)
     for phases, asked, v in states:
         reached = np.array([_reaches(river, place) for place in asked])
         p = np.where(reached[:, None], asked, river.curve.point(phases))
         law, smooth = differenced(plants[0][1], program, river, p, v)
-        abrupt += list(p[reached & ~smooth])
         fresh = program.fresh_memory()
-        forces = [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)]
-        strongest = max(strongest, float(np.linalg.norm(forces, axis=1)[reached].max(initial=0.0)))
+        sizes = np.linalg.norm(
+            [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)], axis=1
+        )
+        strongest = max(strongest, float(sizes[reached].max(initial=0.0)))
+        reached &= np.logical_not(sizes >= _CUT * limit)
+        abrupt += list(p[reached & ~smooth])
         worst = worst._replace(states=worst.states + int(reached.sum()))
         for hand, plant in plants:
             loop = SampledLoop(replace(plant, unit_theta=law.unit_theta, unit_omega=law.unit_omega), river.sampling)

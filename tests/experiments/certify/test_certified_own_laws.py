@@ -1,6 +1,8 @@
 """Certificates of laws of one's own: of every case of a law, never of one that shakes, and with a true reason."""
 
+import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -142,6 +144,18 @@ def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
 
 
 # Every case of a law.
+
+
+def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
+    """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
+    plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
+    sim = simulation(plane)
+    cut = dataclasses.replace(sim, field=sim.field.limited(8.0))
+    judged = [
+        int(re.findall(r"stable at (\d+) states", hvf.certify(of, NO_HANDS).stability.reason)[0]) for of in (sim, cut)
+    ]
+    assert hvf.certify(cut, NO_HANDS).stability.verdict == "certified"
+    assert judged[1] < judged[0]
 
 
 @pytest.mark.slow
