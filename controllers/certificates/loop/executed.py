@@ -146,13 +146,14 @@ def looked_about(program: Program, river: River, hands: Sequence[HandImpedance])
 def _worst(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
     """The worst of several sets of states beside the same phases, with every hand.
 
-    States out of reach are left out, and those at which the program's own limit cuts its force: a certificate assumes
-    that it does not.
+    States out of reach are left out, and those at which the limit of the whole program cuts its force: a certificate
+    assumes that it does not.
     """
     plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
     worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
     strongest, abrupt = 0.0, list[Array]()
-    limit = min((numbers[0] for what, numbers in program.composition() if what is Join.LIMIT), default=np.inf)
+    *_, (last, numbers) = program.composition()
+    limit = numbers[0] if last is Join.LIMIT else np.inf  # of the whole field; an earlier one is of a part of it
     for phases, asked, v in states:
         reached = np.array([_reaches(river, place) for place in asked])
         p = np.where(reached[:, None], asked, river.curve.point(phases))

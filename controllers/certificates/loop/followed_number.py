@@ -17,6 +17,7 @@ import numpy.typing as npt
 from controllers.certificates.loop.device import Symbol
 from controllers.errors import ControllerError
 
+_DEEPEST = 1000  # operations above each other that are compared; what is nested deeper counts as different
 MOST_CONDITIONS = 64  # decisions on one way: more is a loop that does not end on symbols
 
 
@@ -47,6 +48,11 @@ class Condition(NamedTuple):
         return true if self.holds else casadi.logic_not(true)
 
 
+def identical(a: Symbol, b: Symbol) -> bool:
+    """Whether two expressions are the same, to the last bit of their numbers, of which their texts show six digits."""
+    return bool(casadi.is_equal(a, b, _DEEPEST))
+
+
 _TRUE = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
 
 
@@ -60,14 +66,14 @@ class Way:
         self.given = tuple(given)
         self.conditions: list[Condition] = []
         self.lost: str | None = None
-        self._signs: dict[str, frozenset[int]] = {}  # that a gap may still have
+        self._signs = list[tuple[Symbol, frozenset[int]]]()  # that a gap may still have, the latest last
 
     def decide(self, left: Any, right: Any, kind: Literal["<", "<=", "=="]) -> bool:
         """Truth of ``left kind right`` on this way."""
         gap, true = casadi.SX(left - right), _TRUE[kind]
         if gap.is_constant():
             return (float(gap) > 0.0) - (float(gap) < 0.0) in true and float(gap) == float(gap)
-        signs = self._signs.get(str(gap), frozenset((-1, 0, 1)))
+        signs = next((left for of, left in reversed(self._signs) if identical(of, gap)), frozenset((-1, 0, 1)))
         if signs <= true or not signs & true:
             return signs <= true
         at = len(self.conditions)
@@ -75,7 +81,7 @@ class Way:
             self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
         holds = self.given[at] if at < len(self.given) else True
         left_over = signs & true if holds else signs - true
-        self._signs |= {str(gap): left_over, str(-gap): frozenset(-sign for sign in left_over)}
+        self._signs += ((gap, left_over), (casadi.SX(right - left), frozenset(-sign for sign in left_over)))
         self.conditions.append(Condition(gap, kind, holds))
         return holds
 

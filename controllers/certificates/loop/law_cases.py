@@ -8,7 +8,14 @@ import casadi
 import numpy as np
 
 from controllers.certificates.loop.device import Symbol, vector
-from controllers.certificates.loop.followed_number import Condition, FollowedNumber, FollowedVector, NotFollowed, Way
+from controllers.certificates.loop.followed_number import (
+    Condition,
+    FollowedNumber,
+    FollowedVector,
+    NotFollowed,
+    Way,
+    identical,
+)
 from controllers.certificates.loop.hands_about import hands_about, told
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
@@ -57,7 +64,7 @@ class Cases:
     @property
     def smooth(self) -> bool:
         """Whether the force is one expression for every hand."""
-        return len({str(case.force) for case in self.cases}) == 1
+        return all(identical(case.force, self.cases[0].force) for case in self.cases)
 
     @property
     def exerts_moment(self) -> bool:

@@ -150,12 +150,16 @@ def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
     """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
     sim = simulation(plane)
-    cut = dataclasses.replace(sim, field=sim.field.limited(8.0))
-    judged = [
-        int(re.findall(r"stable at (\d+) states", hvf.certify(of, NO_HANDS).stability.reason)[0]) for of in (sim, cut)
-    ]
-    assert hvf.certify(cut, NO_HANDS).stability.verdict == "certified"
-    assert judged[1] < judged[0]
+    cut, in_part = (
+        dataclasses.replace(sim, field=field)
+        for field in (sim.field.limited(8.0), hvf.Follow(CURVE, k_r=300.0, b_d=8.0).limited(0.5) + plane)
+    )
+    free, less, part = (hvf.certify(of, NO_HANDS).stability for of in (sim, cut, in_part))
+    whole, judged = (int(re.findall(r"stable at (\d+) states", told.reason)[0]) for told in (free, less))
+    assert less.verdict == "certified"
+    assert judged < whole
+    # Where a part of the field alone is cut, the plane acts without the damping of the river.
+    assert part.verdict == "refuted"
 
 
 @pytest.mark.slow
@@ -245,6 +249,19 @@ def _endless(hand):
 
 def _boom(hand):
     raise ValueError("boom")
+
+
+def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
+    """CasADi prints six digits of a number: by its text this law would be one smooth expression."""
+
+    def notched(hand, k=1e6):
+        if hand.p[2] > 0.12345671:
+            return 0.0, 0.0, -k * (hand.p[2] - 0.12345671)
+        return (0.0, 0.0, -k * (hand.p[2] - 0.12345672)) if hand.p[2] > 0.12345672 else (0.0, 0.0, 0.0)
+
+    cases = cases_of(hvf.law(notched))
+    assert len(cases.cases) == 3
+    assert not cases.smooth
 
 
 @pytest.mark.parametrize(
