@@ -1,0 +1,88 @@
+"""What has no meaning beside the chosen figure or rivers is refused, its default too, and is in no file."""
+
+import json
+from typing import Any
+
+import pytest
+
+from controllers.errors import ParameterError
+from experiments.config.modes import Rivers, SpeedGovernor
+from experiments.config.part import from_dict, to_dict, to_json
+from experiments.config.run_config import FIGURE_DEFAULTS, Figure, RunConfig
+from experiments.config.words import RunOptions, changed, config_of_options, run_config
+from experiments.hardware.parts import served
+
+
+@pytest.mark.parametrize(
+    ("numbers", "says"),
+    [
+        ({"kind": "none", "residual_force": 0.1},
+         "--residual-force 0.1 has no meaning with --figure none; it belongs to --figure physical"),
+        ({"kind": "kinematic", "residual_moment": 0.0},
+         "--residual-moment 0 has no meaning with --figure kinematic; it belongs to --figure physical"),
+        ({"kind": "none", "blend": 0.1},
+         "--blend 0.1 has no meaning with --figure none; it belongs to --figure physical, kinematic"),
+    ],
+)  # fmt: skip
+def test_a_number_that_means_nothing_for_the_kind_of_figure_is_refused(numbers: dict[str, Any], says: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{says}$"):
+        Figure(**numbers)
+    with pytest.raises(ParameterError, match=says):
+        from_dict(RunConfig, to_dict(RunConfig()) | {"figure": numbers}, "a file")
+
+
+@pytest.mark.parametrize(
+    ("figure", "name"),
+    [("none", name) for name in FIGURE_DEFAULTS if name != "kind"]
+    + [("kinematic", name) for name in ("mass", "residual_force", "residual_moment")],
+)
+def test_an_option_that_means_nothing_for_the_kind_of_figure_is_refused_also_at_its_default(
+    figure: Any, name: str
+) -> None:
+    default, option = FIGURE_DEFAULTS[name], "--" + name.replace("_", "-")
+    for value in (default, default + 1):
+        with pytest.raises(
+            ParameterError, match=rf"^{option} {value} has no meaning with --figure {figure}; it belongs"
+        ):
+            run_config(figure=figure, **{name: value})
+        with pytest.raises(ParameterError, match=f"^{option} .* has no meaning with --figure {figure}; it belongs"):
+            config_of_options(RunOptions(figure=figure, **{name: value}))
+    with pytest.raises(ParameterError, match=f"^{option} .* has no meaning with --figure {figure}; it belongs"):
+        RunConfig(figure=Figure(kind=figure, **{name: default + 1}))
+
+
+def test_a_file_holds_no_number_that_means_nothing_and_may_hold_its_default() -> None:
+    held = to_dict(run_config(figure="none"))
+    assert held["figure"] == json.loads(to_json(run_config(figure="none")))["figure"] == {"kind": "none"}
+    assert repr(Figure(kind="none")) == "Figure(kind='none')"
+    kinematic = to_dict(run_config(figure="kinematic"))["figure"]
+    assert kinematic == {"kind": "kinematic"} | {name: FIGURE_DEFAULTS[name] for name in (
+        "stature", "smoothing", "figure_ticks", "blend")}  # fmt: skip
+    whole = held | {"figure": dict(FIGURE_DEFAULTS) | {"kind": "none"}}
+    assert from_dict(RunConfig, whole, "a recording") == run_config(figure="none")
+
+
+def test_a_led_figure_on_a_device_keeps_its_size_and_another_does_not() -> None:
+    size = {"stature": 1.2, "mass": 30.0}
+    assert served(run_config(mode="lead", blend=0.1, **size)).figure == Figure(kind="none", **size)
+    assert served(run_config(blend=0.1, **size)).figure == Figure(kind="none")
+
+
+@pytest.mark.parametrize("drag", [8.0, 30.0])
+def test_a_drag_of_rivers_that_are_gated_is_refused(drag: float) -> None:
+    for crossing in ({}, {"crossing": "smooth"}):
+        with pytest.raises(ParameterError, match=r"^--governor-drag has no meaning with --mode rivers, whose governor"):
+            run_config("rivers", governor=True, governor_drag=drag, **crossing)  # pyright: ignore
+    with pytest.raises(ParameterError, match=r"^--governor-drag has no meaning"):
+        Rivers(governor=SpeedGovernor(governor_drag=30.0))
+    summed = run_config("rivers", governor=True, governor_drag=drag, crossing="sum")
+    assert summed.mode == Rivers(crossing="sum", governor=SpeedGovernor(governor_drag=drag))
+    assert changed(summed, {"crossing": "discrete"}).mode == Rivers(governor=SpeedGovernor())
+
+
+def test_a_figure_of_another_kind_begins_with_the_defaults_of_what_no_longer_means_anything() -> None:
+    config = run_config(residual_force=0.2, blend=0.3, stature=1.2, mass=30.0, figure_ticks=5)
+    assert changed(config, {"figure": "kinematic"}).figure == Figure(
+        kind="kinematic", blend=0.3, stature=1.2, figure_ticks=5
+    )
+    assert changed(config, {"figure": "none"}).figure == Figure(kind="none")
