@@ -20,7 +20,8 @@ EARLIER = {  # what a page takes for granted: another page's result
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
 }
-ELSEWHERE = ["--cluster tcp://head", "--device NAME", "hvf live "]  # not here; serves until stopped (tests/live)
+# Not here; served until stopped (tests/live); a rig of the reader's with names of its own (test_role_file).
+ELSEWHERE = ["--cluster tcp://head", "--device NAME", "hvf live ", "--roles roles.toml"]
 GIVEN = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
     "back.bvh": "models/mocap/clips/walk.bvh",
