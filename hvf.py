@@ -30,7 +30,7 @@ from controllers.state import HandState, Wrench
 from experiments.certify.certify_simulation import certify
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.public import circle, clips, lift, load, prepare, version
-from experiments.runs.map_objects import Composite, Cylindrical, Lifted
+from experiments.runs.map_objects import Composite, Cylindrical, Lifted, RobotArm
 from experiments.runs.run_result import Run
 from experiments.runs.run_words import run
 from experiments.runs.simulation import Simulation, Tick, User
@@ -72,6 +72,7 @@ __all__ = [
     "Replay",
     "River",
     "RiverBundle",
+    "RobotArm",
     "Room",
     "Run",
     "Search",

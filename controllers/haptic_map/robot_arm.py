@@ -88,8 +88,6 @@ class RobotArm(KernelMap):
     ----------
     lengths : sequence of four floats
         Base to shoulder, shoulder to elbow, elbow to wrist, wrist to tool [m].
-    limits : Array, shape (7, 2)
-        Least and greatest joint angles [rad].
     home : Array-like, shape (3,)
         p_0, the tool's position in the frame of the arm's base when the stylus is at the origin of H [m].
     orientation : Array-like, shape (4,)
@@ -102,28 +100,23 @@ class RobotArm(KernelMap):
         The same for the stylus's rotation from upright [rad].
     arm_angle : float
         ψ [rad].
-    evaluate : callable, optional
-        h of this map at stylus poses (n, 7), shape (n, 7), for the check of the domain, by code that is compiled
-        already. By default the kernel is called from Python and compiled for it.
 
     Raises
     ------
     ParameterError
-        If a number is out of its interval, or somewhere in the domain the arm does not reach, is near a singularity of
-        shoulder, elbow or wrist, or exceeds a joint limit; the message says where.
+        If a number is out of its interval. Whether the arm works in the whole domain is found by `check_domain`, which
+        evaluates the map.
     """
 
-    def __init__(  # noqa: PLR0913 - the constants of an arm are independent
+    def __init__(
         self,
         lengths: Sequence[float],
-        limits: Array,
         home: npt.ArrayLike,
         orientation: npt.ArrayLike,
         scale: float,
         reach: tuple[float, float],
         turn: tuple[float, float],
         arm_angle: float,
-        evaluate: Callable[[CompiledMap, Array], Array] | None = None,
     ) -> None:
         q = np.asarray(orientation, dtype=float)
         numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
@@ -134,7 +127,6 @@ class RobotArm(KernelMap):
             raise ParameterError(
                 f"scale {scale}, reach {reach} m, turn {turn} rad; expected positive numbers, intervals that increase"
             )
-        self._check_domain(np.asarray(limits, dtype=float), evaluate)
 
     @property
     def nq(self) -> int:
@@ -150,19 +142,35 @@ class RobotArm(KernelMap):
         """The map in the form of its kernel; it has no memory."""
         return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
 
-    def _check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None) -> None:
-        """Raise unless the arm works at the centre and the edge of the domain, on a grid of directions and turns."""
+    def check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None = None) -> None:
+        """Refuse a domain in whose centre or at whose edge the arm does not work, on a grid of directions and turns.
+
+        Parameters
+        ----------
+        limits : Array, shape (7, 2)
+            Least and greatest joint angles [rad].
+        evaluate : callable, optional
+            h of this map at stylus poses (n, 7), shape (n, 7), by code that is compiled already. By default the kernel
+            is called from Python and compiled for it.
+
+        Raises
+        ------
+        ParameterError
+            If somewhere in the domain the arm does not reach, is near a singularity of shoulder, elbow or wrist, or
+            exceeds a joint limit; the message says where.
+        """
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
-        edge = [(place, turn) for place in _FAR * directions for turn in _NEARLY_BACK * directions]
-        points = np.array([np.concatenate([place, exponential.py_func(*turn)]) for place, turn in edge])
+        far, bounds = (_FAR, _NEARLY_BACK), (self._params[_REACH + 1], self._params[_TURN + 1])
+        edge = [(place, turn) for place in directions for turn in directions]
+        points = np.array([np.concatenate([far[0] * u, exponential.py_func(*(far[1] * v))]) for u, v in edge])
         poses = [self.pose(x) for x in points] if evaluate is None else evaluate(self.compiled(), points)
-        for (place, turn), q in zip(edge, poses, strict=True):
+        for (u, v), q in zip(edge, poses, strict=True):
             straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
             if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
                 raise ParameterError(
-                    f"the arm cannot follow a stylus at {np.round(1e3 * place)} mm turned by "
-                    f"{np.round(np.degrees(turn))}°: joint angles {np.round(np.degrees(q))}°; expected "
+                    f"the arm cannot follow a stylus at {np.round(1e3 * bounds[0] * u)} mm turned by "
+                    f"{np.round(np.degrees(bounds[1] * v))}°: joint angles {np.round(np.degrees(q))}°; expected "
                     f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
                     f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
                 )

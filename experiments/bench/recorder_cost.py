@@ -9,7 +9,8 @@ import psutil
 
 from experiments.config.words import run_config
 from experiments.setups.wiring import wire
-from sim.loop.loop import Loop, groups, record_into
+from sim.loop.channels import groups, record_into
+from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 
 _SECONDS, _LONG = 2.0, 20.0  # [s] of a short and of a long run

@@ -14,7 +14,7 @@ from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
-from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverClips
+from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverClips, RobotArm
 from experiments.config.modes import Lead, Rivers
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, phantom_of
@@ -71,6 +71,12 @@ def _circle(
     return {"": timed(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
 
 
+def _tilted_circle(config: RunConfig, part: RobotArm, timed: _Timed) -> dict[str, Trajectory]:
+    from experiments.setups.robot_arm import tilted
+
+    return {"": timed(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
+
+
 def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str, Trajectory]:
     from experiments.files.map_files import Lifted, load_map
     from experiments.setups.modes.lifted_runs import curve_number, lifted_curve
@@ -85,6 +91,7 @@ def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str
 
 MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
     "cylindrical": _circle, "composite": _circle, "rivers": _circle, "file": _curves_of_file, "led": _lead_curve,
+    "robot-arm": _tilted_circle,
 }  # fmt: skip
 """Functions that give the curves of a run, by kind of map."""
 

@@ -31,7 +31,7 @@ def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
     ModelError, ControllerError, SimError
         As `experiments.setups.wiring.wire`.
     """
-    return parts_of(config, map_parts(config, World(config.scene, config.figure.kind).figure, tuple(clips) or None))
+    return parts_of(config, map_parts(config, World(config.scene, config.body).body, tuple(clips) or None))
 
 
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:

@@ -3,13 +3,17 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.config.arm_options import Options, arm_config_of_options
+from controllers.errors import ParameterError
+from experiments.config.words import Options, config_of_options
 from experiments.console.output import Json, say
+from experiments.console.startup import STARTED
+
+_RUN = {"map": "robot-arm", "user": "push", "seconds": 12.0}
 
 
 @dataclass(frozen=True)
 class Command:
-    """Let the field lead a robot arm of seven joints instead of the figure, and write what happened into a folder."""
+    """Let the field lead a robot arm of seven joints: `hvf run --map robot-arm`, with a hand that pushes."""
 
     options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
@@ -21,7 +25,11 @@ class Command:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.runs.run_arm import run_arm
+        from experiments.runs.run import run
 
-        say(run_arm(arm_config_of_options(self.options), self.out, self.overwrite), self.json)
+        otherwise = _RUN if not self.options.replay else {name: _RUN[name] for name in ("map", "seconds")}
+        config = config_of_options(self.options, otherwise)
+        if config.body != "robot":
+            raise ParameterError(f"the map {config.map.kind} moves a figure; expected --map robot-arm, or hvf run")
+        say(run(config, self.out, self.overwrite, STARTED), self.json)
         return 0

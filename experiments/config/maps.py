@@ -130,6 +130,36 @@ class MapFile:
 
 
 @part
+class RobotArm:
+    """A robot arm of seven joints in the place of the figure: its tool follows the stylus.
+
+    Parameters
+    ----------
+    around : Circle
+        The curve, a circle that is then tilted towards the user.
+    reach : float
+        As in `Cylindrical`.
+    scale : float
+        Ratio of the tool's motion to the stylus's [1].
+    """
+
+    kind: Literal["robot-arm"] = "robot-arm"
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
+    scale: float = above(0.0, default=1.5)
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        """None: an arm plays no clip."""
+        return ()
+
+    @property
+    def raw(self) -> bool:
+        """There is nothing to prepare."""
+        return True
+
+
+@part
 class Led:
     """The clip of a figure that is led.
 
@@ -146,6 +176,6 @@ class Led:
     raw: bool = False
 
 
-Map = Annotated[Cylindrical | Composite | RiverClips | MapFile | Led, Field(discriminator="kind")]
-MAPS = (Cylindrical, Composite, RiverClips, MapFile)
+Map = Annotated[Cylindrical | Composite | RiverClips | MapFile | RobotArm | Led, Field(discriminator="kind")]
+MAPS = (Cylindrical, Composite, RiverClips, MapFile, RobotArm)
 MAP_SUFFIX = ".npz"

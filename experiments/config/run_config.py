@@ -3,13 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, cast, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
 from controllers.errors import ParameterError
-from experiments.config.maps import Cylindrical, Led, Map
+from experiments.config.maps import Cylindrical, Led, Map, RobotArm
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
 from experiments.config.part import above, at_least, from_file, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
@@ -17,7 +16,7 @@ from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
-from sim.world.world import FigureKind
+from sim.world.world import BodyKind, FigureKind
 
 PERSONAL = ("exaggerate", "cut", "change", "resist", "lost")
 """What only a person does, who sees and feels."""
@@ -76,25 +75,27 @@ class User:
 
 
 _ANIMATED, _RESIDUAL = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
-_SIZE: dict[FigureKind, tuple[str, ...]] = {"physical": (), "kinematic": ("mass",), "none": ("stature", "mass")}
-MEANINGLESS: dict[FigureKind, tuple[str, ...]] = {
-    "physical": (), "kinematic": _RESIDUAL, "none": (*_ANIMATED, *_RESIDUAL)
+_SIZE: dict[BodyKind, tuple[str, ...]] = {
+    "physical": (), "kinematic": ("mass",), "none": ("stature", "mass"), "robot": ("stature", "mass")
 }  # fmt: skip
-"""Numbers of a figure that have no meaning for its kind, whatever is played."""
+MEANINGLESS: dict[BodyKind, tuple[str, ...]] = {
+    "physical": (), "kinematic": _RESIDUAL, "none": (*_ANIMATED, *_RESIDUAL), "robot": ("blend", *_RESIDUAL)
+}  # fmt: skip
+"""Numbers of a figure that have no meaning for what follows the hand, whatever is played."""
 
 
-def meaningless(kind: str, leads: bool) -> tuple[str, ...]:
-    """Numbers of a figure that have no meaning for its kind; that of one that is led always has its size."""
-    one = cast(FigureKind, kind)
+def meaningless(body: str, leads: bool) -> tuple[str, ...]:
+    """Numbers of a figure that have no meaning for what follows the hand; a figure that is led always has its size."""
+    one = cast(BodyKind, body)
     return MEANINGLESS.get(one, ()) + (() if leads else _SIZE.get(one, ()))
 
 
-def no_meaning(name: str, value: object, kind: str) -> ParameterError:
-    """The error that a number of a figure has no meaning for its kind, and for which it has."""
-    others = [other for other in MEANINGLESS if name not in meaningless(other, leads=False)]
+def no_meaning(name: str, value: object, body: str) -> ParameterError:
+    """The error that a number of a figure has no meaning for what follows the hand, and for which figure it has."""
+    others = [other for other in get_args(FigureKind) if name not in meaningless(other, leads=False)]
+    chosen = "a robot arm" if body == "robot" else f"--figure {body}"
     return ParameterError(
-        f"--{name.replace('_', '-')} {value} has no meaning with --figure {kind}; "
-        f"it belongs to --figure {', '.join(others)}"
+        f"--{name.replace('_', '-')} {value} has no meaning with {chosen}; it belongs to --figure {', '.join(others)}"
     )
 
 
@@ -136,20 +137,22 @@ class Figure:
     residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
 
     def __post_init__(self) -> None:
-        self.check(leads=True)
+        self.check(leads=True, body=self.kind)
 
-    def check(self, leads: bool) -> None:
-        """Refuse what has no meaning for the kind of figure, where a figure is led or is not.
+    def check(self, leads: bool, body: BodyKind) -> None:
+        """Refuse what has no meaning for what follows the hand, where a figure is led or is not.
 
         Raises
         ------
         ParameterError
             The number, and the kinds of figure that have it.
         """
-        for name in meaningless(self.kind, leads):
+        if body == "robot" and self.kind != "physical":
+            raise ParameterError(f"a robot arm takes the figure's place; leave out --figure {self.kind}")
+        for name in meaningless(body, leads):
             value = getattr(self, name)
             if value != FIGURE_DEFAULTS[name]:
-                raise no_meaning(name, f"{value:g}", self.kind)
+                raise no_meaning(name, f"{value:g}", body)
 
     def become(self, kind: FigureKind, leads: bool) -> "Figure":
         """The same figure as another kind; what has no meaning for that is left at its default."""
@@ -267,7 +270,7 @@ class RunConfig:
     ----------
     mode : Follow, Bunny, Rivers, Stretch, StretchThenFollow or Lead
         Field of force.
-    map : Cylindrical, Composite, RiverClips, MapFile or Led
+    map : Cylindrical, Composite, RiverClips, MapFile, RobotArm or Led
         Haptic map, with its clips and its curve.
     user, figure, device, clock
         See there.
@@ -293,7 +296,10 @@ class RunConfig:
             raise ParameterError(
                 f"the user {self.user.does!r} and the mode {self.mode.kind!r}: a hand leads in the mode lead only"
             )
-        self.figure.check(self.leads)
+        self.figure.check(self.leads, self.body)
+        for name in ("governor", "walls"):
+            if self.body == "robot" and getattr(self.mode, name, None) is not None:
+                raise ParameterError(f"--{name} is for a figure, and a robot arm is in its place; leave it out")
         check_seed(self.device, self.seed)
         if isinstance(self.device, Replay):
             if self.user != User(does="lead" if self.leads else "relaxed"):
@@ -310,61 +316,24 @@ class RunConfig:
         return isinstance(self.mode, Lead)
 
     @property
+    def body(self) -> BodyKind:
+        """What follows the hand."""
+        return "robot" if isinstance(self.map, RobotArm) else self.figure.kind
+
+    @property
     def scene(self) -> SceneConfig:
         """Of the world: the figure's size and the rates."""
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
-
-@part
-class ArmConfig:
-    """A run of the robot arm: all that decides what happens.
-
-    Parameters
-    ----------
-    user : {"relaxed", "push"}
-        A hand that lets go, or one that pushes outwards and inwards once in the second lap.
-    seconds : float
-        Simulated time [s].
-    seed : int
-        Of where exactly the hand lets go of the stylus at the start.
-    stiffness : float
-        k_r of FOLLOW [N/m].
-    damping : float
-        b_d of FOLLOW [N s/m].
-    tube : float
-        ε of FOLLOW [m].
-    lap : float
-        Time of a lap of the curve, a tilted circle [s].
-    radius : float
-        Of the curve [m].
-    cutoff : float
-        Corner frequency of the velocity filter [Hz].
-    smoothing : float
-        Bandwidth of the filter between stylus and arm [Hz].
-    arm_ticks : int
-        Servo ticks between two updates of the arm's torques.
-    clock : Clock
-        Servo period and physics step.
-    """
-
-    user: Literal["relaxed", "push"] = "push"
-    seconds: Annotated[float, at_least(1.5, unit="s")] = 12.0
-    seed: Annotated[int, whole(0)] = 1
-    stiffness: Annotated[float, at_least(0.0, unit="N/m", most=MOST_STIFFNESS)] = 300.0
-    damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPING)] = 8.0
-    tube: Annotated[float, at_least(1e-4, unit="m", infinite=True)] = 0.25
-    lap: Annotated[float, at_least(0.1, unit="s")] = 4.0
-    radius: Annotated[float, above(0.0, unit="m")] = 0.05
-    cutoff: Annotated[float, above(0.0, unit="Hz")] = 150.0
-    smoothing: Annotated[float, above(0.0, unit="Hz")] = 6.0
-    arm_ticks: Annotated[int, whole(1)] = 4
-    clock: Clock = Clock()
-
-    @property
-    def scene(self) -> SceneConfig:
-        """Of the world: the rates."""
-        return SceneConfig(servo_period=self.clock.servo_period, physics_step=self.clock.physics_step)
+    @model_serializer(mode="wrap")
+    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """What a file holds: nothing of a figure in whose place there is a robot arm."""
+        held = cast(dict[str, Any], plain(self))
+        if self.body == "robot":
+            idle = ("kind", *meaningless("robot", leads=False))
+            held["figure"] = {name: value for name, value in held["figure"].items() if name not in idle}
+        return held
 
 
 def load_config(path: Path) -> RunConfig:

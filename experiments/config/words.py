@@ -8,13 +8,14 @@ import types
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import tyro
 
 from controllers.errors import ParameterError
-from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
+from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile, RobotArm
 from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates
 from experiments.config.run_config import (
     NO_SEED,
@@ -146,7 +147,7 @@ def run_config(
         map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
     if mode != "lead" and user and user not in _USERS:
         raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
-    _refuse_idle(given, mode, figure, replay)
+    _refuse_idle(given, mode, "robot" if map_cls is RobotArm else figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
     taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
     mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
@@ -175,11 +176,11 @@ def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> N
         raise _unknown(f"--{name}")
 
 
-def _refuse_idle(given: Mapping[str, object], mode: str, figure: str, replay: str) -> None:
+def _refuse_idle(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
     """Refuse words that change nothing beside what is chosen, also if their value is the default."""
-    for name in meaningless(figure, mode == "lead"):
+    for name in meaningless(body, mode == "lead"):
         if name in given:
-            raise no_meaning(name, given[name], figure)
+            raise no_meaning(name, given[name], body)
     if replay and "seed" in given:
         raise ParameterError(NO_SEED)
     if mode == "rivers" and "governor_drag" in given and gates(str(given.get("crossing", ""))):
@@ -280,7 +281,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     top = parameters(RunConfig)
     yield option("config", Path | None, CONFIG_HELP, None)
     yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
-    yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
+    yield option("map", str, "Haptic map: cylindrical, composite, rivers, robot-arm, or a map's file (.npz).", "")
     yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
@@ -299,8 +300,8 @@ Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="r
 """The same for a command that has them among its own."""
 
 
-def config_of_options(options: object) -> RunConfig:
-    """The configuration that options ask for; those that are given change the one of ``--config``.
+def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingProxyType({})) -> RunConfig:
+    """The configuration that options ask for; those that are given change the one of ``--config``, or else `otherwise`.
 
     Raises
     ------
@@ -311,7 +312,7 @@ def config_of_options(options: object) -> RunConfig:
     # A zero is given, although it equals False.
     given = {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
     file = given.pop("config", None)
-    return run_config(**given) if file is None else changed(load_config(cast(Path, file)), given)
+    return run_config(**(dict(otherwise) | given)) if file is None else changed(load_config(cast(Path, file)), given)
 
 
 def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
@@ -335,7 +336,8 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
         left |= _HAND | _names(Phantom) | {"seed"}
     if mode == "rivers" and gates(str(words.get("crossing", kept.get("crossing")))):
         left.add("governor_drag")
-    left |= set(meaningless(str(words.get("figure", config.figure.kind)), mode == "lead"))
+    body = "robot" if map == RobotArm.kind else str(words.get("figure", config.figure.kind))
+    left |= set(meaningless(body, mode == "lead"))
     kept = {name: value for name, value in kept.items() if name not in left}
     return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
 
@@ -356,7 +358,7 @@ def words_of(config: RunConfig) -> dict[str, object]:
         part = getattr(config.mode, name, None)
         if part is not None:
             words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
-    idle = set(meaningless(config.figure.kind, config.leads))
+    idle = set(meaningless(config.body, config.leads))
     if isinstance(config.mode, Rivers) and gates(config.mode.crossing):
         idle.add("governor_drag")
     if isinstance(config.device, Replay):

@@ -37,8 +37,8 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
         If the page cannot be served there, or the servo's process ends.
     """
     phantom_of(config.device)
-    if config.figure.kind == "none":
-        raise ParameterError("the live page shows a figure; expected --figure physical or kinematic")
+    if config.body not in ("physical", "kinematic"):
+        raise ParameterError("the live page shows a figure; expected --figure physical or kinematic, and its map")
     if config.user.does not in ("relaxed", "lead") or config.user.pushes or config.user.grabs:
         raise ParameterError("on the live page the hand is yours; leave out --user and what it does")
     token = token_for(host, given)

@@ -7,21 +7,19 @@ import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import cast
 
 import mujoco
 
 from controllers.errors import ParameterError
 from experiments.config.part import from_dict
-from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.files.curve_files import CURVE_FILE
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.world.world import FigureKind, World
-
-_Config = TypeVar("_Config")
+from sim.world.world import BodyKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
@@ -76,50 +74,27 @@ def clear_folder(out: Path) -> None:
 
 
 def config_of(recording: Recording) -> RunConfig:
-    """The configuration of a recording of a figure.
+    """The configuration of a recording.
 
     Raises
     ------
     SimError
-        If it is of the robot arm, of a `Simulation` put together in Python, or recorded by an incompatible version of
-        the program.
+        If it is of a `Simulation` put together in Python, or recorded by an incompatible version of the program.
     """
-    if of_arm(recording):
-        raise SimError(f"{recording.path}: is of the robot arm; expected the run of a figure")
     if "simulation" in recording.config:
         raise SimError(
             f"{recording.path}: is of a simulation put together in Python, whose parts a recording does not hold; "
             "expected the run of a configuration, or run the script again that made it"
         )
-    return _stored(RunConfig, recording)
-
-
-def arm_config_of(recording: Recording) -> ArmConfig:
-    """The configuration of a recording of the robot arm.
-
-    Raises
-    ------
-    SimError
-        If it was recorded by an incompatible version of the program.
-    """
-    return _stored(ArmConfig, recording)
-
-
-def of_arm(recording: Recording) -> bool:
-    """Whether a recording is of the robot arm."""
-    return "arm_ticks" in recording.config
+    try:
+        return from_dict(RunConfig, recording.config, "the recording's configuration")
+    except ParameterError as error:
+        raise SimError(f"{error}; it was recorded by another version of the program, which can run it again") from None
 
 
 def of_device(recording: Recording) -> bool:
     """Whether a recording is of a device, whose figure is only shown beside it and not recorded."""
     return "clock" in recording.groups.get("ticks", {})
-
-
-def _stored(cls: type[_Config], recording: Recording) -> _Config:
-    try:
-        return from_dict(cls, recording.config, "the recording's configuration")
-    except ParameterError as error:
-        raise SimError(f"{error}; it was recorded by another version of the program, which can run it again") from None
 
 
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
@@ -130,8 +105,8 @@ def clips_of(recording: Recording) -> tuple[Clip, ...]:
 
 
 def world_of(recording: Recording) -> mujoco.MjModel:
-    """The MuJoCo model to which the recorded qpos belongs: with the figure if there was one."""
-    kind = cast(FigureKind, recording.text("figure"))
+    """The MuJoCo model to which the recorded qpos belongs: with the figure or the robot arm if there was one."""
+    kind = cast(BodyKind, recording.text("figure"))
     return World(scene_of(recording), kind).full_model()
 
 

@@ -5,12 +5,11 @@ from pathlib import Path
 from rich.console import Console
 
 from experiments.console.compiling import compile_once
-from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of, of_arm
+from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.results.pages.report_of import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import measured, write_animations, write_summary
-from experiments.runs.run_arm import finish_arm
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
 from sim.loop.memory import peak_memory_mb
@@ -29,15 +28,11 @@ def finish(folder: Path) -> list[str]:
     """
     with Recording(folder / RECORDING) as recording:
         of_a_configuration = "mode" in recording.config and "live" not in recording.texts
-        arm = of_arm(recording)
         stopped = not recording.complete and not (folder / SUMMARY).exists()
     with claimed(folder):
         if stopped and of_a_configuration:
             _complete(folder)
-        if arm:
-            finish_arm(folder)
-        else:
-            write_report_of(folder)
+        write_report_of(folder)
     with Recording(folder / RECORDING) as recording:
         return lines_of(recording, folder)
 

@@ -1,4 +1,4 @@
-"""Haptic maps as objects, from which a simulation makes the map of its figure."""
+"""Haptic maps as objects, from which a simulation makes the map of its figure or robot arm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,13 +29,14 @@ from experiments.setups.figure_maps import (
 )
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.part_types import ClipMapParts
+from experiments.setups.robot_arm import arm_parts
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.world.world import World
 
 
-class FigureMap(Protocol):
-    """Factory of a haptic map for the figure of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
+class BodyMap(Protocol):
+    """Factory of a haptic map for the body of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
@@ -98,7 +99,7 @@ class Cylindrical(_AboutCurve):
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
+        return for_size_of(world.body, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,7 +123,7 @@ class Composite(_AboutCurve):
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.figure, lambda model: composite_parts(tuple(self.clips), self._place(), model))
+        return for_size_of(world.body, lambda model: composite_parts(tuple(self.clips), self._place(), model))
 
 
 @dataclass(frozen=True)
@@ -181,4 +182,45 @@ class Lifted:
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
-        return for_size_of(world.figure, lambda _: lifted_parts(*self._made, part))
+        return for_size_of(world.body, lambda _: lifted_parts(*self._made, part))
+
+
+@dataclass(frozen=True, repr=False)
+class RobotArm:
+    """Map to a robot arm of seven joints in the place of the figure: its tool follows the stylus.
+
+    Parameters
+    ----------
+    around : Trajectory
+        Curve in front of which hands begin.
+    reach : float
+        Half width of the tube about the curve in which they do [m].
+    scale : float
+        Ratio of the tool's motion to the stylus's [1].
+
+    Raises
+    ------
+    ParameterError
+        If a number is not positive.
+    SimError
+        If the Phantom does not reach the curve.
+    """
+
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    scale: float = 1.5
+
+    @in_keywords()
+    def __post_init__(self) -> None:
+        check_kinds(self)
+        for name, unit in (("reach", " m"), ("scale", "")):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ParameterError(f"{name} is {getattr(self, name):g}; expected more than 0{unit}, and finite")
+        reached(self.around)
+
+    def __repr__(self) -> str:
+        return short_text(self)
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return arm_parts(world.body, self.around, self.reach, self.scale)

@@ -1,6 +1,6 @@
 """Runs the configuration of a recording again and compares the two bit for bit."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -12,20 +12,14 @@ from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
-from experiments.results.folder import RECORDING, arm_config_of, clips_of, config_of, of_arm, of_device
-from experiments.runs.arm_recording import arm_channels
+from experiments.results.folder import RECORDING, clips_of, config_of, of_device
 from experiments.setups.parts.devices import check_hand
-from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from sim.errors import SimError
-from sim.loop.loop import Loop, groups, shown_channels, tick_channels
-from sim.loop.servo import FrameLog, Servo, TickLog
+from sim.loop.channels import Channels, channels
+from sim.loop.loop import Loop
+from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recording import Recording
-from sim.world.robot_world import RobotWorld
-from sim.world.world import World
-
-Channels = Callable[[TickLog, FrameLog, int], Mapping[str, Mapping[str, Array]]]
-"""Gives the channels of a block of n ticks, by group and name."""
 
 
 class _Comparison:
@@ -98,7 +92,7 @@ class Reproduced:
 
     def lines(self) -> list[str]:
         """Result in words."""
-        found = f"the same, bit for bit, over {self.ticks} ticks and what the figure did"
+        found = f"the same, bit for bit, over {self.ticks} ticks and all frames"
         return [*self.remarks, found if self.same else f"not the same: {'; '.join(self.differences.values())}"]
 
 
@@ -119,32 +113,14 @@ def reproduce(folder: Path) -> Reproduced:
         if of_device(recording):
             raise SimError(f"{folder}: is of a device, which moves differently each time; expected a simulated run")
         remarks = _others(recording.versions)
-        servo, world, channels = _again_arm(recording) if of_arm(recording) else _again(recording)
-        comparison = _Comparison(recording, channels)
+        config = config_of(recording)
+        check_files(config, recording)
+        session = wire(config, clips_of(recording))
+        servo, world = session.servo, session.world
+        comparison = _Comparison(recording, channels(servo, world))
         recorded_ticks = len(recording.channel("ticks", "t"))
         Loop(servo, world, comparison).run(recorded_ticks * servo.plant.period)
     return Reproduced(not comparison.differences, recorded_ticks, comparison.differences, remarks)
-
-
-def _again(recording: Recording) -> tuple[Servo, World, Channels]:
-    """A recorded run of a figure in its start state, and the channels that it recorded."""
-    config = config_of(recording)
-    check_files(config, recording)
-    session = wire(config, clips_of(recording))
-    servo, shown = session.servo, groups(session.servo)["frames"].channels
-
-    def channels(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
-        m = -(-n // servo.figure_ticks)
-        of_frames = shown_channels(frames, m, shown, session.world.pose_at)
-        return {"ticks": tick_channels(ticks, n), "frames": of_frames}
-
-    return servo, session.world, channels
-
-
-def _again_arm(recording: Recording) -> tuple[Servo, RobotWorld, Channels]:
-    """A recorded run of the robot arm in its start state, and the channels that it recorded."""
-    servo, world, _ = wire_arm(arm_config_of(recording))
-    return servo, world, arm_channels(servo, world)
 
 
 def _others(versions: Mapping[str, str]) -> tuple[str, ...]:

@@ -39,8 +39,9 @@ from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
+from sim.loop.channels import groups, record_into, shown_configuration
 from sim.loop.clock import RealTime
-from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into, shown_configuration
+from sim.loop.loop import BLOCK_SECONDS, Loop
 from sim.loop.memory import peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
@@ -204,8 +205,8 @@ def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
 def write_animations(out: Path, session: Session) -> None:
     """Write two BVH files: the animation as the hand made it, and that of the curve's nearest points at each frame."""
     with Recording(out / RECORDING) as recording:
-        if "reference" not in recording.groups["frames"]:
-            return  # a run without a figure has no animation
+        if not session.world.has_figure:
+            return
         reference = recording.channel("frames", "reference")
         on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))

@@ -25,7 +25,7 @@ from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom,
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
-from experiments.runs.map_objects import FigureMap
+from experiments.runs.map_objects import BodyMap, RobotArm
 from experiments.runs.run_result import Run
 from experiments.runs.short_text import short_text
 from experiments.setups.figure_maps import (
@@ -46,7 +46,7 @@ from sim.users.hand.arm import Arm
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
-from sim.world.world import World
+from sim.world.world import BodyKind, World
 
 _MINUTE = 60.0  # [s]
 
@@ -125,9 +125,9 @@ class Tick(NamedTuple):
     force : Array
         Force commanded to the device, after limiter and energy tank, in H [N], shape (3,).
     pose : Array
-        The animation h(p), qpos, shape (75,).
+        The animation h(p), qpos, shape (75,), or joint angles of a robot arm [rad], shape (7,).
     figure : Array
-        Simulated pose of the figure, qpos, shape (75,); empty without a figure.
+        Simulated pose of the figure, or of the arm; empty without one.
     """
 
     hand: HandState
@@ -145,8 +145,9 @@ class Simulation:
     ----------
     field : Law
         Law of force: built-in, composed or user-defined.
-    haptic_map : FigureMap or HapticMap
-        Map from the stylus to the figure; a user-defined `HapticMap` is taken to lie along the curve of the field.
+    haptic_map : BodyMap or HapticMap
+        Map from the stylus to the figure, or to a robot arm in its place; a user-defined `HapticMap` is taken to lie
+        along the curve of the field.
     user : User
         The simulated hand.
     device : Phantom or Replay
@@ -167,7 +168,7 @@ class Simulation:
     """
 
     field: Law
-    haptic_map: FigureMap | HapticMap
+    haptic_map: BodyMap | HapticMap
     user: User = User()
     device: Phantom | Replay = Phantom()  # noqa: RUF009 - frozen
     figure: Figure = Figure()  # noqa: RUF009
@@ -178,7 +179,7 @@ class Simulation:
     @in_keywords()
     def __post_init__(self) -> None:
         _check_kinds(self)
-        self.figure.check(leads=False)
+        self.figure.check(leads=False, body=self.body)
         check_seed(self.device, self.seed)
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
@@ -186,6 +187,11 @@ class Simulation:
 
     def __repr__(self) -> str:
         return short_text(self)
+
+    @property
+    def body(self) -> BodyKind:
+        """What follows the hand."""
+        return "robot" if isinstance(self.haptic_map, RobotArm) else self.figure.kind
 
     @property
     def scene(self) -> SceneConfig:
@@ -207,7 +213,7 @@ class Simulation:
         of_kind("seconds", seconds, float | None)
         if seconds is not None and not 0.0 < seconds < np.inf:
             raise ParameterError(f"seconds is {seconds:g}; expected more than 0 s, and finite")
-        world, console = World(self.scene, self.figure.kind), Console(stderr=True)
+        world, console = World(self.scene, self.body), Console(stderr=True)
         device, span = device_of(self, world, seconds), seconds or _MINUTE
         given = self.haptic_map
         maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
@@ -273,7 +279,7 @@ class Simulation:
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
             yield Tick(
                 HandState.of(ticks.hand[0]), Wrench(force, torque), ticks.force[0].copy(),
-                session.servo.reference.pose.copy(), session.figure_pose(frames.qpos[0]),
+                session.servo.reference.pose.copy(), session.body_pose(frames.qpos[0]),
             )  # fmt: skip
 
     def description(self) -> dict[str, object]:

@@ -1,106 +1,90 @@
-"""Runs with a seven-joint robot arm in place of the figure: the same field and the same loop."""
+"""A robot arm of seven joints in place of the figure: the map's parts, for the same fields and the same loop."""
 
-from collections.abc import Callable
+from functools import cache, partial
+from typing import cast
 
 import mujoco
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.follow import Follow
+from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.robot_arm import ROBOT_ARM, RobotArm
-from controllers.safety.energy_tank import river_power
-from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE, Array
-from experiments.config.run_config import ArmConfig
-from experiments.setups.parts.budget import fastest, tank_for
-from experiments.setups.parts.hands import lap_pushes
-from experiments.setups.parts.pace import reached
-from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
-from models.world.scene import PHANTOM
-from sim.body.robot import robot_state
-from sim.compilation.units import Unit
-from sim.devices.simulated import simulated_phantom
-from sim.loop.run_units import run_units
-from sim.loop.servo import Servo, unlinked_field
-from sim.reference.reference import check_reference, make_reference, poses_along
-from sim.users.hand.arm import Arm
-from sim.world.phantom_port import phantom_port
-from sim.world.plant import make_plant
-from sim.world.robot_world import RobotWorld
+from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
+from controllers.state import Array
+from experiments.config.maps import RobotArm
+from experiments.setups.modes.rivers import default_choice
+from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.pace import course_of, reached
+from experiments.setups.parts.part_types import ClipMapParts
+from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
+from models.world.scene import PEDESTAL
+from sim.reference.reference import poses_along
 
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
-TILT = np.radians(75.0)  # tilt of the tool from the vertical
-ORIENTATION = np.array([np.cos(0.5 * TILT), 0.0, np.sin(0.5 * TILT), 0.0])
-SCALE = 1.5  # ratio of the tool's motion to the stylus's: it stays in a ball of 1.5 times the second reach, 15 cm
-REACH = (0.07, 0.1)  # [m] stylus distance up to which the tool follows exactly, and its bound in saturation
-TURN = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
-ARM_ANGLE = np.radians(30.0)  # ψ of `RobotArm` [rad]
-RATE = 60.0  # feedback rate of the arm's computed-torque control [1/s]
+_TILT = np.radians(75.0)  # tilt of the tool from the vertical
+ORIENTATION = np.array([np.cos(0.5 * _TILT), 0.0, np.sin(0.5 * _TILT), 0.0])
+_REACH = (0.07, 0.1)  # [m] stylus distance up to which the tool follows exactly, and its bound in saturation
+_TURN = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
+_ARM_ANGLE = np.radians(30.0)  # ψ of `controllers.haptic_map.robot_arm.RobotArm` [rad]
+_CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
 
 
-def robot_arm_map() -> RobotArm:
-    """The default map: the tool follows the stylus in front of the arm, with displacements scaled by 1.5."""
-    arm = arm_model()
-    return RobotArm(
-        arm_lengths(arm), arm_limits(arm), HOME, ORIENTATION, SCALE, REACH, TURN, float(ARM_ANGLE), _evaluated
+def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
+    """Map parts of a configured robot arm, along a tilted circle."""
+    around = part.around
+    return arm_parts(
+        arm, tilted(Trajectory.circle(around.radius, around.lap, wave=around.wave)), part.reach, part.scale
     )
+
+
+def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float) -> ClipMapParts:
+    """Map parts of an arm in front of which the tool follows the stylus, about a curve.
+
+    Parameters
+    ----------
+    arm : MjModel
+        The arm alone.
+    curve : Trajectory
+        φ, with the timing that the hand is to have.
+    reach : float
+        Half width of the tube about the curve in which hands begin [m].
+    scale : float
+        Ratio of the tool's motion to the stylus's [1].
+
+    Raises
+    ------
+    ParameterError
+        If the scale is not positive. What the arm does not reach is refused when the parts are refined, which
+        evaluates the map.
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    made = RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, _REACH, _TURN, float(_ARM_ANGLE))
+
+    def refined() -> tuple[ClipMap, tuple[str, ...]]:
+        made.check_domain(arm_limits(arm), _evaluated)
+        return cast(ClipMap, made), ()
+
+    return ClipMapParts(
+        haptic_map=cast(ClipMap, made), clips=(), curve=reached(curve), reach=reach, turning=True, refined=refined,
+        rivers=lambda mode: default_choice(mode, curve, reach),
+        river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
+        course=cache(partial(course_of, curve)),
+        static={"tool_home": HOME + np.array([0.0, 0.0, PEDESTAL]), "tool_scale": scale},
+    )  # fmt: skip
+
+
+def tilted(circle: Trajectory) -> Trajectory:
+    """A curve about the vertical axis of H, tilted by 30° towards the user."""
+    times = np.linspace(circle.start, circle.end, 65)
+    points, cosine, sine = circle.point(times), np.cos(_CIRCLE_TILT), np.sin(_CIRCLE_TILT)
+    x, y, z = points.T
+    turned = np.stack([cosine * x - sine * z, y, sine * x + cosine * z], axis=1)
+    turned[-1] = turned[0]
+    return Trajectory(times, turned, periodic=True)
 
 
 def _evaluated(compiled: CompiledMap, points: Array) -> Array:
     poses = np.empty((len(points), len(ARM_JOINTS)))
     poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
     return poses
-
-
-def tilted_circle(radius: float, lap: float) -> Trajectory:
-    """A circle about the origin of H, tilted by 30° towards the user, passed in `lap` seconds."""
-    times = np.linspace(0.0, lap, 65)
-    points = Trajectory.circle(radius, lap).point(times)
-    tilt = np.radians(30.0)
-    turned = np.stack([np.cos(tilt) * points[:, 0], points[:, 1], np.sin(tilt) * points[:, 0]], axis=1)
-    turned[-1] = turned[0]
-    return Trajectory(times, turned, periodic=True)
-
-
-def wire_arm(
-    config: ArmConfig, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
-) -> tuple[Servo, RobotWorld, Trajectory]:
-    """Wire a run of the arm: servo, world and curve; `ready` as in `experiments.setups.wiring.wire`.
-
-    Raises
-    ------
-    ModelError, ControllerError, SimError
-        If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
-    """
-    world = RobotWorld(config.scene)
-    curve = reached(tilted_circle(config.radius, config.lap))
-    program = Follow(curve, config.stiffness, config.damping, config.tube).program()
-    period = config.scene.servo_period
-    limiter = ForceLimiter(period)
-    power = river_power(config.damping, fastest(curve))
-    tank = tank_for(power, ((config.stiffness, config.tube),), config.radius, limiter)
-    pushes = lap_pushes(config.lap, config.lap) if config.user == "push" else ()
-    start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
-    world.reset(start)
-    stylus = np.empty(4)
-    mujoco.mju_mat2Quat(stylus, world.data.site(PHANTOM + "tip").xmat)
-    port = phantom_port(world.model, world.data, period, config.cutoff)
-    check_reference(period * config.arm_ticks, config.smoothing, 0.0)
-    nothing, arm_period = CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), period * config.arm_ticks
-    device = simulated_phantom(port, Arm(pushes=pushes))
-    servo = Servo(
-        plant=make_plant(world),
-        device=device,
-        field=unlinked_field(program, limiter, tank),
-        reference=make_reference(world.arm, nothing, arm_period, config.smoothing),
-        figure=robot_state(world, RATE),
-        figure_ticks=config.arm_ticks,
-        argument=device.hand[STYLUS_POSE],
-    )  # fmt: skip
-    # The map checks its domain with compiled code, so this comes after all other checks.
-    ready(run_units(servo, program))
-    compiled = robot_arm_map().compiled()
-    world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
-    reference = make_reference(world.arm, compiled, arm_period, config.smoothing)
-    return servo._replace(reference=reference).linked(program), world, curve

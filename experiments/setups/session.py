@@ -14,7 +14,7 @@ from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
 from experiments.setups.parts.devices import recorded_as
 from experiments.setups.parts.part_types import Parts, Settings
-from models.humanoid.skeleton import N_POSE, standing_com
+from models.humanoid.skeleton import standing_com
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import P_WH
@@ -74,7 +74,8 @@ class Session:
     @property
     def _played(self) -> str:
         """Names of the clips, or else the type of the map."""
-        return ", ".join(clip.name for clip in self.clips) or type(self.haptic_map).__name__
+        alone = "a robot arm" if self.world.kind == "robot" else type(self.haptic_map).__name__
+        return ", ".join(clip.name for clip in self.clips) or alone
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """Constant data that the recording keeps beside the channels."""
@@ -107,10 +108,10 @@ class Session:
 
     @property
     def weight(self) -> float:
-        """Weight of the figure [N]."""
-        figure = self.world.figure
-        return float(figure.body_subtreemass[1]) * float(np.linalg.norm(figure.opt.gravity))
+        """Weight of the figure, or of the robot arm [N]."""
+        body = self.world.body
+        return float(body.body_subtreemass[1]) * float(np.linalg.norm(body.opt.gravity))
 
-    def figure_pose(self, qpos: Array) -> Array:
-        """The figure's part of a recorded configuration, shape (75,); empty where there is no figure."""
-        return qpos[self.world.pose_at : self.world.pose_at + N_POSE].copy()
+    def body_pose(self, qpos: Array) -> Array:
+        """The body's part of a recorded configuration: shape (75,), or (7,) of a robot arm; empty without a body."""
+        return qpos[self.world.pose_at : self.world.pose_at + self.world.body.nq].copy()

@@ -5,7 +5,7 @@ from typing import Any
 
 import mujoco
 
-from experiments.config.maps import Led, Map
+from experiments.config.maps import Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
 from experiments.setups.figure_maps import MAP_SETUPS, for_size_of
 from experiments.setups.modes.bunny import bunny_parts
@@ -16,6 +16,7 @@ from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import MapParts, Parts
+from experiments.setups.robot_arm import robot_arm_parts
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
@@ -40,8 +41,8 @@ def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     return led_clips(part) if isinstance(part, Led) else load_clips(part.clips, part.raw)
 
 
-def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
-    """Map parts of a configuration, made of the given clips or, without them, of those that its map names.
+def map_parts(config: RunConfig, body: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
+    """Map parts of a configuration for a figure or a robot arm, with the given clips or else those that its map names.
 
     Raises
     ------
@@ -49,10 +50,12 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
         If there is no such clip, file or curve, or the Phantom does not reach the curve.
     """
     played, remarks = clips_for(config.map) if clips is None else (clips, ())
+    if isinstance(config.map, RobotArm):
+        return robot_arm_parts(body, config.map)
     if isinstance(config.map, Led):
-        return led_parts(config, config.map, played, figure).with_remarks(remarks)
+        return led_parts(config, config.map, played, body).with_remarks(remarks)
     setup = MAP_SETUPS[config.map.kind]
-    return for_size_of(figure, lambda model: setup(config, config.map, played, model)).with_remarks(remarks)
+    return for_size_of(body, lambda model: setup(config, config.map, played, model)).with_remarks(remarks)
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:

@@ -1,4 +1,4 @@
-"""Wiring: from a configuration to a linked servo with stylus and figure in their start state (`wire`)."""
+"""Wiring: from a configuration to a linked servo with stylus and body in their start state (`wire`)."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -11,12 +11,12 @@ from controllers.curves.stylus import UPRIGHT
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.higher_order import HigherOrder
-from controllers.haptic_map.base import CompiledMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, HandState
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
+from experiments.setups.parts.bodies import body_of, figure_period
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.devices import DeviceOf, device_of
 from experiments.setups.parts.eyes import POSES, with_eyes
@@ -29,10 +29,6 @@ from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
 from models.one_blas_thread import on_one_blas_thread
 from models.phantom.kinematics import Quat
-from models.world.scene import FIGURE
-from sim.body.drive import BodyState
-from sim.body.figure import Figure
-from sim.body.unsimulated import kinematic_figure, no_figure
 from sim.compilation.units import Unit
 from sim.devices.replayed import ReplayedHand
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
@@ -43,11 +39,8 @@ from sim.reference.reference import (
     along_unit,
     begin_in_motion,
     check_reference,
-    make_reference,
-    no_reference,
     poses_along,
 )
-from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import lower_start, lower_start_unit
 from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
@@ -93,12 +86,12 @@ def wire(
     config = resolved(config)
     check_seconds(config, config.seconds)
     check_rates(config)
-    world = World(config.scene, config.figure.kind)
+    world = World(config.scene, config.body)
     if device is None and config.leads and not world.has_figure:
         raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
     if device is None:
         device = device_of(config, world, config.seconds)
-    maps = maps_of(config, world.figure, clips)
+    maps = maps_of(config, world.body, clips)
     return assemble(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
 
@@ -133,8 +126,8 @@ def assemble(
     for curve in _curves(draft):
         reached(curve)
     ready(_units(draft, _servo(draft, world, device)))
-    # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
-    refined = maps.refine(world.kind == "physical") if world.has_figure else maps
+    # The map is refined, which takes compiled code, only after all checks have passed and if anything follows it.
+    refined = maps if world.kind == "none" else maps.refine(world.kind == "physical")
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
     if isinstance(parts.user, Participant) and world.has_figure and parts.walking is None:
@@ -166,11 +159,6 @@ def check_rates(settings: Settings) -> None:
     check_reference(figure_period(settings), figure.smoothing, figure.blend)
 
 
-def figure_period(settings: Settings) -> float:
-    """Time between two updates of the figure [s]."""
-    return settings.clock.servo_period * settings.figure.figure_ticks
-
-
 def check_seconds(settings: Settings, seconds: float) -> None:
     """Check that a run of `seconds` has two updates of the figure or more, and an end.
 
@@ -186,7 +174,8 @@ def check_seconds(settings: Settings, seconds: float) -> None:
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     """Compilation units that a run needs."""
-    more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((lower_start_unit(),) if parts.bends else ())
+    lowers = parts.bends and parts.config.body != "robot"
+    more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((lower_start_unit(),) if lowers else ())
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
@@ -210,7 +199,7 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         )
     else:
         device = device_of(world)
-    body, reference = _BODIES[world.kind](parts, world, compiled)
+    body, reference = body_of(parts, world, compiled)
     return Servo(
         plant=make_plant(world), device=device, field=field, reference=reference, figure=body,
         figure_ticks=config.figure.figure_ticks,
@@ -218,46 +207,20 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     )  # fmt: skip
 
 
-def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
-    figure = parts.config.figure
-    return make_reference(
-        world.figure, compiled, figure_period(parts.config), figure.smoothing, figure.blend, packed_legs(world.figure),
-        parts.held_seconds,
-    )  # fmt: skip
-
-
-def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    bounds = parts.config.figure
-    gains = parts.gains._replace(force_bound=bounds.residual_force, moment_bound=bounds.residual_moment)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, figure_period(parts.config))
-    return figure.state, _reference(parts, world, compiled)
-
-
-def _kinematic(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    return kinematic_figure(), _reference(parts, world, compiled)
-
-
-def _none(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    return no_figure(), no_reference(compiled if parts.program.map_feeds else None)
-
-
-_BODIES = {"physical": _physical, "kinematic": _kinematic, "none": _none}
-
-
 def _begin(parts: Parts, servo: Servo, world: World) -> None:
-    """Set stylus and figure to the start state of the run."""
+    """Set stylus and body to the start state of the run."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin, orientation = _first(parts, servo)
     stylus = begin.velocity if moves else None
-    if not world.has_figure:
+    if world.kind == "none":
         world.reset(begin.point, rest_pose(), orientation, stylus)
     else:
         stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
         argument = (stylus_pose if parts.walking is None else servo.argument)[None]
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
-        if parts.bends:
-            lower_start(packed_legs(world.figure), poses[0], parts.maps.size)
+        if parts.bends and world.has_figure:
+            lower_start(packed_legs(world.body), poses[0], parts.maps.size)
         figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:
@@ -274,4 +237,4 @@ def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
         return Beginning(hand.p, hand.v, np.zeros(3)), (w, x, y, z)
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), parts.begins_in_motion)
     # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
-    return begin, UPRIGHT if parts.maps.expressive or parts.user.turns else None
+    return begin, UPRIGHT if parts.maps.oriented or parts.user.turns else None

@@ -18,22 +18,22 @@ from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
 from controllers.state import Array
-from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.console.compiling import compile_once
-from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import PHANTOM
 from sim.body.figure_state import REPORT_DOWN
 from sim.compilation.units import Unit
-from sim.loop.loop import Loop, pose_errors, tick_channels
+from sim.loop.channels import pose_errors, tick_channels
+from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 
 SECONDS, FINER = 8.0, 8
 BAND = 8.0  # [Hz]; for a hand at 8 cm/s this is a wavelength of a centimetre
-MODES: Mapping[str, RunConfig | ArmConfig] = {
+MODES: Mapping[str, RunConfig] = {
     "follow": run_config(),
     "follow pushed": run_config(user="push"),
     "bunny": run_config(mode="bunny"),
@@ -42,7 +42,7 @@ MODES: Mapping[str, RunConfig | ArmConfig] = {
     "stretch": run_config(mode="stretch"),
     "stretch-then-follow": run_config(mode="stretch-then-follow"),
     "lead": run_config(mode="lead"),
-    "arm": ArmConfig(),
+    "arm": run_config(map="robot-arm", user="push"),
 }
 HEAD = (
     "| mode | step ms | stylus off the path, and apart at an instant µm RMS "
@@ -77,20 +77,16 @@ class Course(NamedTuple):
     falls: int
 
 
-def course(config: RunConfig | ArmConfig, step: float) -> Course:
+def course(config: RunConfig, step: float) -> Course:
     """Run a configuration at a step of the physics [s]."""
     clock = replace(config.clock, physics_step=step)
 
     def ready(units: tuple[Unit, ...]) -> None:
         compile_once(Console(stderr=True), units)
 
-    if isinstance(config, ArmConfig):
-        servo, world, _ = wire_arm(replace(config, clock=clock), ready)
-        own = slice(world.model.nq - len(servo.reference.pose), world.model.nq)
-    else:
-        session = wire(replace(config, clock=clock), ready=ready)
-        servo, world = session.servo, session.world
-        own = slice(session.world.pose_at, session.world.pose_at + N_POSE)
+    session = wire(replace(config, clock=clock), ready=ready)
+    servo, world = session.servo, session.world
+    own = slice(world.pose_at, world.pose_at + world.body.nq)
     elbow, two, three = (int(world.model.joint(PHANTOM + n).qposadr[0]) for n in ("elbow", "theta2", "theta3"))
     every, parts = servo.figure_ticks, list[tuple[Array, ...]]()
 

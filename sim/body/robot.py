@@ -8,15 +8,16 @@ at −ω as long as no motor saturates (Craig, Introduction to Robotics, chapter
 
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numba import njit
 
 from controllers.state import Array
-from models.robot_arm.spec import ARM_JOINTS
-from models.world.scene import ROBOT
+from models.robot_arm.spec import ARM_JOINTS, TOOL
+from models.world.scene import PEDESTAL, ROBOT
 from sim.compilation.native import mj_full_m
 from sim.errors import SimError
-from sim.world.robot_world import RobotWorld
+from sim.world.world import World
 
 REPORT_SATURATED, REPORT_SIZE = 1, 8  # as in the figure's report
 
@@ -80,12 +81,12 @@ def robot_torque(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
     s.report[REPORT_SATURATED] = saturated
 
 
-def robot_state(world: RobotWorld, rate: float) -> RobotState:
+def robot_state(world: World, rate: float) -> RobotState:
     """The state of the arm's control.
 
     Parameters
     ----------
-    world : RobotWorld
+    world : World
         Must outlive the state, which holds addresses of its memory.
     rate : float
         ω [1/s].
@@ -108,3 +109,17 @@ def robot_state(world: RobotWorld, rate: float) -> RobotState:
         world_M=world_M, M=world_M[dofs, dofs], rate=float(rate),
         torque_limit=model.actuator_ctrlrange[motors, 1].copy(), acceleration=np.zeros(n), report=np.zeros(REPORT_SIZE),
     )  # fmt: skip
+
+
+def tool_positions(arm: mujoco.MjModel, data: mujoco.MjData, angles: Array) -> Array:
+    """Positions of the tool in the world [m], shape (n, 3), at joint angles [rad], shape (n, 7).
+
+    `arm` is the model of the arm alone, `data` scratch memory of it.
+    """
+    places = np.empty((len(angles), 3))
+    for i, q in enumerate(angles):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(arm, data)
+        places[i] = data.site(TOOL).xpos
+    places[:, 2] += PEDESTAL
+    return places

@@ -14,7 +14,8 @@ from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERA
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
 from sim.hardware.gated_tick import MOTOR_HEAT, MOTORS_ON, GateMemory, gated_tick
-from sim.loop.loop import make_logs, tick_channels
+from sim.loop.channels import tick_channels
+from sim.loop.loop import make_logs
 from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
 

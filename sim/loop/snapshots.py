@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.loop.servo import Servo
-from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
 Array = npt.NDArray[Any]
@@ -49,14 +48,14 @@ def state_arrays(part: object) -> Iterator[Array]:
             yield from state_arrays(value)
 
 
-def kept_state(servo: Servo, world: World | RobotWorld, tick: int) -> KeptState:
+def kept_state(servo: Servo, world: World, tick: int) -> KeptState:
     """Save the state before tick number `tick`."""
     data = mujoco.MjData(world.model)
     mujoco.mj_copyData(data, world.model, world.data)
     return KeptState(tick, data, tuple(array.copy() for array in state_arrays(servo)))
 
 
-def put_back(servo: Servo, world: World | RobotWorld, state: KeptState) -> None:
+def put_back(servo: Servo, world: World, state: KeptState) -> None:
     """Restore a saved state of servo and world."""
     for array, kept in zip(state_arrays(servo), state.arrays, strict=True):
         array[...] = kept

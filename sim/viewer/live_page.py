@@ -22,27 +22,27 @@ class LivePage:
     Parameters
     ----------
     model : mujoco.MjModel
-        The world with the figure; not stepped here.
+        The world with what follows the hand; not stepped here.
     drawn : sequence of Course
         The curves.
     radius : float
         Radius of the tube around each curve [m], 0 for none.
-    figure : {"physical", "kinematic", "none"}
-        Kind of figure; beside a physical one the animation is shown as a ghost.
+    body : {"physical", "kinematic", "none", "robot"}
+        Kind of figure, or a robot arm; beside a physical figure the animation is shown as a ghost.
     port : int
         Port; if it is in use, the next free one is taken.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, figure: str = "physical",
+        self, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, body: str = "physical",
         port: int = 8080,
     ):  # fmt: skip
         self._server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields")
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._clock = self._server.gui.add_html("")
         add_view_buttons(self._server.gui)
-        ghost = "animation h(p)" if figure == "physical" else ""
-        name = "physical figure" if figure == "physical" else "animation h(p)"
+        ghost = "animation h(p)" if body == "physical" else ""
+        name = {"physical": "physical figure", "robot": "robot arm"}.get(body, "animation h(p)")
         self._stage = LiveStage(self._server.scene, model, drawn, radius, name, ghost)
         self._stage.draw_slice(np.zeros((0, 3)), np.zeros((0, 3)))
         light(self._server.scene)

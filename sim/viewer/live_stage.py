@@ -17,7 +17,7 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.framing import TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
-from sim.viewer.shapes import TUBE_SHARE, body_shapes, coarser, tube
+from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, coarser, tube
 from sim.viewer.shown import Shown
 
 MAGNIFICATION = 8.0  # drawn over true lengths of the device
@@ -49,7 +49,7 @@ class LiveStage:
     scene : viser.SceneApi
         Scene of the page.
     model : mujoco.MjModel
-        The world with the figure: bodies named ``phantom/…`` and ``figure/…``.
+        The world with what follows the hand: bodies named ``phantom/…``, and ``figure/…`` or ``robot/…``.
     drawn : sequence of Course
         The curves.
     radius : float
@@ -63,7 +63,7 @@ class LiveStage:
         figure: str = "physical figure", ghost: str = "default animation",
     ):  # fmt: skip
         self._scene, self._model, self._data = scene, model, mujoco.MjData(model)
-        shapes = body_shapes(model, "figure/")
+        shapes = body_shapes(model, body_prefix(model))
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "figure/root")
         self._root = int(model.jnt_qposadr[joint]) if joint >= 0 else -1
         self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
@@ -85,7 +85,7 @@ class LiveStage:
         for k in range(len(self._courses)):
             self.draw_course(k, self._courses[k][0].points)
         self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
-        if self._root >= 0:
+        if shapes:
             self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
         self._ghost_label = self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
         self._ghost_label.visible = self._has_ghost = self._root >= 0 and bool(ghost)

@@ -15,12 +15,13 @@ import numpy as np
 import viser
 
 from controllers.state import Array
+from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course, courses
 from sim.viewer.framing import followed, typical_peak
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
-from sim.viewer.shapes import TUBE_SHARE, body_shapes, tube
+from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
 
 FPS = 30.0  # [1/s]
 SECONDS = 60.0  # [s] longest replay; of a longer run the beginning is shown
@@ -33,29 +34,28 @@ TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the stylus's path app
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
 
-class Target(NamedTuple):
-    """The body that follows the animation.
+class _Target(NamedTuple):
+    """How the body that follows the animation is drawn.
 
     Attributes
     ----------
-    prefix : str
-        Prefix of its bodies and joints in the world.
     name, animation : str
         Labels of the body and of its reference.
     height : float
         Height of the labels [m].
     """
 
-    prefix: str
     name: str
     animation: str
     height: float
 
 
-FIGURE_TARGET = Target("figure/", "physical figure", "animation h(p)", 2.0)
+_TARGETS = {
+    FIGURE: _Target("physical figure", "animation h(p)", 2.0), ROBOT: _Target("robot arm", "h(p, R)", 1.6)
+}  # fmt: skip
 
 
-def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FIGURE_TARGET) -> str:
+def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     """Make the replay page.
 
     Parameters
@@ -63,12 +63,10 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
     recording : Recording
         Must have the arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius``, 0 for none, and
         ``p_WH``, the hand frame's origin in the world; for rivers also ``river_curves`` (k, m, 3) and ``river_names``;
-        in group ``frames`` the channels t, qpos (nq) and, if there is a figure, reference (75, or the target's size);
+        in group ``frames`` the channels t, qpos (nq) and, if there is a figure, reference (75, or 7 of a robot arm);
         in group ``ticks`` the channels t, p, force and user (3 each, hand frame).
     model : mujoco.MjModel
-        The world that was recorded: bodies named ``phantom/…`` and those of the target.
-    target : Target
-        The body that follows the animation.
+        The world that was recorded: bodies named ``phantom/…``, and ``figure/…`` or ``robot/…``.
 
     Returns
     -------
@@ -85,7 +83,7 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         with server.atomic():  # no browser is connected: waking the server for each message takes as long as the rest
-            page = _Stage(server.scene, recording, model, target).play(server)
+            page = _Stage(server.scene, recording, model).play(server)
     finally:
         with contextlib.redirect_stdout(quiet):
             server.stop()
@@ -101,22 +99,23 @@ def drawn_tube(recording: Recording) -> float:
 class _Stage:
     """The scene of a replay and its animation."""
 
-    def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel, target: Target):
+    def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel):
         self._scene = scene
         self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
         # A kinematic figure is drawn once, without a ghost; there may be no figure at all.
         kind = recording.texts.get("figure", "physical")
-        self._simulated = kind == "physical"
+        self._simulated, prefix = kind in ("physical", "robot"), body_prefix(model)
+        target = _TARGETS[prefix]
         names = ("t", "qpos") if kind == "none" else ("t", "qpos", "reference")
         self._frames = {name: recording.channel("frames", name) for name in names}
         self._data = mujoco.MjData(model)
         self._model = model
-        joints = (joint for joint in range(model.njnt) if model.joint(joint).name.startswith(target.prefix))
+        joints = (joint for joint in range(model.njnt) if model.joint(joint).name.startswith(prefix))
         first = next(joints, None)
         self._root = 0 if first is None else int(model.jnt_qposadr[first])
         self._travels = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
         self._p_WH = recording.array("p_WH")
-        figure = body_shapes(model, target.prefix)
+        figure = body_shapes(model, prefix)
         self._phantom = Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION)
         self._figure = Actor(scene, "figure", figure, 1.0)
         self._ghost = Actor(scene, "ghost", figure if self._simulated else [], 1.0, GHOST)

@@ -8,7 +8,7 @@ import trimesh
 from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
 from controllers.state import Array, IntArray
-from models.world.scene import FIRST_HIDDEN_GROUP
+from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
 
 TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 
@@ -35,6 +35,11 @@ class Shape(NamedTuple):
     vertices: Array
     faces: IntArray
     rgba: tuple[float, float, float, float]
+
+
+def body_prefix(model: mujoco.MjModel) -> str:
+    """Prefix of the bodies of what follows the hand: those of a robot arm if the world has one, else of a figure."""
+    return ROBOT if any(model.body(body).name.startswith(ROBOT) for body in range(model.nbody)) else FIGURE
 
 
 def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:

@@ -16,7 +16,6 @@ from sim.users.hand.arm import Arm, CompiledArm, hand_force
 from sim.users.hand.fingers import turning_moment
 from sim.users.person.person_state import PersonState, nobody
 from sim.world.phantom_port import PhantomPort, let_go, true_motion, true_turn
-from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
 
@@ -70,7 +69,7 @@ class Hand(NamedTuple):
     person: PersonState
 
 
-def make_plant(world: World | RobotWorld) -> Plant:
+def make_plant(world: World) -> Plant:
     """Connect to a world; it must outlive the plant, which holds addresses of its memory."""
     model, data = world.model, world.data
     a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in MOTOR_JOINTS)

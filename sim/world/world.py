@@ -1,4 +1,4 @@
-"""The world: the compiled MuJoCo model of Phantom and figure, its state, and setting its initial state."""
+"""The world: the compiled MuJoCo model of Phantom and figure or robot arm, its state, and its initial state."""
 
 from copy import copy
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
-from models.humanoid.skeleton import N_POSE, N_TANGENT, figure_model
+from models.humanoid.skeleton import figure_model
 from models.phantom.kinematics import (
     Quat,
     gimbal_angles,
@@ -18,29 +18,42 @@ from models.phantom.kinematics import (
     vector_to_device_frame,
     within_limits,
 )
-from models.world.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world_model
+from models.robot_arm.spec import ARM_JOINTS, arm_model
+from models.world.scene import (
+    FIGURE,
+    PHANTOM,
+    ROBOT,
+    SceneConfig,
+    device_world_model,
+    robot_world_model,
+    world_model,
+)
 from sim.errors import SimError
 
 FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]
 """The figure in a world: simulated physically; kinematic, its pose h(p) only evaluated and recorded; or none."""
+BodyKind: TypeAlias = Literal[FigureKind, "robot"]
+"""What follows the hand in a world: a figure of some kind, or a robot arm."""
+
+_FIRST_JOINTS: dict[BodyKind, str] = {"physical": FIGURE + "root", "robot": ROBOT + ARM_JOINTS[0]}
 
 
 @dataclass(frozen=True)
 class World:
-    """One MuJoCo model with Phantom and figure, and its state.
+    """One MuJoCo model with Phantom and figure or robot arm, and its state.
 
     Parameters
     ----------
     config : SceneConfig
-        Stature, mass, servo period and physics step.
-    kind : FigureKind
+        Stature and mass of the figure, servo period and physics step.
+    kind : BodyKind
         ``physical``: the figure is simulated together with the Phantom. ``kinematic``: it is not in the physics, and is
-        shown in the animation's pose. ``none``: there is no figure.
+        shown in the animation's pose. ``none``: there is no figure. ``robot``: a robot arm is simulated in its place.
 
     Attributes
     ----------
-    figure : MjModel
-        Model of the figure alone; poses and tangents of animations are its qpos and qvel.
+    body : MjModel
+        Model of the figure, or of the robot arm, alone; poses and tangents of animations are its qpos and qvel.
 
     Raises
     ------
@@ -51,18 +64,18 @@ class World:
     """
 
     config: SceneConfig = field(default_factory=SceneConfig)
-    kind: FigureKind = "physical"
+    kind: BodyKind = "physical"
     model: mujoco.MjModel = field(init=False, repr=False)
     data: mujoco.MjData = field(init=False, repr=False)
-    figure: mujoco.MjModel = field(init=False, repr=False)
+    body: mujoco.MjModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(FigureKind):
-            raise SimError(f"figure is {self.kind!r}; expected one of {', '.join(get_args(FigureKind))}")
-        model, figure = (copy(compiled) for compiled in _models(self.config, self.kind))
+        if self.kind not in get_args(BodyKind):
+            raise SimError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(BodyKind))}")
+        model, body = (copy(compiled) for compiled in _models(self.config, self.kind))
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "data", mujoco.MjData(model))
-        object.__setattr__(self, "figure", figure)
+        object.__setattr__(self, "body", body)
 
     def reset(
         self,
@@ -72,20 +85,21 @@ class World:
         v_H: Array | None = None,
         velocity: Array | None = None,
     ) -> None:
-        """Put the stylus at a point and the figure in a pose, at rest or in motion.
+        """Put the stylus at a point and the body in a pose, at rest or in motion.
 
         Parameters
         ----------
         p_H : Array
             Stylus tip in the hand frame [m], shape (3,).
         pose : Array
-            The figure's pose, shape (75,); used only if it is in the physics.
+            Pose of the figure, shape (75,), or joint angles of the arm [rad], shape (7,); used only if the body is in
+            the physics.
         q_HS : Quat, optional
             Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
         v_H : Array, optional
             Velocity of the stylus tip [m/s], shape (3,); by default it rests.
         velocity : Array, optional
-            The figure's velocity, shape (57,); by default it rests.
+            Velocity of the body, shape (57,) or (7,); by default it rests.
 
         Raises
         ------
@@ -93,17 +107,17 @@ class World:
             If the Phantom cannot reach the point.
         """
         place_stylus(self.model, self.data, p_H, q_HS, v_H)
-        if self.simulates_figure:
-            velocity_at = int(self.model.joint(FIGURE + "root").dofadr[0])
-            self.data.qpos[self.pose_at : self.pose_at + N_POSE] = pose
+        if self.kind in _FIRST_JOINTS:
+            velocity_at = int(self.model.joint(_FIRST_JOINTS[self.kind]).dofadr[0])
+            self.data.qpos[self.pose_at : self.pose_at + len(pose)] = pose
             if velocity is not None:
-                self.data.qvel[velocity_at : velocity_at + N_TANGENT] = velocity
+                self.data.qvel[velocity_at : velocity_at + len(velocity)] = velocity
         mujoco.mj_forward(self.model, self.data)
 
     @property
     def has_figure(self) -> bool:
         """Whether there is a figure, in the physics or only shown."""
-        return self.kind != "none"
+        return self.kind in ("physical", "kinematic")
 
     @property
     def simulates_figure(self) -> bool:
@@ -112,10 +126,10 @@ class World:
 
     @property
     def pose_at(self) -> int:
-        """Index of the figure's pose in a recorded configuration; if not in the physics, it is appended to qpos."""
-        if not self.simulates_figure:
+        """Index of the body's pose in a recorded configuration; if not in the physics, it is appended to qpos."""
+        if self.kind not in _FIRST_JOINTS:
             return int(self.model.nq)
-        return int(self.model.joint(FIGURE + "root").qposadr[0])
+        return int(self.model.joint(_FIRST_JOINTS[self.kind]).qposadr[0])
 
     def full_model(self) -> mujoco.MjModel:
         """The model of recorded configurations: with the figure if there is one, whether in the physics or not."""
@@ -173,8 +187,10 @@ def place_stylus(
 
 
 @lru_cache(maxsize=8)
-def _models(config: SceneConfig, kind: FigureKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
-    """The compiled models of world and figure, cached; every world takes a copy of them."""
+def _models(config: SceneConfig, kind: BodyKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
+    """The compiled models of world and body, cached; every world takes a copy of them."""
+    if kind == "robot":
+        return robot_world_model(config), arm_model()
     model = world_model(config) if kind == "physical" else device_world_model(config)
     return model, figure_model(config.stature, config.mass)
 

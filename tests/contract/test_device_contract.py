@@ -13,7 +13,8 @@ from sim.devices.device import read_device
 from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange, exchange
 from sim.devices.replayed import recorded_hand, replayed_hand
 from sim.errors import SimError
-from sim.loop.loop import Loop, groups, record_into, tick_channels
+from sim.loop.channels import groups, record_into, tick_channels
+from sim.loop.loop import Loop
 from sim.loop.servo import Servo, rearm_servo
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording

@@ -7,7 +7,8 @@ from controllers.safety.faults import FAULT_RAMP
 from sim.devices.driver import Driver
 from sim.devices.exchange import exchange
 from sim.hardware.gated_servo import Ticker
-from sim.loop.loop import Loop, tick_channels
+from sim.loop.channels import tick_channels
+from sim.loop.loop import Loop
 from tests.devices.rig import Rig
 from tests.sim.bare_servos import CUTOFF, bare_servo, device_world, run, simulated
 from tests.sim.hardware.emulation import AT_ONCE, gated_servo

@@ -199,7 +199,7 @@ def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
 
 @pytest.mark.parametrize(
     ("command", "implementation"),
-    [(["arm"], "runs.run_arm.run_arm"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
+    [(["arm"], "runs.run.run"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
 )
 def test_an_interrupted_run_of_arm_or_device_says_where_its_recording_is(
     command: list[str],

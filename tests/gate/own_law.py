@@ -10,7 +10,7 @@ import numpy as np
 
 import hvf
 from experiments.config.words import run_config
-from sim.loop.loop import groups, record_into
+from sim.loop.channels import groups, record_into
 from sim.recording.recorder import Recorder
 from tests.loop_with_law import loop_with
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from experiments.results.folder import config_of
 from experiments.setups.wiring import wire
 from sim.devices.replayed import recorded_hand, replayed_hand
-from sim.loop.loop import Loop, groups, record_into
+from sim.loop.channels import groups, record_into
+from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 

@@ -1,19 +1,27 @@
-"""FOLLOW leads a robot arm through the same loop, map and device as it does the figure."""
+"""Fields lead a robot arm through the same loop and device as they do the figure."""
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+import hvf
 from experiments.cli import main
-from experiments.config.part import from_file
-from experiments.config.run_config import ArmConfig
-from experiments.setups.robot_arm import HOME, SCALE, wire_arm
+from experiments.config.run_config import load_config
+from experiments.config.words import run_config
+from experiments.results.pages.report_of import write_report_of
+from experiments.setups.parts.defaults import resolved
+from experiments.setups.robot_arm import HOME
+from experiments.setups.wiring import wire
 from models.world.scene import PEDESTAL
+from sim.body.robot import RobotState
+from sim.loop.channels import channels
 from sim.loop.loop import Loop
+from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recording import Recording
 
 
@@ -28,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
     with Recording(folder / "run.h5") as recording:
         t, tool = recording.channel("frames", "t")[:], recording.channel("frames", "tool")[:]
-        curve = HOME + [0.0, 0.0, PEDESTAL] + SCALE * recording.array("curve")
+        curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.array("curve")
     away = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
     alone = (t > 1.0) & (t < 4.4)
     assert away[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm
@@ -37,19 +45,21 @@ def test_the_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) 
 
 @pytest.mark.slow
 def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> None:
-    summary = json.loads((folder / "summary.json").read_text())
+    summary = json.loads((folder / "summary.json").read_text())["arm"]
     assert summary["tool_rms_mm"] < 0.2
     assert summary["tool_max_mm"] < 0.5
     assert summary["joints_rms_deg"] < 0.05
     assert summary["torque_share"] < 0.3
     assert summary["nearest_limit_deg"] > 20.0
     assert (folder / "report.html").exists()
-    assert (folder / "arm.png").exists()
+    assert (folder / "figures" / "arm.png").exists()
 
 
 @pytest.mark.slow
 def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert from_file(ArmConfig, folder / "config.json") == ArmConfig(seconds=8.0)
+    config = load_config(folder / "config.json")
+    assert replace(config, user=run_config().user) == resolved(run_config(map="robot-arm", seconds=8.0))
+    assert config.user.does == "push"
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 8000 ticks" in capsys.readouterr().out
     page = (folder / "report.html").read_text(encoding="utf-8")
@@ -61,7 +71,7 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
     with h5py.File(altered / "run.h5", "r+") as file:
         config = json.loads(file["config"][()])
         del file["config"]
-        file["config"] = json.dumps(config | {"stiffness": 301.0})
+        file["config"] = json.dumps(config | {"mode": config["mode"] | {"stiffness": 301.0}})
     assert main(["reproduce", str(altered)]) == 1
     assert "differs first at" in capsys.readouterr().out
 
@@ -69,16 +79,104 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
 @pytest.mark.slow
 def test_a_weak_motor_gives_way_at_its_limit_and_says_so() -> None:
     """The tracking above is the motors' doing: with a tenth of the shoulder's torque the arm hangs behind."""
-    servo, world, _ = wire_arm(ArmConfig(seconds=1.5, user="relaxed"))
+    session = wire(run_config(map="robot-arm", seconds=1.5))
+    servo = session.servo
+    assert isinstance(servo.figure, RobotState)
     servo.figure.torque_limit[1] = 10.0
-    Loop(servo, world).run(0.5)
+    Loop(servo, session.world).run(0.5)
     assert abs(servo.figure.ctrl[1]) <= 10.0
     assert servo.figure.report[1] >= 1.0
     assert np.abs(servo.figure.qpos - servo.reference.pose).max() > 0.1
 
 
 def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for flags in (["--seconds", "0"], ["--arm-ticks", "0"], ["--radius", "0.5"], ["--lap", "nan"]):
+    for flags in (["--seconds", "0"], ["--figure-ticks", "0"], ["--radius", "0.5"], ["--lap", "nan"]):
         assert main(["arm", *flags, "--out", str(tmp_path / "run")]) == 2
         assert "Traceback" not in capsys.readouterr().err
         assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--figure kinematic", "a robot arm takes the figure's place; leave out --figure kinematic"),
+        (
+            "--stature 1.75",
+            "--stature 1.75 has no meaning with a robot arm; it belongs to --figure physical,",
+        ),
+        ("--blend 0.4", "--blend 0.4 has no meaning with a robot arm"),
+        ("--clips walk", "--clips has no meaning with --mode follow --map robot-arm; it belongs to --map cylindrical"),
+        ("--walls", "--walls is for a figure, and a robot arm is in its place"),
+        ("--governor", "--governor is for a figure, and a robot arm is in its place"),
+        ("--mode lead", "leave out --map robot-arm"),
+        ("--scale -1", "--scale is -1; expected more than 0"),
+    ],
+)
+def test_what_has_no_meaning_for_an_arm_is_refused(
+    words: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["run", "--map", "robot-arm", *words.split(), "--out", str(out)]) == 2
+    assert said in capsys.readouterr().err
+    assert not out.exists()
+    assert main(["arm", "--map", "cylindrical", "--out", str(out)]) == 2
+    assert "the map cylindrical moves a figure; expected --map robot-arm" in capsys.readouterr().err
+    assert main(["live", "--map", "robot-arm", "--out", str(out)]) == 2
+    assert "the live page shows a figure" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["bunny", "rivers", "stretch"])
+def test_every_field_leads_the_arm(mode: str) -> None:
+    """By MuJoCo's own kinematics, the tool is where the stylus is, scaled; it lags by the filter between the two."""
+    session = wire(run_config(mode, "robot-arm", seconds=4.0, figure_ticks=4))
+    apart: list[np.ndarray] = []
+    of_block = channels(session.servo, session.world)
+
+    def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        block = of_block(ticks, frames, n)
+        tool = block["frames"]["tool"] - HOME - [0.0, 0.0, PEDESTAL]
+        apart.append(np.linalg.norm(tool - 1.5 * block["ticks"]["p"][::4], axis=1))
+
+    Loop(session.servo, session.world, keep).run(4.0)
+    away = np.concatenate(apart)[250:]
+    assert 1e-6 < away.max() < 4e-3
+
+
+@pytest.mark.slow
+def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
+    """One's own law beside FOLLOW, with the tool at a smaller scale: recorded, stepped and drawn as any run."""
+    curve = hvf.circle(radius=0.04, lap=4.0)
+
+    @hvf.law
+    def floor(hand: hvf.HandState, k: float = 500.0) -> tuple[float, float, float]:
+        return 0.0, 0.0, max(0.0, -k * (hand.p[2] + 1e-3))
+
+    arm = hvf.RobotArm(around=curve, scale=1.0)
+    sim = hvf.Simulation(field=(hvf.Follow(curve, k_r=300, b_d=8) + floor).limited(8.0), haptic_map=arm)
+    run = sim.run(2.5, record=tmp_path / "run")
+    assert run.summary.arm is not None
+    assert run.summary.arm.tool_rms_mm < 0.2
+    assert run.summary.animation is None
+    assert run.summary.figure is None
+    tool = run.frames["tool"] - HOME - [0.0, 0.0, PEDESTAL]
+    p = run.ticks["p"][:: round(len(run.ticks["p"]) / len(tool))]
+    assert np.linalg.norm(tool - p, axis=1)[500:].max() < 4e-3  # at a scale of one, and not of one and a half
+    assert np.linalg.norm(p[500:], axis=1).min() > 0.03
+    tick = next(iter(sim))
+    assert tick.pose.shape == tick.figure.shape == (7,)
+    with pytest.raises(hvf.SimError, match="no figure, and so no animation"):
+        run.to_bvh(tmp_path / "edited.bvh")
+    write_report_of(tmp_path / "run")
+    assert "robot arm" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+
+
+def test_an_arm_beside_a_figure_s_numbers_is_refused_in_python() -> None:
+    curve = hvf.circle(radius=0.04, lap=4.0)
+    river = hvf.Follow(curve, k_r=300, b_d=8)
+    for figure, said in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):
+        with pytest.raises(hvf.ParameterError, match=said):
+            hvf.Simulation(field=river, haptic_map=hvf.RobotArm(around=curve), figure=figure)
+    for name, value in (("scale", -1.0), ("reach", 0.0), ("scale", float("nan"))):
+        with pytest.raises(hvf.ParameterError, match=f"{name} is"):
+            hvf.RobotArm(**{"around": curve, name: value})

@@ -5,7 +5,7 @@ from typing import Any
 import viser
 
 from controllers.errors import ParameterError
-from experiments.config.maps import MAPS, Led, MapFile
+from experiments.config.maps import MAPS, Led, MapFile, RobotArm
 from experiments.config.modes import MODES
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
@@ -38,7 +38,7 @@ class RunPanel:
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, config: RunConfig):
         self._gui, self._desk, self._acts = gui, desk, acts
         modes = tuple(mode.__pydantic_fields__["kind"].default for mode in MODES)  # pyright: ignore
-        maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS)  # pyright: ignore
+        maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS if kind is not RobotArm)  # pyright: ignore
         self._file = config.map.file if isinstance(config.map, MapFile) else ""
         with gui.add_folder("Run"):
             self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)

@@ -44,8 +44,8 @@ from models.errors import ModelError
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
 from sim.errors import SimError
+from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
-from sim.loop.loop import configuration_size, shown_configuration
 
 PICTURE = 0.012  # [s] least time between two pictures: every other block of 8 ms, so that each of the page's is new
 SLICE = 0.25  # [s] between two computations of the field's slice

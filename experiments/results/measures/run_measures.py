@@ -7,6 +7,7 @@ import numpy as np
 
 from controllers.state import Array, Mask
 from experiments.results.folder import scene_of
+from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.faults import fault_lines
@@ -51,7 +52,7 @@ def summarise(
     Parameters
     ----------
     recording : Recording
-        Recording with the channels of `sim.loop.loop.groups`, and the arrays ``curve_span`` (first and last phase),
+        Recording with the channels of `sim.loop.channels.groups`, and the arrays ``curve_span`` (first and last phase),
         ``curve_closed``, ``clip_seconds`` (duration of a lap at the clips' own pace, NaN where a lap plays no clip),
         ``scene``, ``body_weight`` and ``com_height``.
     default_poses : callable
@@ -66,6 +67,7 @@ def summarise(
     return RunSummary(
         path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
         oscillation=oscillation_summary(recording), trace=_replay_summary(recording),
+        arm=arm_summary(recording) if "tool" in recording.groups["frames"] else None,
     )  # fmt: skip
 
 
@@ -83,6 +85,8 @@ def measured(
         FigureMeasure(recording),
     )
     tank = TankSummary(math.inf, 0)
+    physical = "joint_error" in recording.groups["frames"]
+    shown = physical or recording.texts.get("figure") == "kinematic"
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
     rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
     begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)
@@ -92,14 +96,13 @@ def measured(
         ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
         frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
         pushed = path.add(ticks)
-        if "reference" in frames:
+        if shown:
             default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
             animation.add(frames, default, pushed[::per_frame])
-        if "joint_error" in frames:
+        if physical:
             figure.add(frames)
         least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
         tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
-    shown, physical = (name in recording.groups["frames"] for name in ("reference", "joint_error"))
     return path.summary(), animation.summary() if shown else None, figure.summary() if physical else None, tank
 
 

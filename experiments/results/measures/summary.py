@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from experiments.results.measures.arm_summary import ArmSummary
 from experiments.results.measures.changes import RiverChange
 from experiments.results.measures.lead_measures import LeadSummary
 from experiments.results.measures.oscillation import OscillationSummary
@@ -42,6 +43,8 @@ class RunSummary:
         How the hand traced the curve by itself, or moved as it was recorded, if it did.
     oscillation : OscillationSummary or None
         Measured stability of the loop.
+    arm : ArmSummary or None
+        How a robot arm followed the stylus, if one did.
     """
 
     path: PathSummary
@@ -58,6 +61,7 @@ class RunSummary:
     performance: PerformanceSummary | None = None
     trace: TraceSummary | ReplaySummary | None = None
     oscillation: OscillationSummary | None = None
+    arm: ArmSummary | None = None
 
     def lines(self) -> list[str]:
         """Summary in words, one sentence per line."""
@@ -77,6 +81,7 @@ class RunSummary:
             *([went] if (went := self.path.line()) else []),
             *([] if self.animation is None else [self.animation.soles()]),
             *([] if figure is None else figure.lines()),
+            *([] if self.arm is None else self.arm.lines()),
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
             f"MuJoCo's warnings: {warned}.",
         ]

@@ -3,19 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.state import Array
-from models.world.scene import PEDESTAL
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 
 
-def arm_figure(recording: Recording, home: Array, scale: float) -> Figure:
-    """Path of the tool over the scaled curve of the stylus, and the tracking error of the tool over time.
-
-    The curve is scaled by `scale` about the home position of the tool [m].
-    """
+def arm_figure(recording: Recording) -> Figure:
+    """Path of the tool over the scaled curve of the stylus, and the tracking error of the tool over time."""
     t, tool, led = (recording.channel("frames", name)[:] for name in ("t", "tool", "led"))
-    curve = home + [0.0, 0.0, PEDESTAL] + scale * recording.array("curve")
+    curve = recording.array("tool_home") + recording.array("tool_scale") * recording.array("curve")
     ticks, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     path, error = figure.subplots(1, 2, width_ratios=(1, 1.6))
@@ -26,5 +21,5 @@ def arm_figure(recording: Recording, home: Array, scale: float) -> Figure:
     error.plot(t, 1e3 * np.linalg.norm(tool - led, axis=1), color=FIELD, label="tool from where it is led [mm]")
     error.plot(ticks, np.linalg.norm(user, axis=1), color=USER, label="force of the hand [N]")
     error.set(xlabel="time [s]", ylim=(0.0, None), title="tracking")
-    error.legend()
+    error.legend(loc="upper left")
     return figure

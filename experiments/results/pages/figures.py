@@ -21,6 +21,7 @@ from matplotlib.patches import Circle
 
 from controllers.state import Array, Mask
 from experiments.results.measures.changes import river_changes
+from experiments.results.pages.arm_figure import arm_figure
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
@@ -64,10 +65,11 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
         "deviation": deviation_figure,
         "forces": forces_figure,
         "torques": torques_figure,
-        "figure": tracking_figure,
     }
-    if "joint_error" not in recording.groups["frames"]:
-        del drawings["figure"]  # there was no physical figure
+    if "joint_error" in recording.groups["frames"]:
+        drawings["figure"] = tracking_figure
+    if "tool" in recording.groups["frames"]:
+        drawings = {"arm": arm_figure, **drawings}
     for name, draw in drawings.items():
         with mpl.rc_context(STYLE):
             drawing = draw(recording)

@@ -11,7 +11,7 @@ from experiments.results.pages.plots import plots_html
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
-from sim.viewer.replay_html import FIGURE_TARGET, MAGNIFICATION, SECONDS, Target, drawn_tube, replay_html
+from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
 
 _STYLE = """
 ul { margin: 0 0 1rem; padding-left: 1.2rem; }
@@ -39,7 +39,6 @@ their true size.</p>
 
 def write_report(
     path: Path, recording: Recording, model: mujoco.MjModel, title: str, lines: Sequence[str], figures: Sequence[Path],
-    target: Target = FIGURE_TARGET,
 ) -> None:  # fmt: skip
     """Write the report of a run.
 
@@ -57,8 +56,6 @@ def write_report(
         What happened, one sentence per line.
     figures : sequence of Path
         PNG files, which are embedded in the page.
-    target : Target
-        The mechanism that follows the animation: the figure or the robot arm.
 
     Raises
     ------
@@ -72,7 +69,7 @@ def write_report(
     tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
     body = _BODY.format(
         lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
-        replay=html.escape(replay_html(recording, model, target)),
+        replay=html.escape(replay_html(recording, model)),
         replayed=replayed,
         plots=plots_html(recording),
         curves=_curves(recording, tube),

@@ -78,7 +78,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
         tank=tank_for(power, field.springs, maps.reach, limiter),
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),
-        remarks=turning_remark(user, maps.expressive), summarise=_traced if traces else lambda summary, of: summary,
+        remarks=turning_remark(user, maps.oriented), summarise=_traced if traces else lambda summary, of: summary,
     )  # fmt: skip
 
 

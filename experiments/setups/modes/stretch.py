@@ -130,7 +130,7 @@ def _parts(
         gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
         # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
-        remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.expressive),
+        remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.oriented),
     )  # fmt: skip
 
 

@@ -173,9 +173,9 @@ def handled(user: User) -> tuple[tuple[float, float], ...]:
     return tuple((grab.at, grab.end) for grab in user.grabs)
 
 
-def turning_remark(user: User, expressive: bool) -> tuple[str, ...]:
+def turning_remark(user: User, oriented: bool) -> tuple[str, ...]:
     """Remark, if the hand turns the stylus on a map that ignores its orientation."""
-    if user.does == "turn" and not expressive:
+    if user.does == "turn" and not oriented:
         return ("the hand turns the stylus, and this map does not look at that; --expressive does",)
     return ()
 

@@ -26,6 +26,7 @@ from sim.recording.recording import Recording
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
+from sim.world.world import BodyKind
 
 Map = TypeVar("Map", bound=HapticMap, covariant=True)
 Static = Mapping[str, npt.ArrayLike | str]
@@ -53,6 +54,11 @@ class Settings(Protocol):
     @property
     def seed(self) -> int:
         """Seed of the stylus's exact start position."""
+        ...
+
+    @property
+    def body(self) -> BodyKind:
+        """What follows the hand."""
         ...
 
     @property
@@ -103,7 +109,9 @@ class MapParts(Generic[Map]):
     moves : bool
         Whether a run begins in motion: a walk at full speed cannot begin from rest.
     expressive : bool
-        Whether the stylus's orientation turns the figure.
+        Whether gaze and lean of the figure follow the stylus's orientation.
+    turning : bool
+        Whether the map itself takes the stylus's orientation.
     plays_rivers : bool
         Whether every river plays a clip of its own.
     size : float
@@ -122,10 +130,16 @@ class MapParts(Generic[Map]):
     lap_seconds: float | None = None
     moves: bool = False
     expressive: bool = False
+    turning: bool = False
     plays_rivers: bool = False
     size: float = 1.0
     remarks: tuple[str, ...] = ()
     static: Static = field(default_factory=dict)
+
+    @property
+    def oriented(self) -> bool:
+        """Whether the stylus's orientation moves anything."""
+        return self.expressive or self.turning
 
     @property
     def whole_map(self) -> HapticMap:

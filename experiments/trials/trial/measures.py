@@ -162,7 +162,7 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
         return {}
     return {
         "expressiveness": _rms(geodesic_distance(default[chosen], edited[chosen])),
-        "expressiveness_seen": 1e2 * _rms(seen_distance(default[chosen], edited[chosen], session.world.figure)),
+        "expressiveness_seen": 1e2 * _rms(seen_distance(default[chosen], edited[chosen], session.world.body)),
     }
 
 

@@ -23,7 +23,8 @@ from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import measured_trial
 from experiments.trials.trial.trial_log import TrialLog
 from models.mocap.motion.clip import Clip
-from sim.loop.loop import Loop, groups, record_into
+from sim.loop.channels import groups, record_into
+from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 
 State = Literal["done", "failed"]

@@ -4,7 +4,7 @@ import numpy as np
 
 from controllers.state import Array
 from sim.body.figure_state import FigureState
-from sim.loop.loop import frame_channels, tick_channels
+from sim.loop.channels import frame_channels, tick_channels
 from sim.loop.servo import FrameLog, Servo, TickLog
 from sim.world.world import World
 
@@ -17,7 +17,7 @@ class TrialLog:
     Attributes
     ----------
     ticks, frames : dict of str to Array
-        Data by channel, with the names of `sim.loop.loop.groups`; without a figure `frames` is empty, and for a
+        Data by channel, with the names of `sim.loop.channels.groups`; without a figure `frames` is empty, and for a
         kinematic figure it has no errors and forces.
     """
 

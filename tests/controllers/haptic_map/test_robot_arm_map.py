@@ -4,16 +4,18 @@ import mujoco
 import numpy as np
 import pytest
 
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.rotations import exponential, multiply
-from experiments.setups.robot_arm import HOME, ORIENTATION, SCALE, robot_arm_map
+from experiments.setups.robot_arm import HOME, ORIENTATION, arm_parts, tilted
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
 from sim.compilation.kernel_units import map_units
 
-MODEL = arm_model()
-MAP = robot_arm_map()
+MODEL, SCALE = arm_model(), 1.5
+LIMITS = arm_limits(MODEL)
+MAP = arm_parts(MODEL, tilted(Trajectory.circle(0.05, 4.0)), 0.025, SCALE).haptic_map
 
 
 def random_stylus(rng: np.random.Generator, distance: float, angle: float):
@@ -102,10 +104,10 @@ def test_the_servo_s_dispatch_is_the_same_map():
 
 def test_a_domain_that_the_arm_cannot_serve_is_refused_with_the_place():
     with pytest.raises(ParameterError, match=r"cannot follow a stylus at .* mm turned by"):
-        RobotArm(arm_lengths(MODEL), arm_limits(MODEL), HOME, ORIENTATION, 6.0, (0.07, 0.1), (0.25, 0.45), 0.5)
+        RobotArm(arm_lengths(MODEL), HOME, ORIENTATION, 6.0, (0.07, 0.1), (0.25, 0.45), 0.5).check_domain(LIMITS)
 
 
 @pytest.mark.parametrize(("reach", "scale"), [((0.1, 0.1), 1.0), ((0.07, 0.1), -1.0), ((0.07, np.nan), 1.0)])
 def test_numbers_out_of_their_interval_are_refused(reach, scale):
     with pytest.raises(ParameterError, match=r"robot arm|expected positive"):
-        RobotArm(arm_lengths(MODEL), arm_limits(MODEL), HOME, ORIENTATION, scale, reach, (0.25, 0.45), 0.5)
+        RobotArm(arm_lengths(MODEL), HOME, ORIENTATION, scale, reach, (0.25, 0.45), 0.5)

@@ -9,7 +9,7 @@ import pytest
 
 from controllers.errors import ParameterError
 from experiments.cli import main
-from experiments.config.maps import MAPS, Circle, Composite, Cylindrical, Led, MapFile, RiverClips
+from experiments.config.maps import MAPS, Circle, Composite, Cylindrical, Led, MapFile, RiverClips, RobotArm
 from experiments.config.modes import (
     MODES,
     Bunny,
@@ -24,7 +24,6 @@ from experiments.config.modes import (
 )
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole
 from experiments.config.run_config import (
-    ArmConfig,
     Clock,
     Figure,
     Phantom,
@@ -41,7 +40,7 @@ from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
 from sim.users.person.population import persona
 
-PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Replay, Clock, RunConfig, ArmConfig)
+PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Replay, Clock, RunConfig)
 NEEDED: dict[type, dict[str, object]] = {MapFile: {"file": "map.npz"}, Replay: {"run": "runs/mine"}}
 PUSHES = (Push(0.5, 0.3, -2.0), Push(1.0, 0.2, 1.0, (0.0, 0.0, 1.0), (0.05, 0.0, 0.0)))
 TURNS, GRABS = (Turn(0.0, 1.0, 0.5, (0.0, 0.0, 1.0)),), (Grab(1.0, (0.0, 0.01, 0.0), place=(0.05, 0.0, 0.0)),)
@@ -96,7 +95,7 @@ def test_no_number_of_a_configuration_is_without_an_interval() -> None:
 
 def test_all_that_a_run_is_made_of_is_looked_at() -> None:
     """What is in a configuration, however deep, is one of the parts above."""
-    found, waiting = set[type](), [RunConfig, ArmConfig]
+    found, waiting = set[type](), [RunConfig]
     while waiting:
         cls = waiting.pop()
         found.add(cls)
@@ -155,7 +154,7 @@ def test_parts_do_not_change() -> None:
 def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
     assert run_config(seed=2**63 - 1).seed == 2**63 - 1
     text = to_json(run_config()).replace('"seed": 1', f'"seed": {seed}')
-    for make in (lambda: run_config(seed=seed), lambda: ArmConfig(seed=seed), lambda: from_json(RunConfig, text, "c")):
+    for make in (lambda: run_config(seed=seed), lambda: from_json(RunConfig, text, "c")):
         with pytest.raises(ParameterError, match=rf"--seed is {seed}; expected less than {2**63}"):
             make()
 
@@ -166,8 +165,8 @@ def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
         ({"stifness": 3.0}, "--stifness is not known; there are "),
         ({"river_stiffness": 3.0}, "--river-stiffness is not known; there are "),
         ({"mode": "folow"}, "no mode 'folow'; there are follow, bunny, rivers, stretch, stretch-then-follow, lead"),
-        ({"map": "cylinder"}, "no map 'cylinder'; there are cylindrical, composite, rivers, or give a file"),
-        ({"map": "file"}, "no map 'file'; there are cylindrical, composite, rivers, or give a file"),
+        ({"map": "cylinder"}, "no map 'cylinder'; there are cylindrical, composite, rivers, robot-arm, or give a file"),
+        ({"map": "file"}, "no map 'file'; there are cylindrical, composite, rivers, robot-arm, or give a file"),
         ({"user": "lead"}, "no user 'lead'; there are relaxed, trace, push, turn"),
         ({"mode": "bunny", "tube": 0.1}, "--tube has no meaning with --mode bunny; it belongs to --mode follow, "),
         ({"bunny_width": 0.1}, "--bunny-width has no meaning with --mode follow; it belongs to --mode bunny"),
@@ -223,6 +222,8 @@ def _every_config() -> list[RunConfig]:
     ]
     made += [RunConfig(mode=lead, map=Led(clips=clips), user=User(does="lead"))
              for lead, clips in ((Lead(), ("walk",)), (Lead(leash=90.0, floor_scale=70.0), ("run",)))]  # fmt: skip
+    arm, by_arm = RobotArm(around=Circle(lap=3.0), reach=0.02, scale=1.2), Figure(smoothing=5.0, figure_ticks=4)
+    made += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
     made.append(RunConfig(
         figure=Figure(stature=1.6, mass=60.0, smoothing=5.0, figure_ticks=4, blend=0.0), device=Phantom(cutoff=99.0),
         clock=Clock(servo_period=2e-3, physics_step=5e-4), seconds=3.0, seed=2**63 - 1,

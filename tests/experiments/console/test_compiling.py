@@ -8,10 +8,9 @@ import pytest
 from numba import typeof, types
 from rich.console import Console
 
-from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.console.compiling import compile_once
-from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
 from sim.compilation import side_by_side
 from sim.compilation.unit_workers import compile_units, missing_units
@@ -93,7 +92,7 @@ def test_a_unit_is_a_function_of_a_module():
 
 def test_a_robot_arm_says_what_it_needs_before_it_is_made():
     with pytest.raises(_Told) as told:
-        wire_arm(ArmConfig(), _stop)
+        wire(run_config(map="robot-arm"), ready=_stop)
     assert _names(told.value.args[0]) == [
         "run_block", "update_reference", "robot_torque", "robot_arm_map", "follow_wrench", "_poses_along",
     ]  # fmt: skip

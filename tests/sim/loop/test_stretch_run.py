@@ -19,7 +19,8 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.motion.clip import pose_difference
 from sim.errors import SimError
-from sim.loop.loop import Loop, groups
+from sim.loop.channels import groups
+from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording

@@ -42,7 +42,7 @@ def test_the_figure_has_its_velocity_and_after_a_step_has_gone_on_by_it():
     mujoco.mj_step(world.model, world.data)
     moved = np.empty(N_TANGENT)
     mujoco.mj_differentiatePos(
-        world.figure, moved, world.model.opt.timestep, pose, world.data.qpos[first : first + len(pose)].copy()
+        world.body, moved, world.model.opt.timestep, pose, world.data.qpos[first : first + len(pose)].copy()
     )
     # Gravity and passive joints change it by no more than a step's share.
     np.testing.assert_allclose(moved[:3], velocity[:3], atol=2e-2)

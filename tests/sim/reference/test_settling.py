@@ -17,7 +17,8 @@ from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.motion.clip import pose_difference
 from models.world.scene import FIGURE
-from sim.loop.loop import Loop, pose_errors
+from sim.loop.channels import pose_errors
+from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.reference.reference import make_reference, reference_along
 from sim.reference.settling import approach, lower_to_floor, lowering_goal
