@@ -37,6 +37,11 @@ def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
     )
 
 
+def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:
+    """The map by which the tool of an arm follows the stylus in front of it, its displacements scaled [1]."""
+    return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, _REACH, _TURN, float(_ARM_ANGLE))
+
+
 def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float) -> ClipMapParts:
     """Map parts of an arm in front of which the tool follows the stylus, about a curve.
 
@@ -59,7 +64,7 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     SimError
         If the Phantom does not reach the curve.
     """
-    made = RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, _REACH, _TURN, float(_ARM_ANGLE))
+    made = robot_arm_map(arm, scale)
 
     def refined() -> tuple[ClipMap, tuple[str, ...]]:
         made.check_domain(arm_limits(arm), _evaluated)

@@ -20,7 +20,7 @@ from sim.reference.reference import map_poses
 from sim.world.world import World
 
 TURN = 2.0 * np.pi
-LEGS = figure_legs(World(SceneConfig()).figure)
+LEGS = figure_legs(World(SceneConfig()).body)
 EMBEDDED = [embedded(name) for name in embedded_names()]
 MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
 

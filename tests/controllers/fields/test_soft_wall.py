@@ -36,7 +36,7 @@ MAP = Cylindrical(
 LIMITS = (np.array([[-0.5, 0.5]] * 3), np.array([[-0.6, 0.9], [-0.5, 0.7], [-0.4, 1.0]]))
 WALL = SoftWall(MAP, (7, 11), (6, 9), LIMITS, K, MARGIN, 0.0)
 BRAKE = SoftWall(MAP, (7, 11), (6, 9), LIMITS, 0.0, MARGIN, DAMPING, SPEED)
-ARM = robot_arm_map()
+ARM = robot_arm_map(arm_model(), 1.5)
 # Limits tighter than the motors', so that the arm meets them in its domain.
 TIGHT = tuple(arm_limits(arm_model())[:, None, :] * 0.4)
 ARM_WALL = SoftWall(ARM, tuple(range(7)), tuple(range(7)), TIGHT, K, MARGIN, 0.0)

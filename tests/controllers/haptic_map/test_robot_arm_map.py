@@ -4,18 +4,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.rotations import exponential, multiply
-from experiments.setups.robot_arm import HOME, ORIENTATION, arm_parts, tilted
+from experiments.setups.robot_arm import HOME, ORIENTATION, robot_arm_map
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
 from sim.compilation.kernel_units import map_units
 
 MODEL, SCALE = arm_model(), 1.5
 LIMITS = arm_limits(MODEL)
-MAP = arm_parts(MODEL, tilted(Trajectory.circle(0.05, 4.0)), 0.025, SCALE).haptic_map
+MAP = robot_arm_map(MODEL, SCALE)
 
 
 def random_stylus(rng: np.random.Generator, distance: float, angle: float):

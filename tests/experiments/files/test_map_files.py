@@ -37,7 +37,7 @@ def clips():
 
 @cache
 def legs():
-    return figure_legs(World(SceneConfig()).figure)
+    return figure_legs(World(SceneConfig()).body)
 
 
 @cache

@@ -19,13 +19,14 @@ from controllers.haptic_map.expressive import EXPRESSIVE
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from controllers.state import HandState
 from experiments.setups.robot_arm import robot_arm_map
+from models.robot_arm.spec import arm_model
 from sim.compilation import kernel_units
 from sim.compilation.kernel_units import law_units, map_units
 from sim.compilation.unit_cache import cache_folder
 from sim.reference.map_derivative import map_derivative
 from sim.reference.reference import poses_along
 
-ARM = robot_arm_map()
+ARM = robot_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
 
 
