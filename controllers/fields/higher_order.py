@@ -10,7 +10,7 @@ from numba import njit
 from controllers.checks import check_kinds, checked
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
-from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
+from controllers.curves.trajectory import END, PERIODIC, START, Trajectory, curve_point, curve_velocity
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.algebra.instructions import TRACE_RIVER, leave_trace
 from controllers.fields.algebra.law import Law, Program
@@ -297,6 +297,11 @@ class HigherOrder(Law):
         checked("admission", self.admission, "m/s", least=1e-6)
         checked("sigma", self.sigma, "m/s", least=1e-6)
         checked("hysteresis", self.hysteresis, "m/s")
+
+    @property
+    def curves(self) -> tuple[Trajectory, ...]:
+        """Curves of the rivers."""
+        return tuple(river.curve for river in self.bundle.rivers)
 
     def _composed(self) -> Program:
         blocks: list[Array] = []

@@ -223,11 +223,10 @@ class Simulation:
 
     def _curve(self) -> Trajectory:
         """Curve of the first law of the field that has one: a user-defined map lies along it."""
-        curves = (getattr(law, "curve", None) for law in self.field.program().laws)
-        found = [curve for curve in curves if isinstance(curve, Trajectory)]
-        if not found:
+        curves = self.field.curves
+        if not curves:
             raise ParameterError("a map of one's own lies along the curve of the field; expected a field with a curve")
-        return found[0]
+        return curves[0]
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()

@@ -1,16 +1,14 @@
 """Wiring: from a configuration to a linked servo with stylus and body in their start state (`wire`)."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from controllers.curves.stylus import UPRIGHT
-from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, HandState
 from controllers.walking.walker import walker_at
@@ -42,7 +40,6 @@ from sim.reference.reference import (
     poses_along,
 )
 from sim.reference.settling import lower_start, lower_start_unit
-from sim.users.hand.arm import Arm
 from sim.users.participant import Participant
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
@@ -123,7 +120,7 @@ def assemble(
         As `wire`.
     """
     draft = parts_of(maps)
-    for curve in _curves(draft):
+    for curve in draft.program.curves:
         reached(curve)
     ready(_units(draft, _servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if anything follows it.
@@ -135,15 +132,6 @@ def assemble(
         servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks)
-
-
-def _curves(parts: Parts) -> Iterator[Trajectory]:
-    """Curves of the laws of a field."""
-    for law in parts.program.laws:
-        if isinstance(law, HigherOrder):
-            yield from (river.curve for river in law.bundle.rivers)
-        elif isinstance(curve := getattr(law, "curve", None), Trajectory):
-            yield curve
 
 
 def check_rates(settings: Settings) -> None:
@@ -191,12 +179,8 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
         step = config.clock.physics_step
-        if isinstance(parts.user, Arm):
-            parts.user.check_step(step)
-        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, step)
-        device = simulated_phantom(
-            phantom_port(world.model, world.data, period, phantom_of(config.device).cutoff), user
-        )
+        port = phantom_port(world.model, world.data, period, phantom_of(config.device).cutoff)
+        device = simulated_phantom(port, parts.user.holding(period, step))
     else:
         device = device_of(world)
     body, reference = body_of(parts, world, compiled)

@@ -43,7 +43,7 @@ class Participant:
     turns: tuple[()] = ()
     """None: a person lets the gimbal swing."""
 
-    def compiled(self, period: float, physics_step: float) -> PersonState:
+    def holding(self, period: float, physics_step: float) -> PersonState:
         """The person's state for the servo loop, without the address of her compiled time step.
 
         Parameters

@@ -52,6 +52,12 @@ class Law(ABC):
         """Compiled form of the field, which the servo runs."""
         return self._program
 
+    @property
+    def curves(self) -> tuple[Trajectory, ...]:
+        """Curves along which the field leads, in the order of its laws; none of a law without a curve."""
+        curve = getattr(self, "curve", None)
+        return (curve,) if isinstance(curve, Trajectory) else ()
+
     def wrench(self, hand: HandState) -> Wrench:
         """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
         of_kind("hand", hand, HandState)
@@ -197,6 +203,11 @@ class Program(Law):
                 f"a field of {len(laws)} laws with the codes {laws} needs their kernels and names; "
                 f"got {len(self.kernels)} kernels and {len(self.laws)} laws"
             )
+
+    @property
+    def curves(self) -> tuple[Trajectory, ...]:
+        """Curves along which the laws lead, in their order."""
+        return tuple(curve for law in self.laws for curve in law.curves)
 
     def __repr__(self) -> str:
         joins = [Join(code).name.lower() for code in self.ops[:, OP_CODE].tolist() if code < 0]

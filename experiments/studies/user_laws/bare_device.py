@@ -80,7 +80,7 @@ def trial(
     world = World(SceneConfig(servo_period=PERIOD, physics_step=STEP), "none")
     world.reset(start, rest_pose())
     port = phantom_port(world.model, world.data, PERIOD, CUTOFF)
-    device = simulated_phantom(port, Participant(person, wishes, seed).compiled(PERIOD, STEP))
+    device = simulated_phantom(port, Participant(person, wishes, seed).holding(PERIOD, STEP))
     device.link()
     n = round(seconds / PERIOD)
     rows, plant = np.zeros((n, 10)), make_plant(world)

@@ -222,6 +222,11 @@ class Arm:
             raise SimError(f"an arm that traces a path cannot grab as well; got {len(self.grabs)} grabs")
         grab_table(self.grabs)
 
+    def holding(self, period: float, physics_step: float) -> "Arm":
+        """The arm itself, for a servo period and a physics step [s]; see `check_step`."""
+        self.check_step(physics_step)
+        return self
+
     def check_step(self, physics_step: float) -> None:
         """Refuse a physics step for which an impedance of this arm, whose force is held for a step, is too stiff.
 

@@ -167,7 +167,7 @@ def test_an_intent_of_one_s_own_says_what_is_wrong_with_it() -> None:
     def nothing(t, place, force):
         return "up"
 
-    person = Participant(wishes=Own(nothing).wishes(CIRCLE, 1.0, 1), own=Own(nothing)).compiled(1e-3, 1e-4)
+    person = Participant(wishes=Own(nothing).wishes(CIRCLE, 1.0, 1), own=Own(nothing)).holding(1e-3, 1e-4)
     with pytest.raises(SimError, match="expected a place"):
         Own(nothing).ask(person, 0.0)
     with pytest.raises(SimError, match="cannot be compiled"):

@@ -75,7 +75,7 @@ def test_steps_that_cannot_carry_her_are_refused() -> None:
     with pytest.raises(SimError, match="reflex"):
         check_steps(Person(reflex_gain=0.5, reflex_delay=0.06, damping_ratio=0.1, stiffness=800.0, mass=0.1), 1e-4)
     with pytest.raises(SimError, match="servo period"):
-        Participant().compiled(0.02, 1e-4)
+        Participant().holding(0.02, 1e-4)
 
 
 def test_random_numbers_are_uniform_normal_and_repeated() -> None:

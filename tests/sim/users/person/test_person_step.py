@@ -39,7 +39,7 @@ class Clamped:
     """A person whose stylus is held where the test says."""
 
     def __init__(self, person: Person, wishes: Wishes):
-        self.state = Participant(person, wishes, 1).compiled(PERIOD, STEP)
+        self.state = Participant(person, wishes, 1).holding(PERIOD, STEP)
         self.force, self.switch, self.ticks = np.zeros(3), np.zeros(1), 0
 
     def hold(self, p: np.ndarray, seconds: float) -> None:
@@ -90,7 +90,7 @@ def _led_astray(person: PersonState, ways: np.ndarray) -> None:
 
 
 def test_a_movement_is_felt_in_a_wrong_direction_by_what_filtered_noise_has() -> None:
-    person = Participant(Person(), Wishes(resting(2)), 1).compiled(PERIOD, STEP)
+    person = Participant(Person(), Wishes(resting(2)), 1).holding(PERIOD, STEP)
     speed, ways = 0.2, np.empty((2_000_000, 3))
     person.vectors[HAND_V] = 0.0, speed, 0.0
     _led_astray(person, ways)
@@ -178,7 +178,7 @@ def test_what_the_figure_does_not_show_is_felt() -> None:
 def servo_of(participant: Participant):
     world = device_world()
     port = phantom_port(world.model, world.data, world.config.servo_period, CUTOFF)
-    state = participant.compiled(world.config.servo_period, world.config.physics_step)
+    state = participant.holding(world.config.servo_period, world.config.physics_step)
     return bare_servo(world, simulated_phantom(port, state)), world
 
 
