@@ -146,7 +146,7 @@ class Run:
         """
         of_kind("path", path, str | Path)
         if not self._session.world.has_figure:
-            raise SimError("the run has no figure, and so no animation; expected a run that has one")
+            raise SimError("the run has no figure, and so no animation; expected a run of a figure")
         target = Path(path)
         if target.exists() and not overwrite:
             raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")

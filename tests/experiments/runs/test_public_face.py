@@ -318,7 +318,7 @@ def test_a_channel_is_looked_for_as_in_any_mapping() -> None:
 
 def test_a_run_without_a_figure_has_no_animation_to_write(tmp_path: Path) -> None:
     run = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), figure=hvf.Figure(kind="none")).run(0.1)
-    with pytest.raises(hvf.SimError, match="the run has no figure, and so no animation; expected a run with another f"):
+    with pytest.raises(hvf.SimError, match="the run has no figure, and so no animation; expected a run of a f"):
         run.to_bvh(tmp_path / "mine.bvh")
     assert not list(tmp_path.iterdir())
 
