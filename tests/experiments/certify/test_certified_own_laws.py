@@ -146,6 +146,7 @@ def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
 # Every case of a law.
 
 
+@pytest.mark.slow
 def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
     """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
@@ -174,6 +175,7 @@ def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
     assert found.margin < 0.7 * plain.stability.margin
 
 
+@pytest.mark.slow
 def test_a_floor_is_as_stable_as_its_hardest_case():
     assert stability(floor).verdict == "certified"
     hard = hvf.certify(simulation(hvf.law(floor)(k=2e4)), NO_HANDS).stability
@@ -206,6 +208,7 @@ def test_the_slopes_of_a_law_bound_its_force_as_seen_from_the_curve():
         assert ends[0] - 1e-12 <= force <= ends[1] + 1e-12
 
 
+@pytest.mark.slow
 def test_vectors_are_arrays_as_in_a_run():
     def spring(hand, k=50.0, b=1.0):
         return -k * hand.p - b * hand.v

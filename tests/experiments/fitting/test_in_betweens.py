@@ -76,7 +76,7 @@ def test_clips_that_move_alike_are_blended_legs_and_all(clips):
     assert map_of(clips).upper == ()
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, STANDING, *STEPPING, *ALIKE, *slower(SLOWER)])
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *ALIKE, *SLOWER))])
 def test_feet_of_in_betweens_do_not_slide_nor_sink(clips):
     for r, z in MANY:
         places = soles(laps(map_of(clips), r, z, count=1.5))

@@ -34,7 +34,7 @@ class Page(HTMLParser):
 
 @pytest.fixture
 def write(tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "replay_html", lambda recording, model, target: REPLAY)
+    monkeypatch.setattr(report, "replay_html", lambda recording, model: REPLAY)
     (tmp_path / "path.png").write_bytes(b"\x89PNG not really")
 
     def write(radius=0.02, lines=("It worked.",), texts=None):
