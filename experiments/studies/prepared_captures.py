@@ -11,6 +11,8 @@ import numpy as np
 
 from experiments.flights.ballistics import clip_flights
 from experiments.preparation.followed import followed
+from experiments.preparation.source_deviation import deviations
+from experiments.studies.random_sets import JUDGING, TUNING
 from models.errors import ModelError
 from models.mocap.library import embedded
 from models.mocap.preparation.bounds import FLYING
@@ -19,39 +21,65 @@ from models.mocap.preparation.well_formed import WellFormed, well_formed
 
 SECONDS = 20.0  # [s] for which the figure follows each clip
 HEAD = (
-    "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
-    "| skate mm | stand out | ends rad/s | flights: m/s² beside gravity (number) | joints beyond ° "
+    "| file | half | part, pace | residual before % | after % | if not: | motion lacks % | segments from the file ° "
+    "| joints from the file cm | soles in stance mm | tilt ° | skate mm | stand out | ends rad/s "
+    "| flights: m/s² beside gravity (number) | joints beyond ° | torques % of limits "
     "| joints, root from the capture, RMS | most | processor time: s, times the clip, times simulating |\n"
-    "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
+    "|" + 20 * "---|"
 )
 
 
-def row(name: str, made: Prepared) -> str:
+def row(path: Path, made: Prepared) -> str:
     """A line of the table."""
     was, now = (well_formed(clip, clip_flights(clip)) for clip in (made.captured, made.clip))
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
-    most = kept.extremes[0]
+    most, directions, places = kept.extremes[0], *_from_file(path, made)
     why = "" if after.stands else "motion" if not made.near or change.residual > FLYING / 2 else "figure"
     cells = (
-        name,
+        _name(path),
+        _half(path),
         f"{made.looped.kind} {seconds:.2f} s" + (f", {made.paced.pace:.2f}×" if made.paced.pace != 1.0 else ""),
         f"{before}",
         f"{after}" + ("" if made.near else " *"),
         why,
         f"{100 * change.residual:.1f}",
+        directions,
+        places,
         f"{_soles(was)} → {_soles(now)}",
         f"{np.rad2deg(was.tilt):.0f} → {np.rad2deg(now.tilt):.1f}",
-        f"{1000 * was.skate:.0f} → {1000 * now.skate:.0f}",
+        f"{1000 * was.skate:.0f} → {1000 * now.skate:.1f}",
         f"{was.outliers} → {now.outliers}",
         f"{was.seam:.1f} → {now.seam:.1f}",
         f"{_flights(was)} → {_flights(now)}",
         f"{np.rad2deg(was.excess):.0f} → {np.rad2deg(max(now.excess, 0.0)):.0f}",
+        f"{100 * was.strain:.0f} → {100 * now.strain:.0f} {now.joint}",
         f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
         f"{most.joint} {np.rad2deg(most.angle):.0f}°",
         f"{made.seconds:.1f}, {made.seconds / seconds:.1f}, {made.seconds / (seconds * after.cost):.0f}",
     )
     return "| " + " | ".join(cells) + " |"
+
+
+def _name(path: Path) -> str:
+    return f"{path.parent.name}/{path.name}"
+
+
+def _half(path: Path) -> str:
+    name = _name(path)
+    return "tuning" if name in TUNING else "judging" if name in JUDGING else ""
+
+
+def _from_file(path: Path, made: Prepared) -> tuple[str, str]:
+    """Largest deviations of segments and joints from the file, as retargeted and as prepared."""
+    both = deviations(path, made)
+    if both is None:
+        return "its own skeleton", "its own skeleton"
+    was, now = both
+    return (
+        f"{np.rad2deg(was.direction):.1f} → {np.rad2deg(now.direction):.1f} {now.segment}",
+        f"{100 * was.place:.1f} → {100 * now.place:.1f} {now.joint}",
+    )
 
 
 def _flights(measures: WellFormed) -> str:
@@ -67,11 +95,10 @@ def main(paths: list[str]) -> None:
     print(HEAD)
     followed(embedded("walk"), SECONDS)  # compiles the units first, so that no clip's time includes that
     for path in map(Path, paths):
-        name = f"{path.parent.name}/{path.name}"
         try:
-            print(row(name, prepared(path)), flush=True)
+            print(row(path, prepared(path)), flush=True)
         except ModelError as error:
-            print(f"| {name} | refused: {error} |{' |' * 14}", flush=True)
+            print(f"| {_name(path)} | {_half(path)} | refused: {error} |{17 * ' |'}", flush=True)
 
 
 if __name__ == "__main__":

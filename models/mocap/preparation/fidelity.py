@@ -93,20 +93,29 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
         How many times as fast as captured the clip is played.
     """
     original = resampled(Clip(captured.poses, captured.fps * pace, captured.name), clip.fps)
-    first, last = round(part.start * clip.fps), round(part.end * clip.fps)
-    begin = max(first, 0)
-    n = min(clip.n_frames - begin + first, original.n_frames - begin, last - begin + 1)
-    ours, theirs = clip.poses[begin - first :][:n], original.poses[begin:][:n]
+    shown, shows = common_frames(clip, captured, part, pace)
+    ours, theirs = clip.poses[shown], original.poses[shows]
     # The rotation about the vertical and the translation that minimise the distance of the roots over the floor.
     a, b = ours[:, :2] - ours[:, :2].mean(axis=0), theirs[:, :2] - theirs[:, :2].mean(axis=0)
     turn = np.exp(-1j * np.angle(np.sum((a @ (1, 1j)).conj() * (b @ (1, 1j)))))
     level = np.abs(b @ (1, 1j) * turn - a @ (1, 1j))
     height = theirs[:, 2] - ours[:, 2]
-    angles = np.linalg.norm(pose_difference(ours, theirs)[:, 6:].reshape(n, -1, 3), axis=2)
-    instants = (begin - first + angles.argmax(axis=0)) / clip.fps
+    angles = np.linalg.norm(pose_difference(ours, theirs)[:, 6:].reshape(len(ours), -1, 3), axis=2)
+    instants = (shown.start + angles.argmax(axis=0)) / clip.fps
     most = np.argsort(-angles.max(axis=0))[:_LISTED]
     return Fidelity(
         float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(level**2 + height**2))),
         tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in most),
         clip.closes() and not clip.turns_over and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
     )  # fmt: skip
+
+
+def common_frames(clip: Clip, captured: Clip, part: Looped, pace: float) -> tuple[slice, slice]:
+    """Frames of a prepared clip, and of the paced capture at the clip's rate, that show the same moments.
+
+    Those that the capture does not have are in neither; parameters as of `fidelity`.
+    """
+    first, last = round(part.start * clip.fps), round(part.end * clip.fps)
+    begin, frames = max(first, 0), int(captured.duration / pace * clip.fps + 1e-9) + 1
+    n = min(clip.n_frames - begin + first, frames - begin, last - begin + 1)
+    return slice(begin - first, begin - first + n), slice(begin, begin + n)

@@ -1,0 +1,46 @@
+"""A random set of captures through the study's own functions: the figure stands and feet stay in place."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.preparation.followed import followed
+from experiments.studies import random_sets
+from models.mocap.library import load_clip
+from models.mocap.preparation.bounds import RESIDUAL
+
+MOCAP = Path(__file__).resolve().parents[3].parent / "shared" / "mocap"
+FILES = ("snu/walk.bvh", "xia/strutting_01_000.bvh", "cmu_amc/02_01.amc", "xia/dme_example.bvh")
+
+
+@pytest.fixture
+def captures(monkeypatch):
+    """The folder, and a study that takes 6 s a run: a lap, and most of the second one, in which the hand pushes."""
+    if not MOCAP.is_dir():
+        pytest.skip("no motion capture at ../shared/mocap")
+    monkeypatch.setattr(random_sets, "SECONDS", 6.0)
+    monkeypatch.setattr(random_sets, "followed", lambda clip: followed(clip, 6.0))
+    return str(MOCAP)
+
+
+@pytest.mark.slow
+def test_a_random_set_stands_on_the_floor_without_skating(captures):
+    found = [random_sets.captured(captures, name) for name in FILES]
+    assert [one.name for one, _ in found if one.reason or one.alone > RESIDUAL] == []
+    chosen = next(random_sets.drawn([clip for _, clip in found], 4, seed=1))
+    assert sorted(clip.name for clip in chosen) == sorted(FILES)
+    row = random_sets.run_set(0, "cylindrical", chosen, 1, "push", captures)
+    assert row["off_pace"] == ()
+    assert row["fell"] is None
+    assert 0.0 < row["residual"] <= 0.12
+    assert row["lowest"] > -1.0
+    assert row["skate"] <= 2.0
+    assert row["beyond"] == 0.0
+    assert "| cylindrical | 1, 0 | 1, " in random_sets.summary([row])[-1]
+
+
+def test_a_walk_that_is_not_prepared_is_beyond_the_bounds(captures):
+    walk = load_clip(MOCAP / "snu/walk.bvh")
+    found = random_sets.animation_measures(walk.poses, walk.fps)
+    assert found["lowest"] < -1.0
+    assert found["skate"] > 2.0
