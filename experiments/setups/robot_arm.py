@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
@@ -23,9 +24,10 @@ from sim.reference.reference import poses_along
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
 _TILT = np.radians(75.0)  # tilt of the tool from the vertical
 ORIENTATION = np.array([np.cos(0.5 * _TILT), 0.0, np.sin(0.5 * _TILT), 0.0])
-_REACH = (0.07, 0.1)  # [m] stylus distance up to which the tool follows exactly, and its bound in saturation
+_REACH = (0.105, 0.15)  # [m] way of the tool up to which it follows the stylus exactly, and its bound in saturation
 _TURN = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
 _ARM_ANGLE = np.radians(30.0)  # ψ of `controllers.haptic_map.robot_arm.RobotArm` [rad]
+_SAMPLES = 241  # of a curve, where it is furthest away
 _CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
 
 
@@ -39,7 +41,8 @@ def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
 
 def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:
     """The map by which the tool of an arm follows the stylus in front of it, its displacements scaled [1]."""
-    return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, _REACH, _TURN, float(_ARM_ANGLE))
+    near, far = (way / scale for way in _REACH)
+    return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, (near, far), _TURN, float(_ARM_ANGLE))
 
 
 def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float) -> ClipMapParts:
@@ -59,11 +62,17 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     Raises
     ------
     ParameterError
-        If the scale is not positive. What the arm does not reach is refused when the parts are refined, which
-        evaluates the map.
+        If the tool would not go all the way that the curve, scaled, leads it. What the arm does not reach is refused
+        when the parts are refined, which evaluates the map.
     SimError
         If the Phantom does not reach the curve.
     """
+    away = float(np.linalg.norm(curve.point(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
+    if scale * away > _REACH[0]:
+        raise ParameterError(
+            f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most {1e3 * _REACH[0]:.0f} mm "
+            f"from its home; expected --scale {_REACH[0] / away:.2g} or less, or a smaller curve"
+        )
     made = robot_arm_map(arm, scale)
 
     def refined() -> tuple[ClipMap, tuple[str, ...]]:

@@ -110,6 +110,7 @@ def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pyte
         ("--governor", "--governor is for a figure, and a robot arm is in its place"),
         ("--mode lead", "leave out --map robot-arm"),
         ("--scale -1", "--scale is -1; expected more than 0"),
+        ("--scale 4", "expected --scale 2.2 or less, or a smaller curve"),
     ],
 )
 def test_what_has_no_meaning_for_an_arm_is_refused(
