@@ -53,5 +53,5 @@ def test_a_file_that_holds_no_configuration_of_the_arm_is_refused(
         assert capsys.readouterr().err.startswith(f"hvf: {file}: {said}")
     assert main(["arm", "--config", str(tmp_path / "none.json")]) == 2
     assert "none.json: cannot be read (No such file or directory)" in capsys.readouterr().err
-    with pytest.raises(ParameterError, match="--radius is 0; expected more than 0 m"):
+    with pytest.raises(ParameterError, match="radius is 0; expected more than 0 m"):
         resolved("--radius", "0")
