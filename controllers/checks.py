@@ -1,5 +1,6 @@
 """Validation in constructors: numbers within their bounds, and values of the kind that a field's annotation says."""
 
+import inspect
 import reprlib
 import types
 from collections.abc import Sequence
@@ -58,6 +59,28 @@ def of_kind(name: str, value: object, kind: object) -> None:
     """
     if not _is(value, kind):
         raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_expected(kind)}")
+
+
+def takes(name: str, function: object, *arguments: str) -> None:
+    """Refuse what is no function, or one that cannot be called with so many arguments, without a call.
+
+    Raises
+    ------
+    ParameterError
+        The name, the function, and the arguments with which it is called.
+    """
+    expected = f"expected a function of {', '.join(arguments)}"
+    if not callable(function):
+        raise ParameterError(f"{name} is {reprlib.repr(function)}; {expected}")
+    try:
+        found = inspect.signature(function)
+    except ValueError:  # of some functions in C, which do not tell
+        return
+    try:
+        found.bind(*arguments)
+    except TypeError:
+        called = getattr(function, "__name__", type(function).__name__)
+        raise ParameterError(f"{name} is {called}{found}; {expected}") from None
 
 
 def numbers_of(name: str, values: npt.ArrayLike) -> Array:

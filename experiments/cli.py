@@ -22,6 +22,7 @@ import tyro
 
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
+from experiments.config.keywords import in_options
 from experiments.console.welcome import WELCOME, next_step
 from models.errors import ModelError
 from sim.errors import SimError
@@ -55,7 +56,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
-        print(f"hvf: {error}", file=sys.stderr)
+        print(f"hvf: {in_options(error)}", file=sys.stderr)
         return 2
     except OSError as error:
         print(f"hvf: {_by_the_system(error)}", file=sys.stderr)

@@ -7,6 +7,7 @@ from pathlib import Path
 from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
 from experiments.config.keywords import in_keywords, keywords
+from experiments.files.given_path import given_path
 from experiments.lifting.lift_file import lift_into
 from experiments.preparation.command import prepare_file
 from experiments.preparation.prepared_clip import prepared_clips
@@ -43,9 +44,8 @@ def load(path: str | Path, raw: bool = False) -> Clip:
     ModelError
         If the file cannot be read, or its skeleton is not a human's.
     """
-    of_kind("path", path, str | Path)
     of_kind("raw", raw, bool)
-    found = prepared_clips([Path(path)], raw)[0]
+    found = prepared_clips([given_path("path", path)], raw)[0]
     if not found.feasible:
         warnings.warn(keywords(found.remarks[-1]), stacklevel=3)
     return found.clip

@@ -27,6 +27,7 @@ from controllers.fields.own.function_law import FunctionLaw
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.executed_field import REACH, seen
 from experiments.certify.switched_stability import switched_stability
+from experiments.config.keywords import in_keywords
 from experiments.config.run_config import phantom_of
 from experiments.files.device_files import linkage_of
 from experiments.runs.simulation import Simulation
@@ -59,6 +60,7 @@ class _Parts(NamedTuple):
     drag: float
 
 
+@in_keywords()
 def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0) -> SimulationCertificate:
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 

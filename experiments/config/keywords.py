@@ -1,4 +1,8 @@
-"""Messages in the words of Python: what they call an option of the command line is there a keyword argument."""
+"""Messages in the words of Python: what they call an option of the command line is there a keyword argument.
+
+They are written with options. What is called from Python puts them into keywords (`in_keywords`); the command line,
+which may be what calls, prints what was written (`in_options`).
+"""
 
 import re
 from collections.abc import Callable
@@ -12,9 +16,17 @@ from sim.errors import SimError
 _F = TypeVar("_F", bound=Callable[..., Any])
 _OPTION = re.compile(
     r"`[^`]*`"  # a whole command stays as it is typed
-    r"|(?<![\w-])--(?P<chosen>mode|map|user|figure) (?P<kind>[a-z][a-z-]{2,})"
-    r"|(?<![\w-])--(?P<name>[a-z]+(?:-[a-z0-9]+)*)(?: (?P<number>-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.]*\d))?"
+    r"|(?<![\w-])--(?P<chosen>mode|map|user|person|figure) (?P<kind>[a-z][a-z-]{2,})"
+    r"|(?<![\w-])--(?P<name>[a-z]+(?:[-.][a-z0-9]+)*)(?: (?P<number>-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.]*\d))?"
 )
+
+
+_OPTIONS = "options"  # attribute of an error: its message as it was written, with options
+
+
+def in_options(error: Exception) -> str:
+    """Message of an error as the command line says it, also where `in_keywords` has put it into keywords."""
+    return vars(error).get(_OPTIONS, str(error))
 
 
 def keywords(text: str, **others: str) -> str:
@@ -30,7 +42,7 @@ def keywords(text: str, **others: str) -> str:
 
     def keyword(found: re.Match[str]) -> str:
         if found["chosen"] is not None:
-            return f'{found["chosen"]}="{found["kind"]}"'
+            return f'{others.get(found["chosen"], found["chosen"])}="{found["kind"]}"'
         if found["name"] is None:
             return found[0]
         name = found["name"].replace("-", "_")
@@ -40,7 +52,7 @@ def keywords(text: str, **others: str) -> str:
 
 
 def in_keywords(**others: str) -> Callable[[_F], _F]:
-    """Decorator of a function of the public face: its errors name keywords; see `keywords`."""
+    """Decorator of a function that is called from Python: its errors name keywords; see `keywords`."""
 
     def decorated(function: _F) -> _F:
         @wraps(function)
@@ -48,6 +60,7 @@ def in_keywords(**others: str) -> Callable[[_F], _F]:
             try:
                 return function(*arguments, **given)
             except (ControllerError, ModelError, SimError) as error:
+                vars(error).setdefault(_OPTIONS, str(error))
                 error.args = (keywords(str(error), **others),)
                 raise
 

@@ -1,6 +1,6 @@
 """What parts of a configuration are made of: frozen dataclasses, checked when they are made, by pydantic.
 
-A part is given by keyword. One that is wrong raises `ParameterError`: the option, its value, what would be right.
+A part is given by keyword. One that is wrong raises `ParameterError`: the keyword, its value, what would be right.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from controllers.errors import ParameterError
+from experiments.config.keywords import in_keywords, in_options, keywords
 from sim.errors import SimError
 
 _Part = TypeVar("_Part")
@@ -48,13 +49,21 @@ def part(cls: type[_Part]) -> type[_Part]:
     """Make a class a part of a configuration."""
     cast(Any, cls).__get_pydantic_core_schema__ = classmethod(_schema)
     made = cast(Any, checked_dataclass(config=_CONFIG, frozen=True, kw_only=True)(cls))  # pyright: ignore
-    init = made.__init__
+    init, named = made.__init__, [field for field in fields(made) if field.init]
+    places = [field.name for field in named if not field.kw_only]
 
+    @in_keywords()
     def __init__(self: object, *arguments: Any, **values: Any) -> None:
+        if len(arguments) > len(places):
+            raise ParameterError(
+                f"{made.__name__} is given {arguments[len(places)]!r} without a name; "
+                f"expected some of {', '.join(f'{field.name}=' for field in named)}"
+            )
         try:
-            init(self, *arguments, **values)
+            init(self, **dict(zip(places, arguments, strict=False)), **values)
         except ValidationError as error:
-            raise ParameterError(one_line(error, made)) from None
+            own = error.errors()[0].get("ctx", {}).get("error")  # what the part itself raised
+            raise (own if isinstance(own, ParameterError) else ParameterError(one_line(error, made))) from None
 
     made.__init__ = __init__
     return cast(type[_Part], made)
@@ -121,7 +130,7 @@ def from_json(cls: type[_Part], text: str | bytes, where: str) -> _Part:
     try:
         return TypeAdapter(cls).validate_json(text)
     except ValidationError as error:
-        raise ParameterError(f"{where}: {one_line(error, cls)}") from None
+        raise ParameterError(f"{where}: {keywords(one_line(error, cls))}") from None
 
 
 def from_file(cls: type[_Part], path: Path) -> _Part:
@@ -146,7 +155,15 @@ def from_dict(cls: type[_Part], values: Mapping[str, object], where: str) -> _Pa
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as error:
-        raise ParameterError(f"{where}: {one_line(error, cls)}") from None
+        raise ParameterError(f"{where}: {keywords(one_line(error, cls))}") from None
+
+
+_EXPECTED = {
+    "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number", "string_type": "text",
+    "string_too_short": "text that is not empty", "tuple_type": "a list", "dict_type": "values by name",
+    "dataclass_type": "values by name, or {class_name}",
+}  # fmt: skip
+"""What is expected where pydantic's own word is of its schema."""
 
 
 def one_line(error: ValidationError, cls: type) -> str:
@@ -181,10 +198,12 @@ def one_line(error: ValidationError, cls: type) -> str:
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
     if kind == "value_error":  # what parts say of each other, and actions and persons of themselves
-        return str(context["error"])
+        return in_options(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
         return f"{where} is missing"
+    if kind in _EXPECTED:
+        return f"{where or cls.__name__} is {first['input']!r}; expected {_EXPECTED[kind].format(**context)}"
     return f"{where or cls.__name__} is {first['input']!r}; {first['msg'][0].lower()}{first['msg'][1:]}"
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
 from controllers.errors import ParameterError
+from experiments.config.keywords import in_keywords
 from experiments.config.maps import Cylindrical, Led, Map, RobotArm
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
 from experiments.config.part import above, at_least, from_file, part, whole
@@ -139,6 +140,7 @@ class Figure:
     def __post_init__(self) -> None:
         self.check(leads=True, body=self.kind)
 
+    @in_keywords(figure="kind")
     def check(self, leads: bool, body: BodyKind) -> None:
         """Refuse what has no meaning for what follows the hand, where a figure is led or is not.
 
@@ -233,6 +235,10 @@ def phantom_of(device: Phantom | Replay) -> Phantom:
     return device
 
 
+LONGEST_PERIOD = 0.01
+"""Longest servo period [s]: half of a slower rate lies near the 40 Hz above which a loop's oscillation is measured."""
+
+
 @part
 class Clock:
     """The rates of a run.
@@ -240,12 +246,12 @@ class Clock:
     Parameters
     ----------
     servo_period : float
-        Time between two servo ticks [s].
+        Time between two servo ticks [s]; at most 10 ms.
     physics_step : float
         Time step of the physics [s]; divides the servo period.
     """
 
-    servo_period: Annotated[float, above(0.0, unit="s")] = 1e-3
+    servo_period: Annotated[float, above(0.0, unit="s", most=LONGEST_PERIOD)] = 1e-3
     physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 

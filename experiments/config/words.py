@@ -169,10 +169,10 @@ def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> N
     for name, value in chosen.items():
         if not isinstance(value, str):
             raise ParameterError(f"--{name} is {value!r}; expected a name")
-    for name in ADDED:
+    for name in _SWITCHES:
         if not isinstance(words.get(name, False), bool):
             raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
-    for name in sorted({"around", "does", "file", "run"} & words.keys()):
+    for name in sorted({"around", "does", "file", "orientation", "run"} & words.keys()):
         raise _unknown(f"--{name}")
 
 

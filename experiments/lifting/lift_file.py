@@ -6,6 +6,7 @@ from pathlib import Path
 from controllers.checks import of_kind
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.maps import MAP_SUFFIX
+from experiments.files.given_path import given_path
 from experiments.files.map_files import save_map
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.lift_report import LiftReport, report_lift
@@ -15,20 +16,20 @@ _DEFAULT = Room()
 
 
 def lift_into(
-    names: Sequence[str], out: str | Path, *, room: Room = _DEFAULT, cyclic: Sequence[str] = (), seed: int = 1,
-    overwrite: bool = False, raw: bool = False,
+    names: Sequence[str | Path], out: str | Path, *, room: Room = _DEFAULT, cyclic: Sequence[str | Path] = (),
+    seed: int = 1, overwrite: bool = False, raw: bool = False,
 ) -> LiftReport:  # fmt: skip
     """Lift clips: a curve for each, and one haptic map with all of them, which is measured and written to a file.
 
     Parameters
     ----------
-    names : sequence of str
+    names : sequence of str or path
         Names of embedded clips, or motion files, which are prepared.
     out : path
         File to write (.npz), at the very end.
     room : Room
         Where the curves may lie.
-    cyclic : sequence of str
+    cyclic : sequence of str or path
         Those of `names` that must be closed; of the others, clips that close are closed.
     seed : int
         Seed of the initial arrangement of the curves.
@@ -40,17 +41,22 @@ def lift_into(
     Raises
     ------
     ModelError, ControllerError, SimError
-        As `lift_clips`; or if the file is not a .npz, or exists and is not to be replaced.
+        As `lift_clips`; or if an argument is of another kind, the file is not a .npz, or exists and is not to be
+        replaced.
     OSError
         If it cannot be written.
     """
-    of_kind("out", out, str | Path)
-    out = Path(out)
+    for name, value, kind in (
+        ("names", names, Sequence[str | Path]), ("room", room, Room), ("cyclic", cyclic, Sequence[str | Path]),
+        ("seed", seed, int), ("overwrite", overwrite, bool), ("raw", raw, bool),
+    ):  # fmt: skip
+        of_kind(name, value, kind)
+    out, clips = given_path("out", out), tuple(map(str, names))
     if out.suffix != MAP_SUFFIX:
         raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
     if out.exists() and not overwrite:
         raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
-    report = report_lift(lift_clips(names, room, cyclic, seed, raw), seed)
+    report = report_lift(lift_clips(clips, room, tuple(map(str, cyclic)), seed, raw), seed)
     out.parent.mkdir(parents=True, exist_ok=True)
     save_map(report.lifted.haptic_map, out)
     return report

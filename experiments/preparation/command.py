@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from controllers.checks import of_kind
+from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
@@ -43,11 +44,11 @@ def prepare_file(
         If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
     """
     for name, value, kind in (
-        ("source", source, str | Path), ("target", target, str | Path), ("loop", loop, str), ("mirror", mirror, bool),
-        ("hints", hints, Hints | None), ("report", report, str | Path | None),
+        ("loop", loop, str), ("mirror", mirror, bool), ("hints", hints, Hints | None), ("overwrite", overwrite, bool),
     ):  # fmt: skip
         of_kind(name, value, kind)
-    source, target = Path(source), Path(target)
+    source, target = given_path("source", source), given_path("target", target)
+    report = None if report is None else given_path("report", report)
     check_target(target, overwrite)
     made = prepared(source, loop, mirror, hints)
     found = clip_ballistics(made.clip)
@@ -59,8 +60,8 @@ def prepare_file(
         if report is not None and captured is not None:
             from experiments.preparation.page import page  # late: matplotlib and viser
 
-            Path(report).mkdir(parents=True, exist_ok=True)
-            (Path(report) / f"prepare-{source.stem}.html").write_text(page(outcome, captured), encoding="utf-8")
+            report.mkdir(parents=True, exist_ok=True)
+            (report / f"prepare-{source.stem}.html").write_text(page(outcome, captured), encoding="utf-8")
     return outcome
 
 

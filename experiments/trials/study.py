@@ -11,7 +11,9 @@ from rich.console import Console
 
 from controllers.checks import check_kinds, of_kind
 from experiments.certify.kept_stability import kept_stability
+from experiments.config.keywords import in_keywords
 from experiments.config.part import to_json
+from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.tidy import table, write_table
@@ -92,8 +94,7 @@ class Study:
         SimError, ControllerError
             If it cannot be read, or contains an unknown entry.
         """
-        of_kind("path", path, str | Path)
-        file = Path(path)
+        file = given_path("path", path)
         config = study_from(read_toml(file, "a study"), str(file))
         return Study(config, file.read_text(encoding="utf-8"))
 
@@ -117,6 +118,7 @@ class Study:
         """All planned trials; see `experiments.trials.design.plan.planned`."""
         return planned(self.config)
 
+    @in_keywords()
     def run(
         self, out: str | Path, threads: int | None = None, workers: int | None = None, cluster: str | None = None,
         console: Console | None = None,
@@ -141,12 +143,9 @@ class Study:
         ModelError, ControllerError, SimError, OSError
             If the study contradicts itself, or cannot go on; completed trials are kept.
         """
-        of_kind("out", out, str | Path)
-        console, folder, where = (
-            console or Console(stderr=True),
-            Path(out),
-            Where(threads=threads, workers=workers, cluster=cluster),
-        )
+        folder, where = given_path("out", out), Where(threads=threads, workers=workers, cluster=cluster)
+        of_kind("console", console, Console | None)
+        console = console or Console(stderr=True)
         measures, trials = self._measures(), self.trials
         if self.config.recordings:
             check_place(self.config.recordings)

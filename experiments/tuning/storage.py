@@ -19,10 +19,13 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
     Raises
     ------
     StudyError
-        If the database cannot be reached.
+        If the file cannot be written, or the database cannot be reached.
     """
     if "://" not in str(where):
-        return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
+        try:
+            return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
+        except OSError as error:
+            raise StudyError(f"{where}: {error.strerror}; expected a file that can be written") from None
     try:
         return optuna.storages.RDBStorage(str(where))
     except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer

@@ -10,9 +10,11 @@ from typing import Any, Literal
 import numpy as np
 
 from controllers.certificates.report import hash_of
-from controllers.checks import check_kinds, of_kind
+from controllers.checks import check_kinds, numbers_of, of_kind, takes
 from controllers.errors import ParameterError
 from experiments.certify.certify_simulation import certify
+from experiments.config.keywords import in_keywords
+from experiments.files.given_path import given_path
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
@@ -63,6 +65,8 @@ class Search:
                 raise ParameterError(f"{name} is {getattr(self, name)}; expected 1 to {MOST_TRIALS}")
         if not 0 <= self.seed < 2**63:
             raise ParameterError(f"seed is {self.seed}; expected 0 or more and less than {2**63}")
+        if self.journal is not None:
+            given_path("journal", self.journal)
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,7 @@ class TunedSimulation:
     refused: int
 
 
+@in_keywords()
 def tune(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, panel: Sequence[User] = (),
     seconds: float = 6.0, search: Search | None = None,
@@ -115,8 +120,8 @@ def tune(
     Raises
     ------
     ParameterError
-        If the space is empty or has an unknown parameter or a range that is none, none of its candidates may be tried,
-        or a cost is not finite.
+        If the space is empty or has an unknown parameter, a range that is none or a bound that a parameter cannot have,
+        none of its candidates may be tried, or a cost is no number or not finite.
     """
     import optuna  # an optional dependency, which takes half a second to import
 
@@ -124,13 +129,15 @@ def tune(
 
     of_kind("sim", sim, Simulation)
     of_kind("panel", panel, Sequence[User])
+    of_kind("seconds", seconds, float)
     of_kind("search", search, Search | None)
-    if not callable(cost):
-        raise ParameterError(f"cost is {cost!r}; expected a function of a run")
+    takes("cost", cost, "a run")
     search, users = search or Search(), tuple(panel) or (sim.user,)
     check_trials("tuning", search.candidates * len(users), f"{search.candidates} candidates, {len(users)} users")
     _check_space(space)
-    # A session in the middle of the space: reports unknown parameters and compiles the units before any run.
+    for edge in range(2):
+        with_values(sim, {path: bounds[edge] for path, bounds in space.items()})
+    # A session in the middle of the space: compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _study(search, _name(sim, space, cost, len(users), seconds, search))
     complete, ranges = (optuna.trial.TrialState.COMPLETE,), _ranges(space)
@@ -161,6 +168,7 @@ def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
     if not space:
         raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
     for path, bounds in space.items():
+        of_kind("a path of the space", path, str)
         of_kind(path, bounds, Sequence[float])
         if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
@@ -213,7 +221,7 @@ def _means(
         return replace(candidate, user=user).run(seconds)
 
     with ThreadPoolExecutor(max(1, search.threads)) as pool:
-        costs = [np.atleast_1d(np.asarray(cost(run), dtype=np.float64)) for run in pool.map(run, users)]
+        costs = [np.atleast_1d(numbers_of(f"the cost at {dict(values)}", cost(run))) for run in pool.map(run, users)]
     for found in costs:
         if found.shape != (search.costs,) or not np.all(np.isfinite(found)):
             raise ParameterError(f"the cost at {dict(values)} is {found.tolist()}; expected {search.costs} finite")

@@ -7,6 +7,8 @@ from typing import Any, Literal, cast
 
 from pydantic import Field
 
+from controllers.errors import ParameterError
+from experiments.config.keywords import keywords
 from experiments.config.part import above, at_least, from_dict, part, whole
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
@@ -115,11 +117,20 @@ class TuneConfig:
         return tuple("maximize" if more_is_better(name) else "minimize" for name in self.objectives)
 
     def config(self, values: Mapping[str, float], does: str | None = None) -> RunConfig:
-        """The run of a candidate, without a person at the stylus or, given a task, with the panel's first user."""
+        """The run of a candidate, without a person at the stylus or, given a task, with the panel's first user.
+
+        Raises
+        ------
+        StudyError
+            If a word is unknown or has no meaning with the others, or a number is out of its interval.
+        """
         words: Words = self.run | dict(values) | {"seconds": self.seconds}
         if does is not None:
             words |= {"user": does, "person": population(1, self.users.seed)[0]}
-        return run_config(**words)
+        try:
+            return run_config(**words)
+        except ParameterError as error:
+            raise StudyError(f"tuning {self.name!r}: {keywords(str(error))}") from None
 
 
 def more_is_better(objective: str) -> bool:

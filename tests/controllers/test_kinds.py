@@ -1,5 +1,6 @@
 """Arguments of another kind are refused where they are given, by name: curves, numbers, switches, weights, hands."""
 
+import re
 from collections.abc import Sequence
 from math import nan
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.checks import check_kinds, numbers_of, of_kind
+from controllers.checks import check_kinds, numbers_of, of_kind, takes
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.weights import Weight
@@ -63,6 +64,17 @@ def test_the_message_says_what_would_be_right() -> None:
         Bunny(CIRCLE, 1.0, 1.0, 0.1, pace="runs")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ParameterError, match=r"^the other field is 3; expected Law$"):
         FOLLOW + 3  # pyright: ignore[reportOperatorIssue, reportUnusedExpression]
+
+
+def test_a_function_is_one_that_takes_what_it_is_called_with() -> None:
+    for right in (lambda t, p: t, lambda t, p, s=1: t, lambda *those: those, max, print):
+        takes("cost", right, "t", "p")
+    for wrong, said in (
+        (3, "3"), (None, "None"), (lambda t: t, "<lambda>(t)"), (lambda t, p, s: t, "<lambda>(t, p, s)"),
+        (len, "len(obj, /)"),
+    ):  # fmt: skip
+        with pytest.raises(ParameterError, match=f"^{re.escape(f'cost is {said}; expected a function of t, p')}$"):
+            takes("cost", wrong, "t", "p")
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

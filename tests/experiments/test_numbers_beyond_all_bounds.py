@@ -37,10 +37,10 @@ def test_a_number_beyond_all_bounds_is_refused_in_a_line(
 @pytest.mark.parametrize(
     ("command", "text", "said"),
     [
-        ("trials", 'seconds = 1e15\n[factors]\nstiffness = [100, 200]', "--seconds is 1e+15; expected at most 86400 s"),
+        ("trials", 'seconds = 1e15\n[factors]\nstiffness = [100, 200]', "seconds is 1e+15; expected at most 86400 s"),
         ("tune", "seconds = 1e15\n[space]\nstiffness = {low = 1, high = 2}",
-         "--seconds is 1e+15; expected at most 86400 s"),
-        ("tune", "[space]\nstiffness = {low = inf, high = 2}", "--low is inf; expected 0 or more, and finite"),
+         "seconds is 1e+15; expected at most 86400 s"),
+        ("tune", "[space]\nstiffness = {low = inf, high = 2}", "low is inf; expected 0 or more, and finite"),
         ("tune", "candidates = 1000000000000\n[space]\nstiffness = {low = 1, high = 2}",
          "tuning 'mine': 1000000000000 candidates, 6 users, 1 tasks, 1 repetitions are too many; expected at most "
          "1000000 trials"),

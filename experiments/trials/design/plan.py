@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.errors import ParameterError
+from experiments.config.keywords import keywords
 from experiments.config.maps import MapFile
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
@@ -114,7 +115,7 @@ def _base(study: StudyConfig, person: Person, condition: Condition) -> RunConfig
         return run_config(**words)
     except ParameterError as error:
         said = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
-        raise StudyError(f"study {study.name!r}, condition {said}: {error}") from None
+        raise StudyError(f"study {study.name!r}, condition {said}: {keywords(str(error))}") from None
     except TypeError as error:
         raise StudyError(
             f"study {study.name!r}: {error}; expected words of a run, as `hvf run --help` has them"

@@ -25,13 +25,15 @@ class Bend:
     Raises
     ------
     SimError
-        If grabs overlap, or one has no place, since a person decides where she takes hold.
+        If there is no grab, grabs overlap, or one has no place, since a person decides where she takes hold.
     """
 
     grabs: Sequence[Grab]
 
     def __post_init__(self) -> None:
         check_kinds(self)
+        if len(self.grabs) == 0:
+            raise SimError("a person who bends a curve has no grabs; expected one or more")
         grab_table(self.grabs)
         if any(grab.place is None for grab in self.grabs):
             raise SimError("a person's grab has no place; expected where she takes hold, in H [m]")

@@ -46,7 +46,7 @@ def centre(curve: Trajectory) -> Array:
 
 
 def check(intent: object, **numbers: tuple[float, float, float]) -> None:
-    """Check the kinds of all values of an intent, and its numbers, given by name as (value, least, most).
+    """Check the kinds of all values of an intent, and its numbers, given by name as (value, least, most), and finite.
 
     Raises
     ------
@@ -57,5 +57,6 @@ def check(intent: object, **numbers: tuple[float, float, float]) -> None:
     """
     check_kinds(intent)
     for name, (value, least, most) in numbers.items():
-        if not least <= value <= most:
-            raise SimError(f"{name} of {type(intent).__name__} is {value}; expected {least:g} to {most:g}")
+        if not least <= value <= most or np.isinf(value):
+            expected = f"{least:g} to {most:g}" if most < np.inf else f"{least:g} or more, and finite"
+            raise SimError(f"{name} of {type(intent).__name__} is {value}; expected {expected}")

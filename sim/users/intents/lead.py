@@ -1,11 +1,14 @@
 """The intent to lead the figure along a path."""
 
+import reprlib
 from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.checks import numbers_of, of_kind
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
+from sim.errors import SimError
 from sim.users.intents.intent import PERIOD, moments
 from sim.users.person.wishes import Wishes, following
 
@@ -20,10 +23,26 @@ class Lead:
         Points of the path in H [m], shape (n, 3).
     period : float
         Time between two points [s].
+
+    Raises
+    ------
+    ParameterError
+        If the points are no numbers, or the period is no number.
+    SimError
+        If there is no point, they have another shape or are not finite, or the period is not positive and finite.
     """
 
     points: Array
     period: float
+
+    def __post_init__(self) -> None:
+        points = numbers_of("points", self.points)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.all(np.isfinite(points)):
+            raise SimError(f"points of Lead are {reprlib.repr(self.points)}; expected rows of three finite numbers")
+        of_kind("period", self.period, float)
+        if not 0.0 < self.period < np.inf:
+            raise SimError(f"period of Lead is {self.period}; expected more than 0 s, and finite")
+        object.__setattr__(self, "points", points)
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from numba import njit
 from numba.core.errors import NumbaError
 
-from controllers.checks import check_kinds
+from controllers.checks import check_kinds, takes
 from controllers.curves.trajectory import Trajectory
 from controllers.kernel_call import address_of
 from sim.errors import SimError
@@ -59,6 +59,8 @@ class Own:
 
     Raises
     ------
+    ParameterError
+        If a value is of another kind, or the function takes other arguments.
     SimError
         If `every` is not positive and finite.
     """
@@ -69,8 +71,7 @@ class Own:
 
     def __post_init__(self) -> None:
         check_kinds(self)
-        if not callable(self.function):
-            raise SimError(f"the function of an intent is {self.function!r}; expected a function of what she perceives")
+        takes("function", self.function, "t", "place", "force", *(("rows",) if self.compiled else ()))
         if not (np.isfinite(self.every) and self.every > 0.0):
             raise SimError(f"an intent that is asked every {self.every} s; expected more than 0 s")
 

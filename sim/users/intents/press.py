@@ -25,13 +25,15 @@ class Press:
     Raises
     ------
     SimError
-        If a push has a place.
+        If there is no push, or one has a place.
     """
 
     pushes: Sequence[Push]
 
     def __post_init__(self) -> None:
         check_kinds(self)
+        if len(self.pushes) == 0:
+            raise SimError("a person who pushes has no pushes; expected one or more")
         if any(push.place is not None for push in self.pushes):
             raise SimError("a person's push has a place; expected a time and a direction")
 

@@ -1,14 +1,18 @@
 """Messages from Python name keyword arguments where those of the command line name options."""
 
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 import hvf
 from controllers.errors import ParameterError
 from experiments.cli import main
-from experiments.config.keywords import in_keywords, keywords
+from experiments.config.keywords import in_keywords, in_options, keywords
 from experiments.config.words import run_config
 
 CURVE = hvf.circle()
@@ -28,6 +32,8 @@ SIM = hvf.Simulation(
         ("--map FILE.npz, --mode follow, --governor", 'map FILE.npz, mode="follow", governor'),
         ("choose another --out, or --overwrite it", "choose another record, or overwrite it"),
         ("as `hvf run --help` has them, or --threads", "as `hvf run --help` has them, or threads"),
+        ("a smaller --room.r-range or another --room.z-range", "a smaller room.r_range or another room.z_range"),
+        ("add a person, such as --person median", 'add a person, such as person="median"'),
         ("a hand -- and a file a--b-c.bvh", "a hand -- and a file a--b-c.bvh"),
         ("0.4 m --> 0.5 m", "0.4 m --> 0.5 m"),
     ],
@@ -44,6 +50,87 @@ def test_the_kind_of_an_error_and_where_it_was_raised_stay() -> None:
     with pytest.raises(ParameterError, match=r"^lap is 0; expected more$") as raised:
         fails()
     assert raised.traceback[-1].name == "fails"
+
+
+def test_the_command_line_says_what_was_written_also_through_several_functions() -> None:
+    @in_keywords()
+    def fails() -> None:
+        raise ParameterError("--lap is 0 with --figure none")
+
+    with pytest.raises(ParameterError, match=r'^lap is 0 with figure="none"$') as raised:
+        in_keywords(figure="kind")(fails)()
+    assert in_options(raised.value) == "--lap is 0 with --figure none"
+    assert in_options(ParameterError("--lap is 0")) == "--lap is 0"
+
+
+SPACE, CERTIFIED = {"field.k_r": (50.0, 90.0)}, SimpleNamespace(verdict="certified")
+NAN, DESIGN = float("nan"), {"name": "s", "factors": {"stiffness": [100.0, 300.0]}}
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: hvf.Figure(stature=-1.0), "stature is -1; expected more than 0 m, and finite"),
+        (lambda: hvf.Figure(kind="ghost"), "kind is 'ghost'; expected 'physical', 'kinematic' or 'none'"),  # pyright: ignore
+        (lambda: hvf.Figure(kind="none", smoothing=3.0), 'smoothing=3 has no meaning with kind="none"; it belongs to '),
+        (lambda: hvf.Figure(stature=None), "stature is None; expected a number"),  # pyright: ignore
+        (lambda: hvf.Figure("none"), "Figure is given 'none' without a name; expected some of kind=, stature=, mass="),  # pyright: ignore
+        (lambda: hvf.Phantom(150.0), "Phantom is given 150.0 without a name; expected some of kind=, cutoff="),  # pyright: ignore
+        (lambda: hvf.Phantom(cutoff=NAN), "cutoff is nan; expected more than 0 Hz, and finite"),
+        (lambda: hvf.Phantom(device_file=3), "device_file is 3; expected text"),  # pyright: ignore
+        (lambda: hvf.Clock(servo_period=0.0), "servo_period is 0; expected more than 0 s, and finite"),
+        (lambda: hvf.Clock(servo_period=0.02), "servo_period is 0.02; expected at most 0.01 s"),
+        (lambda: hvf.Replay(""), "run is ''; expected text that is not empty"),
+        (lambda: hvf.Replay(3), "run is 3; expected text"),  # pyright: ignore
+        (lambda: list(hvf.sweep(SIM, {"clock.physics_step": [-1.0]})), "physics_step is -1; expected more than 0 s"),
+        (lambda: hvf.certify(replace(SIM, device=hvf.Replay("x"))), "expected a Phantom: leave out replay"),
+        (lambda: hvf.Study.of(**DESIGN, seed=-1), "study: seed is -1; expected 0 or more"),
+        (lambda: hvf.Study.of(**DESIGN, users=3), "study: users is 3; expected values by name, or Users"),
+        (lambda: hvf.Study.of(**DESIGN).with_users(0), "number is 0; expected 1 or more"),
+        (lambda: hvf.Study.of(**DESIGN, run={"lap": -1}).trials, "condition stiffness = 100.0: lap is -1; expected "),
+        (lambda: hvf.Study.of(**DESIGN).run("x", threads=0), "threads is 0; expected 1 or more"),
+        (lambda: hvf.Study.of(**DESIGN).run("x", threads=1, workers=1), "threads and workers contradict each other"),
+        (lambda: hvf.Study.of(**DESIGN).run(""), "out is empty; expected a path"),
+        (lambda: hvf.Study.of(**DESIGN).run("x", console=3), "console is 3; expected Console or None"),  # pyright: ignore
+        (lambda: hvf.Study.load(""), "path is empty; expected a path"),
+        (lambda: hvf.lift("walk", "a.npz"), "names is 'walk'; expected a sequence, each text or Path"),
+        (lambda: hvf.lift(["walk", "run"], ""), "out is empty; expected a path"),
+        (lambda: hvf.lift(["walk", "run"], "a.npz", overwrite="no"), "overwrite is 'no'; expected True or False"),  # pyright: ignore
+        (lambda: hvf.lift(["walk", "run"], "a.npz", seed=True), "seed is True; expected a whole number"),
+        (lambda: hvf.lift(["walk", "run"], "a.npz", room=hvf.Room((0.2, 0.4))), "a smaller room.r_range or another"),
+        (lambda: hvf.Room("x"), "r_range is 'x'; expected 2 numbers"),  # pyright: ignore
+        (lambda: hvf.prepare("", "a.bvh"), "source is empty; expected a path"),
+        (lambda: hvf.prepare("a.bvh", "b.bvh", overwrite=1), "overwrite is 1; expected True or False"),
+        (lambda: hvf.load(""), "path is empty; expected a path"),
+        (lambda: hvf.run(orientation=True), "orientation is not known; there are "),
+        (lambda: hvf.run(user="cut"), 'add a person, such as person="median"'),
+        (lambda: hvf.run(clips="walk"), "clips is 'walk'; expected a list"),
+        (lambda: hvf.run(seed=1.5), "seed is 1.5; expected a whole number"),
+        (lambda: hvf.Search(journal=""), "journal is empty; expected a path"),
+        (lambda: hvf.tune(SIM, SPACE, lambda: 1.0), "cost is <lambda>(); expected a function of a run"),  # pyright: ignore
+        (lambda: hvf.tune(SIM, {"field.k_r": (-5.0, 90.0)}, len), "k_r must be finite and at least 0 N/m, got -5"),  # pyright: ignore
+        (lambda: hvf.tune(SIM, {3: (50.0, 90.0)}, len), "a path of the space is 3; expected text"),  # pyright: ignore
+        (lambda: hvf.tune(SIM, SPACE, len, seconds=None), "seconds is None; expected a number"),  # pyright: ignore
+    ],
+)  # fmt: skip
+def test_each_name_of_the_public_face_is_told_what_is_wrong_in_keywords(
+    make: Callable[[], Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((hvf.ControllerError, hvf.ModelError, hvf.SimError)) as error:
+        make()
+    assert said in str(error.value)
+    assert "--" not in str(error.value)
+    assert "\n" not in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("wrong", ["x", True, None])
+def test_a_search_says_at_which_values_a_cost_is_no_number(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
+    said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected numbers"
+    with pytest.raises(hvf.ParameterError, match=said):
+        hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 
 
 def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(

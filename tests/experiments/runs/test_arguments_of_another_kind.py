@@ -37,7 +37,7 @@ MADE: list[tuple[Any, dict[str, Any]]] = [
     (hvf.intents.Trace, {"tempo": 1}),
     (hvf.intents.Exaggerate, {"larger": 2, "where": (0.1, 0.2)}),
     (hvf.intents.CutCorner, {"start": 0.1, "end": 0.2}),
-    (hvf.intents.Press, {"pushes": ()}),
+    (hvf.intents.Press, {"pushes": (hvf.Push(1.0, 1.0, 2.0),)}),
     (hvf.sweep, {"sim": SIM, "values": {"seed": [1]}, "threads": 1}),
 ]
 OPTIONAL = {"traces", "person", "direction", "place"}

@@ -126,9 +126,9 @@ def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
 @pytest.mark.parametrize(
     ("threads", "workers", "cluster", "says"),
     [
-        (2, 2, None, "--threads and --workers contradict"),
-        (0, None, None, "--threads is 0"),
-        (None, 0, None, "--workers is 0"),
+        (2, 2, None, "threads and workers contradict"),
+        (0, None, None, "threads is 0"),
+        (None, 0, None, "workers is 0"),
     ],
 )
 def test_where_trials_run_is_one_place_and_a_contradiction_leaves_nothing_behind(

@@ -159,7 +159,7 @@ def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle(
     ("values", "says"),
     [
         ({"space": {}}, "empty space"),
-        ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "--stifness is not known"),
+        ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "stifness is not known"),
         ({"space": {"stiffness": {"low": 2.0, "high": 1.0}}}, "lies between 2 and 1"),
         ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "low > 0 for log|log of > 0"),
         ({"objectives": ["speed"]}, "no objective 'speed'"),

@@ -30,8 +30,9 @@ BEHIND = {
     "DHD": (DEVICES / "mock_dhd.c",),
 }
 RESTRICTED = modes.Follow(
-    walls=modes.JointWalls(), governor=modes.SpeedGovernor(), orientation=modes.OrientationMoment(0.05)
-)
+    walls=modes.JointWalls(), governor=modes.SpeedGovernor(),
+    orientation=modes.OrientationMoment(orientation_stiffness=0.05),
+)  # fmt: skip
 RUNS = {
     "bunny": RunConfig(mode=modes.Bunny()),
     "rivers": RunConfig(mode=modes.Rivers()),

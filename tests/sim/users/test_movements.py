@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push
 from sim.users.intents import (
@@ -12,6 +13,7 @@ from sim.users.intents import (
     CutCorner,
     Exaggerate,
     GetLost,
+    Lead,
     Own,
     Press,
     Relax,
@@ -156,11 +158,34 @@ def test_pressing_is_a_force_away_from_the_middle() -> None:
         lambda: Press([Push(0.0, 1.0, 1.0, place=(0.0, 0.0, 0.0))]), lambda: Bend([Grab(0.0, (0.0, 0.0, 0.0))]),
         lambda: Wishes(np.zeros((3, 4))), lambda: Wishes(np.full((3, 10), np.nan)),
         lambda: targets(np.zeros((2, 3)), 0.0),
+        lambda: Press([]), lambda: Bend([]), lambda: ChangeOver(at=np.inf), lambda: Resist(at=np.inf),
+        lambda: GetLost(at=np.inf), lambda: GetLost(seconds=np.inf), lambda: GetLost(seconds=np.nan),
+        lambda: Lead([], 0.1), lambda: Lead(np.zeros((3, 2)), 0.1), lambda: Lead(np.full((3, 3), np.nan), 0.1),
+        lambda: Lead(np.zeros((3, 3)), 0.0), lambda: Lead(np.zeros((3, 3)), -1.0),
+        lambda: Lead(np.zeros((3, 3)), np.nan),
     ],
 )  # fmt: skip
 def test_an_intent_that_makes_no_sense_is_refused(make) -> None:
     with pytest.raises(SimError, match=r"expected|needs"):
         make()
+
+
+def test_an_intent_of_other_values_or_arguments_is_refused_by_name() -> None:
+    for make, said in (
+        (lambda: Lead("x", 0.1), "points is 'x'; expected numbers"),  # pyright: ignore
+        (lambda: Lead(np.zeros((3, 3)), "x"), "period is 'x'; expected a number"),  # pyright: ignore
+        (lambda: Own(lambda t: t), "function is <lambda>(t); expected a function of t, place, force"),
+        (
+            lambda: Own(lambda t, p, f: p, compiled=True),
+            "<lambda>(t, p, f); expected a function of t, place, force, rows",
+        ),
+        (lambda: Own(3), "function is 3; expected a function of t, place, force"),  # pyright: ignore
+    ):
+        with pytest.raises(ParameterError) as error:
+            make()
+        assert said in str(error.value)
+    rows = Lead([(0, 0, 0), (0, 0, 0.1)], 1.0).wishes(CIRCLE, 4.0, 1).rows  # pyright: ignore
+    assert rows[-1, PLACE + 2] == 0.1
 
 
 def test_an_intent_of_one_s_own_says_what_is_wrong_with_it() -> None:

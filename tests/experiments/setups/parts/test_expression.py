@@ -96,8 +96,8 @@ def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_
             {"mode": "stretch", "orientation_stiffness": 0.1},
             f"--orientation-stiffness has no meaning with --mode stretch; {belongs}",
         ),
-        ({"orientation_stiffness": -0.1}, "--orientation-stiffness is -0.1; expected 0 N m/rad or more, and finite"),
-        ({"orientation_damping": np.nan}, "--orientation-damping is nan; expected 0 N m s/rad or more, and finite"),
+        ({"orientation_stiffness": -0.1}, "orientation_stiffness is -0.1; expected 0 N m/rad or more, and finite"),
+        ({"orientation_damping": np.nan}, "orientation_damping is nan; expected 0 N m s/rad or more, and finite"),
     ):
         with pytest.raises(ParameterError, match=says):
             run_config(**options)

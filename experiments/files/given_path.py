@@ -1,0 +1,20 @@
+"""Paths as Python is given them: text or a `pathlib.Path`."""
+
+from pathlib import Path
+
+from controllers.checks import of_kind
+from controllers.errors import ParameterError
+
+
+def given_path(name: str, value: str | Path) -> Path:
+    """The path that an argument says; empty text, which would be the working directory, is refused.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither text nor a path, or is empty.
+    """
+    of_kind(name, value, str | Path)
+    if not str(value):
+        raise ParameterError(f"{name} is empty; expected a path")
+    return Path(value)
