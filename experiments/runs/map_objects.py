@@ -14,6 +14,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted as LiftedMap
 from experiments.config.keywords import in_keywords
 from experiments.config.maps import MapFile
+from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
 from experiments.setups.figure_maps import (
@@ -154,6 +155,7 @@ class Lifted:
     @in_keywords()
     def __post_init__(self) -> None:
         check_kinds(self)
+        given_path("file", self.file)
         _ = self.around
 
     @property

@@ -17,6 +17,7 @@ from controllers.state import Array
 from experiments.config.keywords import keywords
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
+from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.results.folder import (
     CONFIG,
@@ -36,6 +37,13 @@ from experiments.setups.session import Session
 from models.errors import ModelError
 from sim.errors import SimError
 from sim.recording.recording import Recording
+
+
+def check_record(record: str | Path | None, overwrite: bool) -> None:
+    """Refuse values of another kind of what `Run.of` takes, before anything is compiled."""
+    if record is not None:
+        given_path("record", record)
+    of_kind("overwrite", overwrite, bool)
 
 
 class NoChannel(SimError, KeyError):
@@ -144,10 +152,10 @@ class Run:
         SimError
             If the run has no figure.
         """
-        of_kind("path", path, str | Path)
+        target = given_path("path", path)
+        of_kind("overwrite", overwrite, bool)
         if not self._session.world.has_figure:
             raise SimError("the run has no figure, and so no animation; expected a run of a figure")
-        target = Path(path)
         if target.exists() and not overwrite:
             raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")
         if not (self.folder / EDITED).exists():

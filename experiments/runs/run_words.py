@@ -6,7 +6,6 @@ from typing import Any, cast
 
 from rich.console import Console
 
-from controllers.checks import of_kind
 from controllers.errors import ParameterError
 from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
@@ -14,7 +13,8 @@ from experiments.config.run_config import RunConfig, load_config
 from experiments.config.words import changed, run_config
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
-from experiments.runs.run_result import Run
+from experiments.files.given_path import given_path
+from experiments.runs.run_result import Run, check_record
 from experiments.setups.wiring import wire
 
 
@@ -47,14 +47,14 @@ def run(
         If there is no such word, it does not belong to what is chosen, a number is out of its interval, a file cannot
         be read, or the folder cannot be written or holds a run.
     """
-    of_kind("config", config, str | Path | None)
-    of_kind("record", record, str | Path | None)
-    if record is not None and not str(record):
-        raise ParameterError("record is empty; expected a folder, or None for a temporary one")
+    if "out" in words:
+        raise ParameterError("out is an option of the command line; expected record, a folder to write into")
+    file = None if config is None else given_path("config", config)
+    check_record(record, overwrite)
     given: dict[str, Any] = {
         name: tuple(cast(list[object], value)) if isinstance(value, list) else value for name, value in words.items()
     }
-    whole = run_config(**given) if config is None else changed(load_config(Path(config)), given)
+    whole = run_config(**given) if file is None else changed(load_config(file), given)
     check_length(Path(record or tempfile.gettempdir()), whole.seconds, whole.clock.servo_period)
     console = Console(stderr=True)
     session = wire(whole, ready=lambda units: compile_once(console, units))

@@ -26,7 +26,7 @@ from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compile_once
 from experiments.console.estimates import check_length
 from experiments.runs.map_objects import BodyMap, RobotArm
-from experiments.runs.run_result import Run
+from experiments.runs.run_result import Run, check_record
 from experiments.runs.short_text import short_text
 from experiments.setups.figure_maps import (
     own_parts,
@@ -93,7 +93,7 @@ class User:
         Raises
         ------
         ParameterError
-            If an intent is given without a person, or turns with one.
+            If an intent is given without a person, or beside pushes or grabs, or turns with a person.
         SimError
             If the Phantom does not reach what the hand traces.
         """
@@ -104,6 +104,9 @@ class User:
         if self.person is not None:
             if self.turns:
                 raise ParameterError("a person lets the stylus swing and does not turn it; leave out the turns")
+            acts = [name for name in ("pushes", "grabs") if len(getattr(self, name)) > 0]
+            if self.intent is not None and acts:
+                raise ParameterError(f"a person means one thing at a time; expected an intent or {acts[0]}, not both")
             does = "relaxed" if self.traces is None else "trace"
             user = RunUser(does=does, pushes=tuple(self.pushes), grabs=tuple(self.grabs))
             return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
@@ -260,9 +263,7 @@ class Simulation:
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
         of_kind("seconds", seconds, float)
-        of_kind("record", record, str | Path | None)
-        if record is not None and not str(record):
-            raise ParameterError("record is empty; expected a folder, or None for a temporary one")
+        check_record(record, overwrite)
         check_seconds(self, seconds)
         check_length(Path(record or tempfile.gettempdir()), seconds, self.clock.servo_period)
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)

@@ -12,9 +12,11 @@ from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import OP_CODE, OP_PARAMETERS, Join
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
+from experiments.config.keywords import in_keywords
 from experiments.runs.run_result import Run
 from experiments.runs.short_text import name_of
 from experiments.runs.simulation import Simulation
+from experiments.setups.wiring import check_seconds
 
 _LIMITED = "limited"  # the operation `Law.limited`
 _BOUNDS = {"force": "N", "torque": "N m"}  # its numbers, in order
@@ -35,6 +37,7 @@ class Swept(NamedTuple):
     run: Run
 
 
+@in_keywords()
 def sweep(
     sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float = 10.0, threads: int = 1
 ) -> Iterator[Swept]:
@@ -56,13 +59,14 @@ def sweep(
 
     Raises
     ------
-    ParameterError
-        If there is no such parameter, or several laws have it; a parameter has no values; there is no thread; or an
-        argument is of another kind.
+    ModelError, ControllerError, SimError
+        Before the first run, if there is no such parameter, or several laws have it; it has no values, or one that it
+        cannot have; there is no thread; or an argument is of another kind.
     """
     of_kind("sim", sim, Simulation)
     of_kind("values", values, Mapping)
     for path, several in values.items():
+        of_kind("a path of values", path, str)
         of_kind(path, several, Sequence[Any])
         if len(several) == 0:
             raise ParameterError(f"{path} has no values; expected one or more")
@@ -70,13 +74,16 @@ def sweep(
     of_kind("threads", threads, int)
     if threads < 1:
         raise ParameterError(f"threads is {threads}; expected 1 or more")
-    return _swept(sim, values, seconds, threads)
-
-
-def _swept(sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float, threads: int) -> Iterator[Swept]:
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
     simulations = [with_values(sim, chosen) for chosen in combinations]
+    for simulation in simulations:
+        check_seconds(simulation, seconds)
+    return _swept(combinations, simulations, seconds, threads)
 
+
+def _swept(
+    combinations: Sequence[dict[str, Any]], simulations: Sequence[Simulation], seconds: float, threads: int
+) -> Iterator[Swept]:
     def run(simulation: Simulation) -> Run:
         return simulation.run(seconds)
 
