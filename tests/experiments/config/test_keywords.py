@@ -67,6 +67,9 @@ SPACE, CERTIFIED = {"field.k_r": (50.0, 90.0)}, SimpleNamespace(verdict="certifi
 NAN, DESIGN = float("nan"), {"name": "s", "factors": {"stiffness": [100.0, 300.0]}}
 
 
+PUSH = hvf.Push(0.0, 1.0, 1.0)
+
+
 def meant(**does: Any) -> Any:
     return replace(SIM, user=hvf.User(person=hvf.Person(), **does)).session(1.0)
 
@@ -119,7 +122,7 @@ def meant(**does: Any) -> Any:
         (lambda: hvf.sweep(SIM, {"field.k_r": [200, -1]}), "k_r must be finite and at least 0 N/m, got -1"),
         (lambda: hvf.sweep(SIM, {3: [1]}), "a path of values is 3; expected text"),  # pyright: ignore
         (lambda: hvf.sweep(SIM, {"seed": [1]}, seconds=NAN), "a run of nan s; expected 0.004 s or more, and finite"),
-        (lambda: meant(intent=hvf.intents.Trace(), pushes=[hvf.Push(0.0, 1.0, 1.0)]), "expected an intent or pushes, not"),
+        (lambda: meant(intent=hvf.intents.Trace(), pushes=[PUSH]), "expected an intent or pushes, not both"),
         (lambda: hvf.Search(journal=""), "journal is empty; expected a path"),
         (lambda: hvf.tune(SIM, SPACE, lambda: 1.0), "cost is <lambda>(); expected a function of a run"),  # pyright: ignore
         (lambda: hvf.tune(SIM, {"field.k_r": (-5.0, 90.0)}, len), "k_r must be finite and at least 0 N/m, got -5"),  # pyright: ignore
