@@ -10,7 +10,7 @@ from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
-from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.results.folder import RECORDING, animated, clips_of, config_of
 from experiments.results.measures.run_measures import SETTLING
 from experiments.setups.setups import clips_for
 from models.humanoid.skeleton import DEFAULT_STATURE
@@ -55,8 +55,8 @@ def similar(clip: Clip, size: float) -> Clip:
 
 
 def played(recording: Recording) -> tuple[Clip, ...]:
-    """The animation of a recorded run as it was played, after the first second; empty without a reference."""
-    if "reference" not in recording.groups.get("frames", {}):
+    """The animation of a recorded run as it was played, after the first second; empty if nothing was animated."""
+    if not animated(recording):
         return ()
     rate = recording.rates["frames"]
     stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_LONGEST * rate)

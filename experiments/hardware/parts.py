@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from controllers.errors import ParameterError
 from controllers.safety.gate import Gate
 from controllers.state import Array
 from experiments.config.run_config import Clock, RunConfig, phantom_of
@@ -30,7 +31,14 @@ def served(config: RunConfig) -> RunConfig:
 
     The device replaces the simulated physics, and the figure is evaluated where it is shown; the certificate depends on
     neither of the two.
+
+    Raises
+    ------
+    ParameterError
+        If the map moves a robot arm: only figures are shown beside a device.
     """
+    if config.body == "robot":
+        raise ParameterError("beside a device only figures are shown; expected another map than robot-arm")
     clock = Clock(servo_period=config.clock.servo_period, physics_step=config.clock.servo_period)
     return replace(config, figure=config.figure.become("none", config.leads), clock=clock)
 

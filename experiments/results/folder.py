@@ -97,6 +97,11 @@ def of_device(recording: Recording) -> bool:
     return "clock" in recording.groups.get("ticks", {})
 
 
+def animated(recording: Recording) -> bool:
+    """Whether a recording holds the animation of a figure: a run without one has none, nor has a robot arm's."""
+    return "reference" in recording.groups.get("frames", {}) and recording.texts.get("figure") != "robot"
+
+
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
     """The clips of a recording, as poses of the figure."""
     names = recording.text("clip_names").split("\n") if recording.text("clip_names") else []

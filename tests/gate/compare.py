@@ -85,7 +85,7 @@ def differences(before: Path, after: Path) -> Iterator[str]:
                 if name not in old[group] or name not in new[group]:
                     yield f"{group}/{name} is in one of them only"
                     continue
-                was, now = old[group][name][()], new[group][name][()]
+                was, now = (np.atleast_1d(file[group][name][()]) for file in (old, new))
                 if was.shape != now.shape:
                     yield f"{group}/{name} has shape {now.shape}, had {was.shape}"
                 elif was.tobytes() != now.tobytes():

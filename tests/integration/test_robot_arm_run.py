@@ -66,6 +66,10 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
     (folder / "report.html").unlink()
     assert main(["report", str(folder)]) == 0
     assert (folder / "report.html").read_text(encoding="utf-8") == page
+    assert main(["certify", str(folder), "--out", str(tmp_path / "certificate")]) == 0
+    told = capsys.readouterr().out
+    assert "stability: certified" in told
+    assert "ballistic" not in told  # an arm plays no clip
     altered = tmp_path / "altered"
     shutil.copytree(folder, altered)
     with h5py.File(altered / "run.h5", "r+") as file:
@@ -124,6 +128,8 @@ def test_what_has_no_meaning_for_an_arm_is_refused(
     assert "the map cylindrical moves a figure; expected --map robot-arm" in capsys.readouterr().err
     assert main(["live", "--map", "robot-arm", "--out", str(out)]) == 2
     assert "the live page shows a figure" in capsys.readouterr().err
+    assert main(["hardware", "run", "--device", "emulated", "--arm", "--map", "robot-arm", "--out", str(out)]) == 2
+    assert "beside a device only figures are shown" in capsys.readouterr().err
 
 
 @pytest.mark.slow

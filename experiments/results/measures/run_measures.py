@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from controllers.state import Array, Mask
-from experiments.results.folder import scene_of
+from experiments.results.folder import animated, scene_of
 from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
 from experiments.results.measures.changes import river_changes
@@ -85,8 +85,7 @@ def measured(
         FigureMeasure(recording),
     )
     tank = TankSummary(math.inf, 0)
-    physical = "joint_error" in recording.groups["frames"]
-    shown = physical or recording.texts.get("figure") == "kinematic"
+    physical, shown = "joint_error" in recording.groups["frames"], animated(recording)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
     rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
     begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)

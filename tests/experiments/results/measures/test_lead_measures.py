@@ -201,8 +201,8 @@ def test_the_lines_tell_it() -> None:
         ({"walls": True}, "--walls has no meaning with --mode lead"),
         ({"clips": ("walk", "run")}, "one clip is led, got 2"),
         ({"clips": ("cheer",)}, "must go somewhere"),
-        ({"floor_scale": -1.0}, "--floor-scale is -1; expected 0.001 or more, and finite"),
-        ({"leash": -1.0}, "--leash is -1; expected 0 N/m or more, and finite"),
+        ({"floor_scale": -1.0}, "floor_scale is -1; expected 0.001 or more, and finite"),
+        ({"leash": -1.0}, "leash is -1; expected 0 N/m or more, and finite"),
     ],
 )
 def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
