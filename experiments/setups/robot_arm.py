@@ -67,7 +67,7 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     SimError
         If the Phantom does not reach the curve.
     """
-    away = float(np.linalg.norm(curve.point(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
+    away = float(np.linalg.norm(reached(curve).point(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
     if scale * away > _REACH[0]:
         raise ParameterError(
             f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most {1e3 * _REACH[0]:.0f} mm "
@@ -80,7 +80,7 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
         return cast(ClipMap, made), ()
 
     return ClipMapParts(
-        haptic_map=cast(ClipMap, made), clips=(), curve=reached(curve), reach=reach, turning=True, refined=refined,
+        haptic_map=cast(ClipMap, made), clips=(), curve=curve, reach=reach, turning=True, refined=refined,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)),

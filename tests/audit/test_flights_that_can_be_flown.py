@@ -81,7 +81,7 @@ def test_an_animation_is_judged_as_it_was_played_and_every_clip_is_listed():
     pace = 0.65
     frames = np.clip(np.arange(0.0, 1.0 + clip.duration / pace, 1.0 / rate) - 1.0, 0.0, None) * pace * clip.fps
     poses = clip.poses[np.minimum(np.round(frames).astype(int), clip.n_frames - 1)]
-    of_run = SimpleNamespace(groups={"frames": {"reference": poses}}, rates={"frames": rate},
+    of_run = SimpleNamespace(texts={}, groups={"frames": {"reference": poses}}, rates={"frames": rate},
                              channel=lambda group, name: poses)  # fmt: skip
     (taken,) = played(of_run)
     told = certify_clips((embedded("walk"), clip, taken))["ballistic"]

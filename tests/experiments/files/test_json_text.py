@@ -52,7 +52,7 @@ def test_a_file_of_another_program_may_have_its_own_word_for_an_infinite_number(
     (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "tube": Infinity}}', encoding="utf-8")
     assert load_config(tmp_path / "mine.json") == run_config(tube=np.inf)
     (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "stiffness": "Infinity"}}', encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"--stiffness is inf; expected .* finite"):
+    with pytest.raises(ParameterError, match=r"stiffness is inf; expected .* finite"):
         load_config(tmp_path / "mine.json")
 
 
