@@ -7,9 +7,11 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.weights import Weight
+from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import Follow
+from controllers.fields.higher_order import HigherOrder
 from controllers.fields.own.python_law import PythonLaw
-from controllers.fields.river import window
+from controllers.fields.river import River, window
 from controllers.state import HandState
 from tests.controllers.fields.field_probes import force_of, largest_jump
 
@@ -40,6 +42,17 @@ def test_gate_and_blend_are_their_formulas(weight, s):
     np.testing.assert_allclose(force_of(A.gated(weight), HAND), s * F, rtol=1e-12)
     np.testing.assert_allclose(force_of(A.gated(~weight), HAND), (1 - s) * F, rtol=1e-12)
     np.testing.assert_allclose(force_of(A.blended(B, weight), HAND), (1 - s) * F + s * G, rtol=1e-12)
+
+
+def test_a_field_names_the_curves_along_which_it_leads():
+    circle, other = Trajectory.circle(0.05, 4.0), Trajectory.circle(0.03, 2.0)
+    first, second = River(circle, 0.03, 0.02, 4.0), River(other, 0.02, 0.02, 4.0)
+    bundle = RiverBundle((first, second), ("a", "b"))
+    still = PythonLaw(lambda hand: np.zeros(3))
+    assert still.curves == ()
+    assert (Follow(other, 100.0, 1.0, 0.028) + still + Follow(circle, 200.0, 4.0, 0.03)).curves == (other, circle)
+    crossing = HigherOrder(bundle, admission=0.02, sigma=0.01)
+    assert crossing.curves == crossing.limited(3.0).curves == (circle, other)
 
 
 def test_the_switch_gates():
