@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import CodeType
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from controllers.certificates.report import hash_of
 from controllers.checks import check_kinds, numbers_of, of_kind, takes
 from controllers.errors import ParameterError
+from controllers.state import Array
 from experiments.certify.certify_simulation import certify
 from experiments.config.keywords import in_keywords
 from experiments.files.given_path import given_path
@@ -221,8 +223,16 @@ def _means(
         return replace(candidate, user=user).run(seconds)
 
     with ThreadPoolExecutor(max(1, search.threads)) as pool:
-        costs = [np.atleast_1d(numbers_of(f"the cost at {dict(values)}", cost(run))) for run in pool.map(run, users)]
-    for found in costs:
-        if found.shape != (search.costs,) or not np.all(np.isfinite(found)):
-            raise ParameterError(f"the cost at {dict(values)} is {found.tolist()}; expected {search.costs} finite")
+        costs = [_finite(cost(run), search.costs, values) for run in pool.map(run, users)]
     return [float(mean) for mean in np.mean(costs, axis=0)]
+
+
+def _finite(cost: object, count: int, values: Mapping[str, Any]) -> Array:
+    """The cost of a run as `count` numbers; anything else is refused, with the values at which it is."""
+    with suppress(ParameterError):
+        found = np.atleast_1d(numbers_of("the cost", cast(Any, cost)))
+        if found.shape == (count,) and np.all(np.isfinite(found)):
+            return found
+    raise ParameterError(
+        f"the cost at {dict(values)} is {cost!r}; expected {count} finite number{'s' if count > 1 else ''}"
+    )

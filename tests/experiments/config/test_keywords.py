@@ -145,7 +145,7 @@ def test_each_name_of_the_public_face_is_told_what_is_wrong_in_keywords(
 @pytest.mark.parametrize("wrong", ["x", True, None])
 def test_a_search_says_at_which_values_a_cost_is_no_number(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
-    said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected numbers"
+    said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
     with pytest.raises(hvf.ParameterError, match=said):
         hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 
