@@ -96,8 +96,22 @@ class RiverClips:
     expressive: bool = False
 
 
+class _WithoutClips:
+    """What maps have that name no clips."""
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        """None by name: a file has its own, and an arm plays none."""
+        return ()
+
+    @property
+    def raw(self) -> bool:
+        """There is nothing to prepare."""
+        return True
+
+
 @part
-class MapFile:
+class MapFile(_WithoutClips):
     """A map from a file, with clips of its own, such as one that was lifted.
 
     Parameters
@@ -118,19 +132,9 @@ class MapFile:
     reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
 
-    @property
-    def clips(self) -> tuple[str, ...]:
-        """None by name: those of the file count."""
-        return ()
-
-    @property
-    def raw(self) -> bool:
-        """Those of the file are as they are."""
-        return True
-
 
 @part
-class RobotArm:
+class RobotArm(_WithoutClips):
     """A robot arm of seven joints in the place of the figure: its tool follows the stylus.
 
     Parameters
@@ -147,16 +151,6 @@ class RobotArm:
     around: Circle = Circle()
     reach: float = above(0.0, default=0.025, unit="m")
     scale: float = above(0.0, default=1.5)
-
-    @property
-    def clips(self) -> tuple[str, ...]:
-        """None: an arm plays no clip."""
-        return ()
-
-    @property
-    def raw(self) -> bool:
-        """There is nothing to prepare."""
-        return True
 
 
 @part

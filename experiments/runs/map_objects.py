@@ -194,16 +194,16 @@ class RobotArm:
     Parameters
     ----------
     around : Trajectory
-        Curve in front of which hands begin.
+        Curve about which the hand is led.
     reach : float
-        Half width of the tube about the curve in which they do [m].
+        Half width of the tube about it in which hands begin [m].
     scale : float
         Ratio of the tool's motion to the stylus's [1].
 
     Raises
     ------
     ParameterError
-        If a number is not positive.
+        If a number is not positive, or, when it is run, the arm does not reach what it is led to.
     SimError
         If the Phantom does not reach the curve.
     """

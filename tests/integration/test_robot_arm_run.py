@@ -78,6 +78,10 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
         file["config"] = json.dumps(config | {"mode": config["mode"] | {"stiffness": 301.0}})
     assert main(["reproduce", str(altered)]) == 1
     assert "differs first at" in capsys.readouterr().out
+    with h5py.File(altered / "run.h5", "r+") as file:
+        del file["static/title"]
+    assert main(["report", str(altered)]) == 2
+    assert "recorded by another version of the program" in capsys.readouterr().err
 
 
 @pytest.mark.slow

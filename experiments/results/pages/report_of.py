@@ -11,15 +11,27 @@ from experiments.results.pages.hardware_report import write_hardware_report
 from experiments.results.pages.lead_figure import draw_lead
 from experiments.results.pages.report import write_report
 from experiments.results.pages.stretch_figure import draw_stretch
+from sim.errors import SimError
 from sim.recording.recording import Recording
 
 
 def write_report_of(folder: Path) -> None:
-    """Draw the figures and the page of a run from its recording."""
+    """Draw the figures and the page of a run from its recording.
+
+    Raises
+    ------
+    SimError
+        If it was recorded by an incompatible version of the program.
+    """
     with Recording(folder / RECORDING) as recording:
         if "frames" not in recording.groups:  # a hardware run, which has no figure in the loop
             write_hardware_report(folder, recording, lines_of(recording, folder))
             return
+        if "title" not in recording.texts:
+            raise SimError(
+                f"{recording.path}: lacks its title; it was recorded by another version of the program, "
+                "which can draw it, or run it again"
+            )
         figures = draw_figures(recording, folder / FIGURES)
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")
