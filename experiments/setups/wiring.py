@@ -10,9 +10,9 @@ import numpy as np
 from controllers.curves.stylus import UPRIGHT
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE, HandState
+from controllers.state import STYLUS_POSE
 from controllers.walking.walker import walker_at
-from experiments.config.run_config import NOBODY_LED, Replay, RunConfig, phantom_of
+from experiments.config.run_config import NOBODY_LED, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.bodies import body_of, figure_period
 from experiments.setups.parts.defaults import resolved
@@ -28,20 +28,14 @@ from models.mocap.motion.clip import Clip
 from models.one_blas_thread import on_one_blas_thread
 from models.phantom.kinematics import Quat
 from sim.compilation.units import Unit
-from sim.devices.replayed import ReplayedHand
-from sim.devices.simulated import SimulatedPhantom, simulated_phantom
+from sim.devices.device import known_start, measure_in_motion
+from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.map_derivative import derivative_unit, map_derivative
-from sim.reference.reference import (
-    along_unit,
-    begin_in_motion,
-    check_reference,
-    poses_along,
-)
+from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along
 from sim.reference.settling import lower_start, lower_start_unit
-from sim.users.participant import Participant
-from sim.world.phantom_port import phantom_port, sense_in_motion
+from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.world import World
 
@@ -127,9 +121,9 @@ def assemble(
     refined = maps if world.kind == "none" else maps.refine(world.kind == "physical")
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
-    if isinstance(parts.user, Participant) and world.has_figure and parts.walking is None:
+    if parts.user.wishes is not None and world.has_figure and parts.walking is None:
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
-        servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
+        servo = with_eyes(servo, parts.user.wishes, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks)
 
@@ -209,14 +203,14 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         world.reset(begin.point, poses[0], orientation, stylus, figure)
         if moves:
             begin_in_motion(reference, np.array(begin))
-    if moves and isinstance(servo.device, SimulatedPhantom):
-        sense_in_motion(servo.device.port)
+    if moves:
+        measure_in_motion(servo.device)
 
 
 def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
     """How the stylus begins, and its orientation; without one the gimbal's joints are at zero."""
-    if isinstance(parts.config.device, Replay) and isinstance(servo.device, ReplayedHand):
-        hand = HandState.of(servo.device.rows[0])
+    hand = known_start(servo.device)
+    if hand is not None:
         w, x, y, z = (float(number) for number in hand.q)
         return Beginning(hand.p, hand.v, np.zeros(3)), (w, x, y, z)
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), parts.begins_in_motion)

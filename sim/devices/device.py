@@ -13,12 +13,13 @@ from typing import Any, TypeAlias
 
 from numba.extending import overload
 
-from controllers.state import Array
+from controllers.state import Array, HandState
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 from sim.devices.exchange import Exchange, actuate_exchange, advance_exchange, sense_exchange
 from sim.devices.replayed import ReplayedHand, actuate_replayed, advance_replayed, sense_replayed
 from sim.devices.simulated import SimulatedPhantom, actuate_simulated, advance_simulated, sense_simulated
+from sim.world.phantom_port import sense_in_motion
 from sim.world.plant import Plant
 
 DeviceState: TypeAlias = SimulatedPhantom | ReplayedHand | Exchange
@@ -91,3 +92,14 @@ def link_device(device: DeviceState) -> None:
 def ticks_of(device: DeviceState) -> int | None:
     """Number of ticks that a device can deliver; None if unlimited."""
     return len(device.rows) if isinstance(device, ReplayedHand) else None
+
+
+def known_start(device: DeviceState) -> HandState | None:
+    """Reading with which a device begins, where that is known before the run; otherwise None."""
+    return HandState.of(device.rows[0]) if isinstance(device, ReplayedHand) else None
+
+
+def measure_in_motion(device: DeviceState) -> None:
+    """Let a device whose joints move when the run begins measure their velocity from the first tick on."""
+    if isinstance(device, SimulatedPhantom):
+        sense_in_motion(device.port)

@@ -12,29 +12,27 @@ from models.mocap.motion.clip import pose_difference
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
 from sim.reference.reference import poses_along
-from sim.users.participant import Participant
 from sim.users.person.eye import Eye
-from sim.users.person.wishes import ENGAGED, PLACE
+from sim.users.person.wishes import ENGAGED, PLACE, Wishes
 
 POSES = 128  # poses along a motion: some 3 degrees of a lap apart
 _BESIDE = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
 _BLIND = 0.15  # damping of the inverse over the largest singular value: weaker effects are felt rather than seen
 
 
-def with_eyes(servo: Servo, user: Participant, curve: Array) -> Servo:
+def with_eyes(servo: Servo, wishes: Wishes, curve: Array) -> Servo:
     """The servo with a person who sees the figure.
 
     Parameters
     ----------
     servo : Servo
         Linked servo of a figure whose map's argument is the stylus.
-    user : Participant
-        The person; the places of her wishes are those that she has in mind, or `curve` if there are none.
+    wishes : Wishes
+        What the person wants; their places are those that she has in mind, or `curve` if there are none.
     curve : Array
         Points of the map's curve in H [m], shape (n, 3).
     """
     assert isinstance(servo.device, SimulatedPhantom)
-    wishes = user.wishes
     rows = wishes.rows[wishes.rows[:, ENGAGED] > 0.0, PLACE : PLACE + 3]
     if wishes.period > 0.0 and wishes.lap > 0.0:
         rows = rows[: round(wishes.lap / wishes.period)]

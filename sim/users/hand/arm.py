@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -208,6 +208,8 @@ class Arm:
     turns: Sequence[Turn] = ()
     turn_stiffness: float = 0.1
     turn_damping: float = 2.5e-3
+    wishes: ClassVar[None] = None
+    """None: an arm does not look at the figure."""
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "damping", "turn_stiffness", "turn_damping"):
