@@ -10,7 +10,9 @@ which `contraction` verifies independently.
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import NamedTuple
+from functools import cache
+from threading import get_ident
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
@@ -83,15 +85,32 @@ def common_lyapunov(maps: Sequence[Array]) -> Common | None:
 
 
 def _improved(maps: Sequence[Array]) -> Array:
-    """P of trace n with the largest least decrease t, P − A_iᵀ P A_i ≥ t I; the identity matrix if none is found."""
+    """P of trace n with the largest least decrease t, P − A_iᵀ P A_i ≥ t I; the identity matrix if none is found.
+
+    The maps are stable, so that t > 0 makes P positive definite.
+    """
     import cvxpy  # here, since the import takes a second and most certificates do not need it
 
-    n = len(maps[0])
-    p, least = cvxpy.Variable((n, n), PSD=True), cvxpy.Variable()
-    decrease = [p - a.T @ p @ a - least * np.eye(n) for a in maps]
-    constraints: list[cvxpy.Constraint] = [cvxpy.PSD(0.5 * (gap + gap.T)) for gap in decrease]
-    constraints.append(cvxpy.Zero(cvxpy.trace(p) - n))
+    problem, p, products = _program(len(maps[0]), len(maps), get_ident())
+    for product, a in zip(products, maps, strict=True):
+        product.value = np.kron(a.T, a.T)
+    p.value = None  # where the solver fails, P is not that of other maps
     with warnings.catch_warnings(), suppress(cvxpy.SolverError):
         warnings.simplefilter("ignore", UserWarning)  # of a solution that is inaccurate: it is judged
-        cvxpy.Problem(cvxpy.Maximize(least), constraints).solve(solver=cvxpy.CLARABEL)
-    return np.eye(n) if p.value is None else 0.5 * (p.value + p.value.T)
+        problem.solve(solver=cvxpy.CLARABEL)
+    return np.eye(len(maps[0])) if p.value is None else 0.5 * (p.value + p.value.T)
+
+
+@cache
+def _program(n: int, count: int, thread: int) -> tuple[Any, Any, list[Any]]:
+    """The semidefinite program of `count` maps, its P, and its parameters A_iᵀ ⊗ A_iᵀ; translated for Clarabel once.
+
+    Each thread has its own, since solving sets the parameters.
+    """
+    import cvxpy
+
+    p, least = cvxpy.Variable((n, n), symmetric=True), cvxpy.Variable()
+    products = [cvxpy.Parameter((n * n, n * n)) for _ in range(count)]
+    after = [cvxpy.reshape(product @ cvxpy.vec(p, order="F"), (n, n), order="F") for product in products]
+    decrease = [cvxpy.PSD(p - last - least * np.eye(n)) for last in after]
+    return cvxpy.Problem(cvxpy.Maximize(least), [*decrease, cvxpy.Zero(cvxpy.trace(p) - n)]), p, products
