@@ -29,7 +29,11 @@ def assert_published(panels: Sequence[Sequence[Law]]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in STUDIES if name not in HARDLY_VARY])
 def test_a_published_law_holds_over_fresh_panels(name: str) -> None:
-    assert_published([user_laws(PEOPLE, seed, (name,))[0].laws for seed in PANELS])
+    panels = [user_laws(PEOPLE, seed, (name,))[0].laws for seed in PANELS[:-1]]
+    # Between two values that lie in an interval the median of three does, too: the third is not needed.
+    if not all(law.least <= law.value <= law.most for panel in panels for law in panel):
+        panels.append(user_laws(PEOPLE, PANELS[-1], (name,))[0].laws)
+        assert_published(panels)
 
 
 @pytest.mark.slow

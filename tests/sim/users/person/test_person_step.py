@@ -7,6 +7,8 @@ import pytest
 from numba import njit
 
 from controllers.curves.trajectory import Trajectory
+from controllers.kernel_call import call_as_given
+from controllers.lent import lend
 from sim.devices.simulated import simulated_phantom
 from sim.loop.loop import Loop
 from sim.users.intents import Own, Trace, Wish
@@ -24,7 +26,7 @@ from sim.users.person.person_state import (
     REFLEX,
     PersonState,
 )
-from sim.users.person.person_step import person_step
+from sim.users.person.person_unit import link_person
 from sim.users.person.senses import ASTRAY_TIME, VEER_TIME, go_astray
 from sim.users.person.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
@@ -35,18 +37,26 @@ QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, direction_noise=
 PERIOD, STEP = 1e-3, 2.5e-4
 
 
+@njit
+def _held(person: PersonState, ticks: int, first: int, p: np.ndarray, force: np.ndarray, switch: np.ndarray) -> None:
+    at_rest = np.zeros(3)
+    for k in range(first, first + ticks):
+        for i in range(round(PERIOD / STEP)):
+            call_as_given(person.units[0], (lend(person), k * PERIOD, STEP, i, p, at_rest, force, switch))
+
+
 class Clamped:
-    """A person whose stylus is held where the test says."""
+    """A person whose stylus is held where the test says, in the unit that a run has."""
 
     def __init__(self, person: Person, wishes: Wishes):
         self.state = Participant(person, wishes, 1).holding(PERIOD, STEP)
+        link_person(self.state)
         self.force, self.switch, self.ticks = np.zeros(3), np.zeros(1), 0
 
     def hold(self, p: np.ndarray, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD)):
-            for i in range(round(PERIOD / STEP)):
-                person_step(self.state, self.ticks * PERIOD, STEP, i, p, np.zeros(3), self.force, self.switch)
-            self.ticks += 1
+        ticks = round(seconds / PERIOD)
+        _held(self.state, ticks, self.ticks, p, self.force, self.switch)
+        self.ticks += ticks
 
 
 def test_at_rest_arm_and_fingers_are_springs_in_series() -> None:
