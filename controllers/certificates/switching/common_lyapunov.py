@@ -97,7 +97,7 @@ def _improved(maps: Sequence[Array]) -> Array:
     p.value = None  # where the solver fails, P is not that of other maps
     with warnings.catch_warnings(), suppress(cvxpy.SolverError):
         warnings.simplefilter("ignore", UserWarning)  # of a solution that is inaccurate: it is judged
-        problem.solve(solver=cvxpy.CLARABEL)
+        problem.solve(solver=cvxpy.CLARABEL, warm_start=False)  # else it keeps the scaling of other maps
     return np.eye(len(maps[0])) if p.value is None else 0.5 * (p.value + p.value.T)
 
 

@@ -1,6 +1,7 @@
 """Switching of rivers: Lyapunov functions judged independently, bounds that hold in MuJoCo, hands lost there."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -63,6 +64,20 @@ def test_maps_that_share_a_function_get_one_that_eigenvalues_confirm():
     for a in maps:
         assert np.linalg.eigvalsh(found.rate**2 * found.p - a.T @ found.p @ a)[0] > -1e-9
     assert 0.8 - 1e-9 <= found.rate < 1.0
+
+
+def test_a_function_depends_neither_on_those_sought_before_nor_on_those_sought_beside():
+    rng = np.random.default_rng(5)
+    pairs = [[a / (1.2 * np.abs(np.linalg.eigvals(a)).max()) for a in rng.normal(size=(2, 4, 4))] for _ in range(24)]
+    found = [common_lyapunov(pair) for pair in pairs]
+    assert 2 < sum(each is None for each in found) < 22
+    with ThreadPoolExecutor(2) as pool:
+        beside = list(pool.map(common_lyapunov, pairs))
+    for again in ([common_lyapunov(pair) for pair in pairs[::-1]][::-1], beside):
+        for one, other in zip(found, again, strict=True):
+            assert (one is None) == (other is None)
+            if one is not None and other is not None:
+                np.testing.assert_array_equal(one.p, other.p)
 
 
 def test_maps_whose_product_grows_have_none():
