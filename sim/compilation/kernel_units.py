@@ -6,20 +6,22 @@ function that Python calls.
 """
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 from controllers.fields.algebra.instructions import LAW_ARGUMENTS
 from controllers.fields.algebra.law import Program
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
-from controllers.kernel_call import address_of
+from controllers.kernel_call import KEEPERS, address_of
 from controllers.state import Array, IntArray
 from controllers.walking.walking import follow_hand
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
 
-for _kernel in MAP_KERNELS.values():  # what Python asks of a map is answered by its unit
+for _kernel in (evaluate, *MAP_KERNELS.values()):  # what Python asks of a field or a map is answered by its unit
     keep_on_disk(_kernel)
 
 
@@ -55,6 +57,12 @@ def linked_walkers(walkers: Walkers) -> Walkers:
 def is_kept(kernel: Callable[..., None]) -> bool:
     """Whether a law's kernel is cached on disk as a unit: not if it is a closure over a user-defined function."""
     return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
+
+
+@KEEPERS.append
+def _keep_law(kernel: Any) -> None:
+    if is_kept(kernel):
+        keep_on_disk(kernel)
 
 
 def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:

@@ -20,6 +20,13 @@ import experiments.cli, experiments.runs.run
 print(*(name for name in {HEAVY} if name in sys.modules))
 """
 
+_EVALUATES = """
+import hvf
+import numpy as np
+field = hvf.Follow(hvf.circle(radius=0.0477, lap=4.0), k_r=300.0, b_d=8.0)
+print(np.linalg.norm(field.wrench(hvf.HandState.at((0.05, 0.0, 0.0)))[0]))
+"""
+
 _COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
 
 
@@ -36,6 +43,13 @@ def test_a_command_that_is_named_is_the_only_one_imported() -> None:
 
 def test_what_a_process_compiles_is_told() -> None:
     assert "compiles smooth_step" in compiled(process(TELLS + _COMPILES))
+
+
+def test_a_law_that_python_evaluates_is_compiled_once_for_all_processes() -> None:
+    """As a certificate does with the program of a run."""
+    for ran in (process(TELLS + _EVALUATES), process(TELLS + _EVALUATES)):
+        assert float(ran.stdout) > 0.0
+    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(ran)).split())
 
 
 @pytest.fixture(scope="module")
