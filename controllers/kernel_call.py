@@ -55,15 +55,15 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
-KEEPERS: list[Callable[[Any], None]] = []
-"""Called with each kernel before it is compiled: `sim.compilation` has its code kept on disk."""
+KEEPERS: list[Callable[[Any, tuple[types.Type, ...]], None]] = []
+"""Called with each kernel and its types before it is compiled: `sim.compilation` has the code of laws kept on disk."""
 
 
 @cache
 def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
     """Address of a kernel (an ``njit`` function) after compiling it in this process for these types; kept alive."""
     for keep in KEEPERS:
-        keep(kernel)
+        keep(kernel, arguments)
     kernel.compile(arguments)
     compiled = kernel.get_compile_result(types.void(*arguments))
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

@@ -60,8 +60,8 @@ def is_kept(kernel: Callable[..., None]) -> bool:
 
 
 @KEEPERS.append
-def _keep_law(kernel: Any) -> None:
-    if is_kept(kernel):
+def _keep_law(kernel: Any, arguments: tuple[Any, ...]) -> None:
+    if arguments == LAW_ARGUMENTS and is_kept(kernel):
         keep_on_disk(kernel)
 
 
