@@ -100,7 +100,11 @@ class HidrawNode:
 
     def close(self) -> None:
         self._line.close()
-        self._server.wait(10)
+        try:
+            self._server.wait(10)
+        except subprocess.TimeoutExpired:  # umockdev sometimes waits for a client that has gone
+            self._server.kill()
+            self._server.wait()
 
 
 class NodeFirmware:

@@ -152,7 +152,7 @@ def main() -> None:
         except ConnectionError:
             pass  # the test has ended
         finally:
-            loop.quit()
+            GLib.idle_add(loop.quit)  # by the loop itself, which may not have begun yet
 
     node.tell(directory=directory)
     threading.Thread(target=serve, daemon=True).start()
