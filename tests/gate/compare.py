@@ -48,7 +48,7 @@ CASES = {
     "own-law": f"{_SCRIPT} own_law.py",
     "compiled-law": f"{_SCRIPT} compiled_law.py",
     "reproduce": f"reproduce {_RUN}",
-    "replay": f"{_SCRIPT} replay.py {_RUN}",
+    "replay": f"run --replay {_RUN} --seconds 2",
 }
 
 
