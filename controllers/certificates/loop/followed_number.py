@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Literal, NamedTuple, NoReturn
 
 import casadi
 import numpy as np
-import numpy.typing as npt
 
 from controllers.certificates.loop.device import Symbol
 from controllers.errors import ControllerError
@@ -213,7 +212,7 @@ class FollowedNumber:
     hypot = partialmethod(_with, made=_hypot)
 
 
-class FollowedVector(npt.NDArray[Any]):
+class FollowedVector(np.ndarray[Any, np.dtype[Any]]):
     """A vector of the hand as an array of `FollowedNumber`, whose Euclidean norm is one, too."""
 
     @staticmethod
