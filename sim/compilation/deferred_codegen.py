@@ -10,12 +10,14 @@ This patches numba's internals. With an untested version numba is left unpatched
 # pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
 # The patched attributes are private to numba; TESTED lists the versions for which they are known.
 
+import gc
+from functools import cache
 from typing import Any
 from weakref import WeakValueDictionary
 
 import numba
 from llvmlite import ir
-from numba.core import base, codegen, cpu, dispatcher, sigutils
+from numba.core import base, codegen, cpu, dispatcher, sigutils, targetconfig
 from numba.core.environment import lookup_environment
 
 from sim.errors import SimError
@@ -24,6 +26,7 @@ TESTED = ("0.68",)
 """Minor versions of numba for whose internals the patches were tested."""
 
 _SYMBOL = "_ZN"  # prefix of the names that numba gives to functions
+_YOUNG = (20_000, 10, 1000)  # thresholds of Python's garbage collector without a full collection
 _ENVIRONMENT = "_ZN08NumbaEnv"  # prefix of the names of their environments, which hold constants
 
 
@@ -36,15 +39,26 @@ class _NoEntry:
 
 
 class _Depth:
-    """Nesting depth of the compilation in progress, 1 for the outermost; protected by numba's compiler lock."""
+    """Nesting depth of the compilation in progress, 1 for the outermost; protected by numba's compiler lock.
+
+    What a compilation makes is needed until it ends: to look through all of it for garbage again and again takes a
+    tenth of the time, so meanwhile only young objects are looked through.
+    """
 
     now = 0
 
+    thresholds = gc.get_threshold()
+
     def __enter__(self) -> None:
+        if _Depth.now == 0:
+            _Depth.thresholds = gc.get_threshold()
+            gc.set_threshold(*_YOUNG)
         _Depth.now += 1
 
     def __exit__(self, *error: object) -> None:
         _Depth.now -= 1
+        if _Depth.now == 0:
+            gc.set_threshold(*_Depth.thresholds)
 
 
 _defining: "WeakValueDictionary[str, UnitLibrary]" = WeakValueDictionary()
@@ -158,6 +172,7 @@ def install() -> bool:
         _count_depth()
         _spare_wrappers()
         _compile_anew_for_python()
+        _compare_flags_quickly()
     return True
 
 
@@ -210,6 +225,30 @@ def _set_environments(library: UnitLibrary) -> None:
         environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
         if environment is not None and library.codegen._engine.get_global_value_address(variable.name):
             library.codegen.set_env(variable.name, environment)
+
+
+def _compare_flags_quickly() -> None:
+    """Compare and hash flags by their values alone: numba reads twenty properties for each of 70 000 comparisons."""
+    kind = targetconfig.TargetConfig
+
+    @cache
+    def defaults(flags: Any) -> dict[str, Any]:
+        return {name: option.default for name, option in flags.options.items()}
+
+    @cache
+    def hash_of_names(flags: Any) -> int:  # numba's own hash, which has no values
+        return hash(tuple(sorted(flags.options)))
+
+    def values(self: Any) -> dict[str, Any]:
+        return defaults(type(self)) | self._values
+
+    def equal(self: Any, other: Any) -> bool:
+        return self is other or (isinstance(other, kind) and values(self) == values(other))
+
+    def hash_of(self: Any) -> int:
+        return hash_of_names(type(self))
+
+    kind.values, kind.__eq__, kind.__hash__ = values, equal, hash_of
 
 
 def _compile_anew_for_python() -> None:

@@ -1,5 +1,7 @@
 """Code generation left to the unit: the same results, errors and addresses, and no symbol undefined."""
 
+import gc
+import itertools
 import math
 import subprocess
 import sys
@@ -9,6 +11,8 @@ import numba
 import numpy as np
 import pytest
 from numba import njit, types
+from numba.core.compiler import DEFAULT_FLAGS, Flags
+from numba.core.errors import TypingError
 
 from sim.compilation import deferred_codegen
 from sim.compilation.deferred_codegen import TESTED, UnitLibrary, install, undefined_symbols
@@ -51,6 +55,34 @@ def test_it_is_at_work_with_the_version_that_is_pinned():
     assert any(numba.__version__.startswith(version + ".") for version in TESTED)
     pinned = Path(deferred_codegen.__file__).parents[2] / "pyproject.toml"
     assert '"numba>=0.68,<0.69"' in pinned.read_text(encoding="utf-8")
+
+
+def test_flags_are_told_apart_as_numba_does():
+    install()
+    kinds = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
+    for a, b in itertools.product([kind() for kind in kinds], repeat=2):
+        # What numba's own `values` would give: every option's property.
+        told, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
+        assert list(a.values().items()) == list(told.items())
+        assert (a == b) == (told == others)
+        assert hash(a) == hash(tuple(sorted(told)))
+    assert _with("fastmath", True) != Flags()
+    assert Flags() != "flags"
+
+
+def _with(name, value):
+    flags = Flags()
+    setattr(flags, name, value)
+    return flags
+
+
+def test_garbage_is_collected_as_before_once_a_function_is_compiled_or_is_not():
+    before = gc.get_threshold()
+    njit(lambda x: x + 1)(2)
+    assert gc.get_threshold() == before
+    with pytest.raises(TypingError):
+        njit(lambda x: x.nothing)(2)
+    assert gc.get_threshold() == before
 
 
 def test_another_version_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch):
