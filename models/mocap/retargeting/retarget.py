@@ -2,8 +2,8 @@
 
 Segment axes in the rig, the vertical and the floor are estimated from the motion itself (`calibration`, `upright`,
 `footing`), never from the rig's rest pose, so limbs point exactly where the source's do. The root is the middle of the
-hips, scaled by the length of the legs. A constant vertical shift puts the feet on the floor, so flights remain
-parabolas.
+hips, scaled by the length of the legs (`leg_proportions` for those of another shape). A constant vertical shift puts
+the feet on the floor, so flights remain parabolas.
 """
 
 from typing import NamedTuple
@@ -25,6 +25,7 @@ from models.mocap.retargeting.calibration import Calibration, calibrate
 from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leading_pose import leading_frames
+from models.mocap.retargeting.leg_proportions import hips_over_feet
 from models.mocap.retargeting.retarget_report import (
     RetargetReport,
     axis_name,
@@ -40,6 +41,10 @@ from models.mocap.retargeting.upright import check_sides, check_stature, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
+_SITS = (
+    "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
+    "{} cm in height, so that feet that stand stay on the floor"
+)
 
 
 class _Frames(NamedTuple):
@@ -79,8 +84,13 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
     segments = quaternions.product(axes, with_twist_shared(calibrated.segments[skipped:]))
     own_leg = _own_leg(not np.isnan(lines.ankles).any())
-    hips = lines.middle[skipped:]
-    root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
+    hips, ankles = lines.middle[skipped:], lines.ankles[skipped:]
+    scaled = own_leg / lines.leg
+    path = scaled * quaternions.rotated(axes, hips - hips[0])
+    legs = scaled * quaternions.rotated(axes, ankles - lines.hips[skipped:])
+    below = scaled * quaternions.rotated(axes, ankles - hips[:, None])
+    root = hips_over_feet(path, segments, legs, below, motion.fps)
+    sits = float(np.ptp(root[:, 2] - path[:, 2]))
     root, segments, slope = levelled(root, segments, motion.fps)
     if slope:  # levelling changes the heading of a body that does not face along the slope
         ahead = _world_axes(segments[0, 0], _Z)
@@ -90,6 +100,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
+        *([_SITS.format(round(100.0 * sits))] if sits else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, roles),
         *(calibration_remarks(calibrated, roles, motion.n_frames - frames.dropped) if rest is None else ()),
@@ -101,7 +112,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         axis_name(up.axis),
         axis_name(quaternions.rotated(quaternions.conjugate(axes), _X)),
         unit_name(motion.unit, lines.leg, own_leg),
-        own_leg / lines.leg,
+        scaled,
         frames.dropped,
         up.confidence,
         remarks,
