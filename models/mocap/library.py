@@ -113,7 +113,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
         expected = "the skeleton of a human, or --roles FILE that says which joint is which"
-        raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", expected)
+        raise MotionFileError(path, 1, f"no joint is taken for the {roles} (among {names})", expected)
     clip, report = retarget(motion, roles, hints)
     copies = [joint for own in people if len(own) > 1 for joint in own] if hints.roles is None else []
     remarks = (

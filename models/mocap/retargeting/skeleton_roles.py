@@ -69,7 +69,10 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | No
         for limb in (_LEG, _ARM):
             named |= _limb(side, limb, names, parents)
         if (toe := named.get(f"{side}_toe")) is not None:
-            named[f"{side}_toe"] = _middle_toe(toe, joints, names, parents)
+            if f"{side}_foot" not in named and parents[toe] == named.get(f"{side}_shank"):
+                named[f"{side}_foot"] = named.pop(f"{side}_toe")  # an ankle, by what is right above it
+            else:
+                named[f"{side}_toe"] = _middle_toe(toe, joints, names, parents)
         if (wrist := named.get(f"{side}_wrist")) is not None:
             # Beyond a wrist there may be a hand (CMU): it carries all the rotation.
             below = [joint for joint in joints_below(wrist, parents) if names[joint].side == side]

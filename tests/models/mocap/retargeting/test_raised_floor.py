@@ -43,6 +43,18 @@ def test_a_body_that_climbs_for_most_of_the_time_tells_what_is_up(tmp_path):
     assert report.confidence > 1.0
 
 
+def test_a_body_that_climbs_leaning_tells_what_is_up_where_its_rig_stands_so_too(tmp_path):
+    leaning = climbing(1.5, 0.0, 1.0)
+    turn = Rotation.from_euler("y", 20.0, degrees=True)
+    leaning.poses[:, :3] = turn.apply(leaning.poses[:, :3])
+    leaning.poses[:, 3:7] = (turn * Rotation.from_quat(leaning.poses[:, 3:7], scalar_first=True)).as_quat(
+        scalar_first=True
+    )
+    assert report_of(leaning, tmp_path / "r.bvh").up == "+Y"
+    with pytest.raises(MotionFileError, match="the motion does not tell what is up"):
+        report_of(leaning, tmp_path / "r.bvh", "along X")
+
+
 def test_a_body_that_climbs_higher_than_any_studio_does_not_tell_what_is_up(tmp_path):
     """Its root is in another unit than its bones."""
     write_rig(Rig(zero="along X"), climbing(150.0, 0.0, 1.0), tmp_path / "r.bvh")

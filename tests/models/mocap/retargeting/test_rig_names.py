@@ -197,6 +197,13 @@ def test_a_leg_that_goes_on_by_an_unknown_name_is_refused():
     assert roles_of(*tree(text)) == "left_foot, though leftPes is below leftShin"
 
 
+def test_what_is_right_below_a_shank_is_the_foot_though_it_is_called_a_toe():
+    found = taken(both("hips @Thigh @Shin @Toe @ToeEnd\nhips spine chest", "left", "right"))
+    assert found["left_foot"] == "leftToe"
+    found = taken(both("hips @Thigh @Shin @Foot @Toe\nhips spine chest", "left", "right"))
+    assert found["left_foot"] == "leftFoot"
+
+
 def test_legs_in_numbers_are_not_guessed():
     """Whether leg 1 is the thigh, or leg 2 its twist, cannot be told."""
     assert roles_of(*tree(both("hips @Leg1 @Leg2 @Leg3 @Foot", "left", "right"))) == "left_thigh"
