@@ -143,12 +143,14 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     )
     if not np.isfinite(rate):
         return Verdict("certified", "nothing turns, starts or stops on the floor", None, assumptions)
-    up_to = f"up to {rate:.2f} of" if rate < ANY_RATE else f"more than {ANY_RATE:g} times"
+    # As many decimals as tell a rate below 1 from 1.
+    digits = next((k for k in range(2, 16) if round(rate, k) < 1.0), 2)
+    up_to = f"up to {rate:.{digits}f} of" if rate < ANY_RATE else f"more than {ANY_RATE:g} times"
     reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0 if rate < ANY_RATE else None, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
-    reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.1f} mm"
+    reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.2g} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
 
 

@@ -141,9 +141,13 @@ def _read_rows(text: str, document: dict[str, object], joints: tuple[_Joint, ...
     check_size(len(rows), len(joints), len(rows) * width, path, 1)
     for index, row in enumerate(rows):
         values = cast("list[object]", row) if isinstance(row, list) else []
-        if len(values) != width or not all(_is_number(value) for value in values):
-            what = f"frame {index} has {len(values)} values or one that is not a number"
-            raise MotionFileError(path, _line_of_row(text, index), what, f"{width} numbers below {MAGNITUDE_LIMIT:.0e}")
+        if len(values) != width:
+            what = f"frame {index} has {len(values)} values"
+        elif not all(_is_number(value) for value in values):
+            what = f"frame {index} has a value that is no number or too large"
+        else:
+            continue
+        raise MotionFileError(path, _line_of_row(text, index), what, f"{width} numbers below {MAGNITUDE_LIMIT:.0e}")
     table = np.array(rows, dtype=np.float64)
     if table[:, 0].min() < 0.0:
         index = int(np.argmin(table[:, 0]))

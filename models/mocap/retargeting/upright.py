@@ -204,7 +204,8 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
         raise MotionFileError(motion.path, 0, what, stated)
     if clear and sum(clear) < 0:
-        raise MotionFileError(motion.path, 0, "the body is mirrored: toes and knees point back", stated)
+        back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_SURE)
+        raise MotionFileError(motion.path, 0, f"the body is mirrored: {back} point back", stated)
     if clear and sum(clear) == 0:
         raise MotionFileError(
             motion.path, 0, "toes and knees point opposite ways", "a body that bends its knees forwards"

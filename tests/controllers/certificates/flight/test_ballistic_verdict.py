@@ -169,3 +169,14 @@ def test_the_stylus_gets_the_narrower_bound_of_neighbouring_frames():
     assert high[4] == 0.0
     with pytest.raises(ParameterError):
         bounds.stylus_speed(np.array([1.2]), np.array([0.1]))
+
+
+def test_a_turn_that_is_missed_by_little_is_not_said_to_be_reached():
+    """Rounded to two decimals its rate would be 1.00, and the distance 0.0 mm."""
+    motion = circling(3.0, radius=2.0)
+    within = turns_verdict(motion, (), 3.0**2 / (9.81 * 2.0), 600)
+    friction = 3.0**2 / (9.81 * 2.0) * 0.998 / (within.margin + 1.0)
+    found = turns_verdict(motion, (), friction, 600)
+    assert found.verdict == "refuted"
+    assert "up to 0.999 of its speed" in found.reason
+    assert float(found.reason.split("within ")[1].removesuffix(" mm")) > 0.0

@@ -162,7 +162,7 @@ WRONG_JSON = {
     "frames empty": ('{"Frames": []}', "d.txt:1: no list of Frames"),
     "row a number": ('{"Frames":\n[3]}', "d.txt:"),
     "short row": (changed_row(0, 0.1).replace(", 0.1]", "]", 2), "d.txt:1: frame 0 has 43 values"),
-    "string": (changed_row(5, "1.0"), "d.txt:2: frame 1 has 44 values or one that is not a number"),
+    "string": (changed_row(5, "1.0"), "d.txt:2: frame 1 has a value that is no number or too large"),
     "null": (changed_row(5, None), "d.txt:2: frame 1"),
     "boolean": (changed_row(5, True), "d.txt:2: frame 1"),
     "list inside": (changed_row(5, [1]), "d.txt:2: frame 1"),
