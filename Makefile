@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all test-commands test-processes live-load lint format docs bench gate fuzz fault-table hil-vm clean
+.PHONY: setup demo test test-all test-commands test-processes test-python live-load lint format docs bench gate fuzz fault-table hil-vm clean
 
 setup: $(READY)
 
@@ -29,6 +29,15 @@ test-commands: $(READY)
 # Processes against the clock, browsers, device nodes (Debian: chromium, umockdev, python3-gi, gir1.2-umockdev-1.0).
 test-processes: $(READY)
 	$(BIN)/python -m pytest -m processes
+
+# Another Python, which may get newer libraries, in a venv of its own: all modules are imported, and a run is made.
+test-python:
+	$(PYTHON) -m venv --clear build/python
+	build/python/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[study,video,gltf]'
+	build/python/bin/python -c 'import pkgutil, models, controllers, sim, experiments, hvf; \
+	    [__import__(module.name) for top in (models, controllers, sim, experiments) \
+	        for module in pkgutil.walk_packages(top.__path__, top.__name__ + ".") if not module.name.endswith("__main__")]'
+	build/python/bin/hvf run --figure none --seconds 1 --out build/python/run --overwrite
 
 # The live page in a browser: what it costs the servo while it is dragged and reloaded (four minutes).
 live-load: $(READY)
