@@ -162,7 +162,7 @@ def packed_lifted(clips: Sequence[PlacedClip], sites: Array, margin: float, limb
     ]
     at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
     numbers = [low[0], high[0], low[1], high[1], margin, len(clips), _NOBODYS, 1.0, *at]
-    return np.concatenate([numbers, *blocks])
+    return np.concatenate([np.array(numbers), *blocks])
 
 
 def with_legs_of(params: Array, clip: int, upper: Sequence[int], share: float) -> Array:

@@ -87,10 +87,10 @@ def field_and_map(runs: Path) -> Figure:
         away = (place - middle) / np.linalg.norm(place - middle)
         foot = middle + size * away - np.array([0.0, 0.5 * 1.75 * STATURE])
         people.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, float(heading(pose[3:7])) + np.pi - 0.4)
-        ends = np.array([place + 4.0 * away, middle + (size - 0.42 * STATURE) * away])
-        ax.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
+        (x, y), (u, v) = place + 4.0 * away, middle + (size - 0.42 * STATURE) * away
+        ax.annotate("", (u, v), (x, y), arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
         ax.plot(*place, "o", ms=3.5, color=CURVE, zorder=5)
-    ax.annotate("h", middle + np.array([0.74 * size, 2.5]), fontsize=12, style="italic")
+    ax.annotate("h", (middle[0] + 0.74 * size, middle[1] + 2.5), fontsize=12, style="italic")
     reach = size + 1.15 * STATURE
     ax.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]), aspect="equal")
     ax.set(xlabel="x [mm]", ylabel="y [mm]")

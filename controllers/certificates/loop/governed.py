@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import casadi
 import numpy as np
+import numpy.typing as npt
 
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
@@ -23,7 +24,6 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River, stability, unstable_start
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import piece_velocity
-from controllers.state import Array
 
 # Number of frequencies of G, from 1e-4 of the Nyquist frequency up to it: eight times as many lower the largest drag
 # by 0.02 %.
@@ -43,7 +43,7 @@ def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
     return base._replace(force=force)
 
 
-def response_along(loop: SampledLoop, k_r: float, b_d: float) -> Array:
+def response_along(loop: SampledLoop, k_r: float, b_d: float) -> npt.NDArray[np.complex128]:
     """G(e^{iω}) [m/(N s)] from a force along the curve to the measured speed, complex, shape (n, `FREQUENCIES`)."""
     linear, (basis, projection) = loop.linear, loop.across
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
