@@ -7,13 +7,13 @@ from experiments.cli import main
 from experiments.flights.ballistics import clip_flights
 from experiments.preparation import prepared_clip
 from experiments.preparation.command import prepare_file
-from experiments.preparation.prepared_file import summary
+from experiments.preparation.prepared_file import advice, summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.feasible import borne
+from models.mocap.preparation.feasible import borne, feasible
 from models.mocap.preparation.fidelity import OTHERWISE
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import plus, resampled, sole_points
@@ -380,3 +380,25 @@ def test_a_target_that_exists_is_left(tmp_path):
     write_bvh(embedded("walk"), tmp_path / "walk.bvh")
     with pytest.raises(ModelError, match="--overwrite"):
         prepare_file(tmp_path / "walk.bvh", tmp_path / "walk.bvh")
+
+
+@pytest.mark.parametrize(("degrees", "near"), [(10.0, True), (60.0, False)])
+def test_a_motion_that_takes_a_joint_far_beyond_its_range_is_not_near(degrees, near, monkeypatch, tmp_path):
+    """As a run that is cut at full speed came to rest: it is tried again within the ranges, then kept as captured."""
+    tried = []
+
+    def bent(clip, schedule, **options):
+        tried.append(clip)
+        poses = clip.poses.copy()
+        knee = 7 + 4 * JOINTS.index("right_knee")
+        poses[10, knee : knee + 4] = np.cos(np.deg2rad(degrees) / 2), 0.0, -np.sin(np.deg2rad(degrees) / 2), 0.0
+        return feasible(clip, schedule, **options)._replace(clip=Clip(poses, clip.fps, clip.name), residual=0.0)
+
+    monkeypatch.setattr("models.mocap.preparation.prepare.feasible", bent)
+    write_bvh(embedded("cheer"), tmp_path / "r.bvh")
+    made = prepared(tmp_path / "r.bvh", "0:1" if near else "open")
+    assert made.near is near
+    assert len(tried) == (1 if near else 2)
+    assert np.rad2deg(beyond_ranges(made.clip.poses).max()) < 30.0
+    said = " ".join(advice(made))
+    assert said == "" if near else re.search(r"takes a joint \d\d° beyond its range", said)
