@@ -1,5 +1,6 @@
 """Estimates, before a run begins, of the time and disk space that it will take."""
 
+import math
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -49,9 +50,10 @@ def _check(out: Path, seconds: float, rate: float) -> None:
 
 
 def _free(out: Path) -> float:
-    """Free bytes on the file system where a folder is or will be."""
+    """Free bytes on the file system where a folder is or will be; infinite where it has no size, such as ``/proc``."""
     there = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.exists())
-    return float(shutil.disk_usage(there).free)
+    total, _, free = shutil.disk_usage(there)
+    return float(free) if total else math.inf
 
 
 def _size(size: float) -> str:

@@ -108,6 +108,13 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.
     assert "Errno" not in said
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
+def test_a_place_without_a_size_is_not_said_to_be_full(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
+    assert said.startswith("hvf: /proc/nowhere: ")
+    assert "free" not in said
+
+
 def test_a_folder_that_holds_a_run_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
     assert "--overwrite" in refused(["run", "--out", str(tmp_path)], capsys)
