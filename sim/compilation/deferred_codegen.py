@@ -26,8 +26,8 @@ TESTED = ("0.68",)
 """Minor versions of numba for whose internals the patches were tested."""
 
 _SYMBOL = "_ZN"  # prefix of the names that numba gives to functions
-_YOUNG = (20_000, 10, 1000)  # thresholds of Python's garbage collector without a full collection
 _ENVIRONMENT = "_ZN08NumbaEnv"  # prefix of the names of their environments, which hold constants
+_YOUNG = (20_000, 10, 1000)  # thresholds of Python's garbage collector without a full collection
 
 
 class UndefinedSymbol(SimError):
@@ -46,7 +46,6 @@ class _Depth:
     """
 
     now = 0
-
     thresholds = gc.get_threshold()
 
     def __enter__(self) -> None:
