@@ -55,15 +55,30 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
-KEEPERS: list[Callable[[Any, tuple[types.Type, ...]], None]] = []
-"""Called with each kernel and its types before it is compiled: `sim.compilation` has the code of laws kept on disk."""
+_Keeper = Callable[[Any, tuple[types.Type, ...]], None]
+_announced: list[tuple[Any, tuple[types.Type, ...]]] = []
+_keepers: list[_Keeper] = []
+
+
+def announce(kernel: Any, arguments: tuple[types.Type, ...]) -> None:
+    """Tell the keepers of a kernel (an ``njit`` function) and its types, before it is compiled."""
+    _announced.append((kernel, arguments))
+    for keeper in _keepers:
+        keeper(kernel, arguments)
+
+
+def add_keeper(keeper: _Keeper) -> _Keeper:
+    """Have a function told of every kernel, past and future: `sim.compilation` has the code of laws and maps kept."""
+    _keepers.append(keeper)
+    for kernel, arguments in _announced:
+        keeper(kernel, arguments)
+    return keeper
 
 
 @cache
 def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
     """Address of a kernel (an ``njit`` function) after compiling it in this process for these types; kept alive."""
-    for keep in KEEPERS:
-        keep(kernel, arguments)
+    announce(kernel, arguments)
     kernel.compile(arguments)
     compiled = kernel.get_compile_result(types.void(*arguments))
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

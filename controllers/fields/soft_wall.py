@@ -189,7 +189,7 @@ class SoftWall(Law):
     def _composed(self) -> Program:
         """A new run starts with the initial memory of the map."""
         haptic_map = self.haptic_map
-        _, params, memory = haptic_map.compiled()
+        _, params, memory, _ = haptic_map.compiled()
         gains = WallGains(
             haptic_map.nq, haptic_map.nv, len(self.limits), self.stiffness, self.margin, self.damping, self.speed
         )  # fmt: skip

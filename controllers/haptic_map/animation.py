@@ -8,7 +8,8 @@ from controllers.blending.blend import packed_blend
 from controllers.blending.clip_arrays import kept
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import CompiledMap, Kernel, KernelMap
+from controllers.haptic_map.base import KernelMap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import in_step
@@ -20,7 +21,7 @@ class ClipMap(KernelMap):
 
     Parameters
     ----------
-    kind, kernel, params
+    params
         As in `KernelMap`.
     clips : sequence of (Array, float)
         Clips that the map is made of: poses (n, nq) and frames per second.
@@ -32,14 +33,12 @@ class ClipMap(KernelMap):
 
     def __init__(
         self,
-        kind: int,
-        kernel: Kernel,
         params: Array,
         clips: Sequence[tuple[Array, float]],
         names: Sequence[str],
         limbs: Sequence[Limb],
     ) -> None:
-        super().__init__(kind, kernel, params)
+        super().__init__(params)
         # Stored as given, so that a map made of them again is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
         self.names, self.limbs = tuple(names), tuple(limbs)
@@ -56,7 +55,7 @@ class ClipMap(KernelMap):
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap(self._kind, self._params, fresh_lap())
+        return CompiledMap.of(self.map_kernel, self._params, fresh_lap())
 
 
 class AnimationMap(ClipMap):
@@ -64,8 +63,6 @@ class AnimationMap(ClipMap):
 
     Parameters
     ----------
-    kind, kernel
-        As in `KernelMap`.
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second; a pose is root position, root quaternion, then joint quaternions (wxyz).
         Clips that do not close are closed (`closed_loop`), travelling ones brought in step (`strides`), and all
@@ -89,8 +86,6 @@ class AnimationMap(ClipMap):
 
     def __init__(
         self,
-        kind: int,
-        kernel: Kernel,
         clips: Sequence[tuple[Array, float]],
         numbers: Sequence[float] | Array,
         second_group: Sequence[int],
@@ -114,7 +109,7 @@ class AnimationMap(ClipMap):
         samples = int(np.clip(np.ceil(frames), 64, 2048))
         params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
         self._lap_seconds = float(np.mean([loop.duration for loop in self.loops]))
-        super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs)
+        super().__init__(params, clips, [str(i) for i in range(len(clips))], limbs)
 
     @property
     def laps(self) -> int:

@@ -1,46 +1,26 @@
 """Interface of haptic maps, from stylus poses to configurations of a target (Donald & Henle 2000, section 2.2)."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import ClassVar
 
 import numpy as np
 
 from controllers.curves.stylus import stylus_path
 from controllers.errors import ParameterError
+from controllers.haptic_map.map_stages import CompiledMap, register
 from controllers.haptic_map.own_map import (
-    OWN,
     Asked,
     check_derivative,
     checked_jacobian,
     checked_pose,
     finite_differences,
+    own_map,
 )
 from controllers.state import Array, Pose
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
 STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H
-Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
-"""Compiled function (params, x, memory, pose, jacobian) of a map; writes h(x), and h_*(x) unless jacobian is empty."""
 _ORIGIN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-
-
-class CompiledMap(NamedTuple):
-    """A map in the form that the servo evaluates (see `controllers.haptic_map.evaluate`).
-
-    Attributes
-    ----------
-    kind : int
-        Number of the kernel.
-    params : Array
-        Parameters of the kernel.
-    memory : Array
-        State of the kernel between ticks, at the start of a run.
-    """
-
-    kind: int
-    params: Array
-    memory: Array
 
 
 class HapticMap(ABC):
@@ -63,7 +43,13 @@ class HapticMap(ABC):
     derivative is computed by finite differences; a `jacobian` of its own is compared with them before a run.
     """
 
+    map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(own_map)
+    """The kernel of the class (see `controllers.haptic_map.map_stages`); by default one that calls Python."""
     _asked: ClassVar[Asked | None] = None
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        register(cls.map_kernel)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -97,7 +83,7 @@ class HapticMap(ABC):
             start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
             asked = Asked(self.pose, self.jacobian, checked_pose(start, start.size))
             object.__setattr__(self, "_asked", asked)  # kept alive, since the tick has only its address
-        return CompiledMap(OWN, asked.params, np.zeros(1))
+        return CompiledMap.of(self.map_kernel, asked.params, np.zeros(1))
 
     def check(self) -> None:
         """Raise the first error of a user-defined map that was called by the tick, if there was one."""
@@ -139,20 +125,20 @@ class HapticMap(ABC):
 
 
 class KernelMap(HapticMap):
-    """A map whose pose and derivative are computed by one compiled kernel.
+    """A map whose pose and derivative are computed by one compiled kernel, the `map_kernel` of its class.
 
     Parameters
     ----------
-    kind : int
-        Number of the kernel (see `evaluate`).
-    kernel : Kernel
-        The kernel.
     params : Array
-        Its parameters.
+        Parameters of the kernel.
     """
 
-    def __init__(self, kind: int, kernel: Kernel, params: Array) -> None:
-        self._kind, self._kernel, self._params = kind, kernel, params
+    def __init__(self, params: Array) -> None:
+        self._params = params
+
+    def compiled(self) -> CompiledMap:
+        """The map in the form of its kernel; by default it has no memory."""
+        return CompiledMap.of(self.map_kernel, self._params, np.zeros(0))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
@@ -167,5 +153,5 @@ class KernelMap(HapticMap):
         if stylus.shape != (STYLUS,):
             raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
         pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
+        self.map_kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
         return pose, jacobian

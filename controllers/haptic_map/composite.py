@@ -15,7 +15,6 @@ from controllers.legs.limbs import Limb
 from controllers.state import Array
 from controllers.work_array import work_array
 
-COMPOSITE = 2
 _CLIPS = 3
 _R_MIN, _R_MAX, _SHARE, _BLEND = range(4)
 
@@ -64,6 +63,8 @@ class Composite(AnimationMap):
         empty.
     """
 
+    map_kernel = staticmethod(composite_map)
+
     def __init__(
         self,
         lower: tuple[Array, float],
@@ -80,7 +81,7 @@ class Composite(AnimationMap):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
         self.r_range, self.upper_joints, self.apart = r_range, tuple(upper_joints), apart
         numbers = checked_interval("r_range", r_range, AXIS)
-        super().__init__(COMPOSITE, composite_map, (lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
+        super().__init__((lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
                          apart)  # fmt: skip
         self.share = 1.0
 

@@ -20,7 +20,6 @@ from controllers.motion.inbetween import FOOT, ROOT, correction, packed_table, t
 from controllers.state import Array
 from controllers.work_array import work_array
 
-CYLINDRICAL = 1
 _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _SHARE, _TABLE_SIZE, _TABLE = range(8)
@@ -134,6 +133,8 @@ class Cylindrical(AnimationMap):
         If there are not four clips with poses of one size, an interval is empty, or the poses lack a limb's joints.
     """
 
+    map_kernel = staticmethod(cylindrical_map)
+
     def __init__(
         self,
         clips: Sequence[tuple[Array, float]],
@@ -155,7 +156,7 @@ class Cylindrical(AnimationMap):
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
         self.upper, self.legs_of, self.share = tuple(upper), legs_of, 1.0
         legs = 1.0 + legs_of if self.upper else 0.0
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
+        super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures()

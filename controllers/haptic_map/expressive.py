@@ -9,25 +9,17 @@ from numba import njit
 from controllers.curves.cylinder import blend_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
+from controllers.haptic_map.map_stages import kernels_of
 from controllers.haptic_map.wrapped import Wrapped
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-EXPRESSIVE = 6
 FADE_FROM = 2.0 * np.pi / 3.0  # [rad] stylus angle from which its effect fades out, to zero at half a turn
-_KIND, _JOINTS, _ROWS = range(3)
+_JOINTS, _ROWS = 0, 1
 _JOINT, _GAIN, _LOW, _HIGH, _ROW = 0, 1, 4, 7, 10
 _NO_MEMORY = np.zeros(0)
 _ROUNDING = 0.02  # [rad] smooths the room left to a joint limit near zero, so that it stays positive
-
-
-@njit
-def base_of(kind: int, params: Array) -> tuple[int, Array]:
-    """Kind and parameters of the map that a map wraps; its own if it wraps none."""
-    if kind != EXPRESSIVE:
-        return kind, params
-    return int(params[_KIND]), params[_ROWS + _ROW * int(params[_JOINTS]) :]
 
 
 @njit
@@ -170,20 +162,21 @@ class Expressive(Wrapped):
         empty.
     """
 
+    map_kernel = staticmethod(express)
+
     def __init__(self, base: HapticMap, joints: Sequence[ExpressiveJoint]) -> None:
-        kind, params, _ = base.compiled()
         last = (base.nq - 7) // 4
         if base.nq != 7 + 4 * last or base.nv != 6 + 3 * last:
             raise ParameterError(
                 f"expression turns joints of poses with 7 + 4 n numbers and 6 + 3 n of a tangent; "
                 f"the base map has {base.nq} and {base.nv}"
             )
-        if kind == EXPRESSIVE:
+        if express in kernels_of(base.compiled().stages):
             raise ParameterError("the base of an expressive map is one itself; give all joints to one of them")
         if not joints:
             raise ParameterError("expression needs at least one joint that turns with the stylus")
         rows = [_checked_row(joint, last) for joint in joints]
-        super().__init__(base, EXPRESSIVE, np.concatenate([[kind, len(rows)], *rows, params]))
+        super().__init__(base, np.concatenate([[len(rows)], *rows]))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the base map."""

@@ -21,7 +21,8 @@ from numba import njit
 
 from controllers.curves.splines import control_points, interpolate
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import CompiledMap, KernelMap
+from controllers.haptic_map.base import KernelMap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.cyclic_runs import runs
 from controllers.legs.grounded import grounded, hastened
 from controllers.legs.limb_ends import with_ends
@@ -45,7 +46,6 @@ from controllers.walking.walked_path import (
 )
 from controllers.work_array import work_array
 
-LED = 7
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
 LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
@@ -266,6 +266,8 @@ class Led(KernelMap):
         If the clip does not travel by 0.5 m a lap, or turns by more than 30° meanwhile.
     """
 
+    map_kernel = staticmethod(led_map)
+
     def __init__(
         self,
         clip: tuple[Array, float],
@@ -318,7 +320,7 @@ class Led(KernelMap):
         width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
         header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
-        super().__init__(LED, led_map, np.concatenate([header, *(limb.packed() for limb in limbs), *packed]))
+        super().__init__(np.concatenate([header, *(limb.packed() for limb in limbs), *packed]))
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
@@ -331,4 +333,4 @@ class Led(KernelMap):
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with a straight path along x, 30 m to both sides of the origin."""
-        return CompiledMap(LED, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
+        return CompiledMap.of(self.map_kernel, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))

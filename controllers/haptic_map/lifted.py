@@ -11,11 +11,11 @@ from controllers.curves.splines import round_lap
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.lifted_kernel import LIFTED, lifted_map, packed_lifted, weigh, with_legs_of
+from controllers.haptic_map.lifted_kernel import lifted_map, packed_lifted, weigh, with_legs_of
 from controllers.haptic_map.lifting.frames import CLOSES, PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.footing import fresh_footing
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import checked_clip
@@ -82,6 +82,8 @@ class Lifted(ClipMap):
         too near to the axis, or two sites too near to each other.
     """
 
+    map_kernel = staticmethod(lifted_map)
+
     def __init__(
         self,
         clips: Sequence[tuple[Array, float]],
@@ -111,11 +113,13 @@ class Lifted(ClipMap):
         self.share = 1.0
         limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
         params = packed_lifted(self._placed, self.sites, self.margin, limbs)
-        super().__init__(LIFTED, lifted_map, params, clips, names, limbs)
+        super().__init__(params, clips, names, limbs)
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap(LIFTED, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))]))
+        return CompiledMap.of(
+            self.map_kernel, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))])
+        )
 
     @property
     def closed(self) -> tuple[bool, ...]:

@@ -32,8 +32,6 @@ from controllers.saturation import clamped
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
 
-LIFTED = 3
-
 _LAGS = 128  # samples of λ round the lap
 _ROWS = 256  # largest number of rows of the corrections' table round the lap
 _PAIR_STEPS = 24  # phases of the lap at which neighbouring clips are searched

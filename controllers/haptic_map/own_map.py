@@ -16,7 +16,6 @@ from controllers.errors import ParameterError
 from controllers.rotations import logarithm, multiply
 from controllers.state import Array, Pose
 
-OWN = 8
 _NUMBERS = ctypes.POINTER(ctypes.c_double)
 _CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
 _STEP = 1e-5  # [m, rad] of central differences: cube root of the rounding error, for lengths of some centimetres

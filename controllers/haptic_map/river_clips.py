@@ -11,8 +11,8 @@ from controllers.blending.combination import fresh_lap
 from controllers.curves.trajectory import START, Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.clip_change import ClipChange, add_change, change_lasts, packed_changes
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.river_memory import (
     AHEAD,
     BLEND,
@@ -36,7 +36,6 @@ from controllers.legs.limbs import Limb
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-RIVER_CLIPS = 5
 LONGEST = 0.7  # of a round: longest duration of a change
 _ALIKE = 1e-6  # [s] largest difference of the laps of two rivers with a change between them
 
@@ -122,6 +121,8 @@ class RiverClips(AnimationMap):
         size; if there is less than one lap.
     """
 
+    map_kernel = staticmethod(river_clips_map)
+
     def __init__(
         self,
         curves: Sequence[Trajectory],
@@ -146,7 +147,7 @@ class RiverClips(AnimationMap):
         self.curves, self._laps, self._tube = tuple(curves), laps, tube
         self._rests: tuple[Array, ...] = (np.zeros(0),) * len(curves)
         self.changes: tuple[ClipChange, ...] = ()
-        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header(), (), limbs, lap, apart)
+        super().__init__(clips, self._header(), (), limbs, lap, apart)
 
     def _header(self) -> Array:
         """Parameters of the kernel before those of the blend."""
@@ -216,4 +217,4 @@ class RiverClips(AnimationMap):
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel, with the memory of a new run: the first river is active."""
         memory = [0.0, np.nan, 0.0, 0.0, 0.0, 0.0, np.nan, -1.0, 0.0, np.nan]
-        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), memory]))
+        return CompiledMap.of(self.map_kernel, self._params, np.concatenate([fresh_lap(), memory]))

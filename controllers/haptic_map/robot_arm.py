@@ -16,13 +16,13 @@ from numba import njit
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.arm_kinematics import arm_rates, bend_arm
-from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, KernelMap
+from controllers.haptic_map.base import STYLUS_TANGENT, KernelMap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.motion.vectors import Vector, cross, product, turned
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import saturate_vector
 from controllers.state import Array
 
-ROBOT_ARM = 4
 JOINTS = 7
 _HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 4, 6, 8, 12, 16, 17
 
@@ -108,6 +108,8 @@ class RobotArm(KernelMap):
         evaluates the map.
     """
 
+    map_kernel = staticmethod(robot_arm_map)
+
     def __init__(
         self,
         lengths: Sequence[float],
@@ -120,7 +122,7 @@ class RobotArm(KernelMap):
     ) -> None:
         q = np.asarray(orientation, dtype=float)
         numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
-        super().__init__(ROBOT_ARM, robot_arm_map, np.array(numbers, dtype=float))
+        super().__init__(np.array(numbers, dtype=float))
         if self._params.shape != (_SIZE,) or not np.isfinite(self._params).all():
             raise ParameterError(f"a robot arm's map has {_SIZE} finite numbers, got {numbers}")
         if not (scale > 0.0 and 0.0 < reach[0] < reach[1] and 0.0 < turn[0] < turn[1] < np.pi):
@@ -137,10 +139,6 @@ class RobotArm(KernelMap):
     def nv(self) -> int:
         """Numbers of a tangent: seven."""
         return JOINTS
-
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel; it has no memory."""
-        return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
 
     def check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None = None) -> None:
         """Refuse a domain in whose centre or at whose edge the arm does not work, on a grid of directions and turns.

@@ -6,33 +6,11 @@ from numba import njit
 from controllers.checks import of_kind
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap
-from controllers.haptic_map.expressive import base_of
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.wrapped import Wrapped
 from controllers.state import Array, Pose
 
-SIZED = 9
-_KIND, _SIZE, _HEADER = 0, 1, 2
-
-
-@njit
-def unsized(kind: int, params: Array) -> tuple[int, Array]:
-    """Kind and parameters of the map that a `Sized` map wraps; its own if it wraps none."""
-    if kind != SIZED:
-        return kind, params
-    return int(params[_KIND]), params[_HEADER:]
-
-
-@njit
-def innermost(kind: int, params: Array) -> tuple[int, Array]:
-    """Kind and parameters of the map that is left without size and expression."""
-    inner, numbers = unsized(kind, params)
-    return base_of(inner, numbers)
-
-
-@njit
-def size_of(kind: int, params: Array) -> float:
-    """Size s of a map's figure over that of its clips [1]."""
-    return params[_SIZE] if kind == SIZED else 1.0
+_SIZE = 0
 
 
 @njit
@@ -76,13 +54,18 @@ class Sized(Wrapped):
         If the size is no number, not positive, or not finite.
     """
 
+    map_kernel = staticmethod(size_pose)
+
     def __init__(self, base: HapticMap, size: float) -> None:
         of_kind("size", size, float)
         if not 0.0 < size < np.inf:
             raise ParameterError(f"size is {size:g}; expected more than 0, and finite")
-        kind, params, _ = base.compiled()
-        super().__init__(base, SIZED, np.concatenate([[kind, float(size)], params]))
+        super().__init__(base, np.array([float(size)]))
         self.size = float(size)
+
+    def compiled(self) -> CompiledMap:
+        """The other map with one more stage, the memory of a new run, and the size."""
+        return super().compiled()._replace(size=self.size)
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h_s(x), shape (nq,), of a stylus pose (7,); memory as in the wrapped map."""

@@ -1,24 +1,23 @@
 """Maps that change the pose of another map."""
 
-from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.state import Array
 
 
 class Wrapped(HapticMap):
-    """A map whose kernel changes the pose of another one, with as many numbers and the same memory.
+    """A map whose kernel, called after those of another map, changes its pose, with the same numbers and memory.
 
     Parameters
     ----------
     base : HapticMap
         The other map.
-    kind : int
-        Kind of the kernel.
     params : Array
-        Its parameters, with kind and parameters of the other map's kernel.
+        Parameters of the kernel.
     """
 
-    def __init__(self, base: HapticMap, kind: int, params: Array) -> None:
-        self.base, self._kind, self._params = base, kind, params
+    def __init__(self, base: HapticMap, params: Array) -> None:
+        self.base, self._params = base, params
 
     @property
     def nq(self) -> int:
@@ -31,5 +30,5 @@ class Wrapped(HapticMap):
         return self.base.nv
 
     def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap(self._kind, self._params, self.base.compiled().memory)
+        """The other map with one more stage, and the memory of a new run."""
+        return self.base.compiled().followed_by(self.map_kernel, self._params)

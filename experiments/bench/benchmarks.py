@@ -15,11 +15,11 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.map_feed import Maps, feed_maps, unlinked_maps
 from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.haptic_map.base import HapticMap
-from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, HandState, IntArray
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
@@ -44,7 +44,7 @@ from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import map_units
+from sim.compilation.kernel_units import linked_stages
 from sim.loop.servo import run_block
 
 ROUNDS = 7  # of which the fastest counts
@@ -210,11 +210,9 @@ def closest_point_microseconds(pieces: int) -> float:
 
 
 @entry_point
-def _map_many(
-    units: IntArray, kind: int, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array
-) -> None:
+def _map_many(stages: IntArray, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     for i in range(points.shape[0]):
-        evaluate_map_jacobian(units, kind, params, points[i], memory, pose, jacobian)
+        evaluate_map_jacobian(stages, params, points[i], memory, pose, jacobian)
 
 
 def map_microseconds(session: Session) -> float:
@@ -237,17 +235,17 @@ def lifted_microseconds(m: int) -> float:
 
 def _map_microseconds(haptic_map: HapticMap, places: Array) -> float:
     """Mean time of h with h_* at places (n, 3) of an upright stylus [µs]."""
-    kind, params, memory = haptic_map.compiled()
+    stages, params, memory, _ = haptic_map.compiled()
     pose, jacobian, points = np.empty(haptic_map.nq), np.empty((haptic_map.nv, 6)), stylus_path(places)
-    units = map_units([(kind, params)])
-    _map_many(units, kind, params, points[:2], memory, pose, jacobian)
-    return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))
+    stages = linked_stages(stages)
+    _map_many(stages, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _map_many(stages, params, points, memory, pose, jacobian), len(points))
 
 
 @njit
-def _wall_many(units: IntArray, feeds: IntArray, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
+def _wall_many(maps: Maps, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
-        feed_maps(units, feeds, field.params, memory, hands[i])
+        feed_maps(maps, field.params, memory, hands[i])
         evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)
 
 
@@ -258,10 +256,10 @@ def walls_microseconds(session: Session) -> float:
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
     walls = figure_walls(session.haptic_map, numbers.wall_stiffness, numbers.wall_margin, numbers.joint_speed)
     program, wrench = walls.program(), np.empty(6)
-    memory, units = program.fresh_memory(), session.servo.reference.units
-    feeds, field = feed_rows(program.map_feeds), program.compiled()
-    _wall_many(units, feeds, field, memory, hands[:2], wrench)
-    return _microseconds(lambda: _wall_many(units, feeds, field, memory, hands, wrench), len(hands))
+    memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.map_feeds)
+    maps = maps._replace(stages=linked_stages(maps.stages))
+    _wall_many(maps, field, memory, hands[:2], wrench)
+    return _microseconds(lambda: _wall_many(maps, field, memory, hands, wrench), len(hands))
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:

@@ -71,5 +71,5 @@ def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
 def _pose(session: Session, argument: Array) -> Array:
     """Pose of the animation at a stylus pose (7,), shape (75,)."""
     reference, poses = session.servo.reference, np.empty((1, session.haptic_map.nq))
-    poses_along(reference.kind, reference.params, reference.memory.copy(), argument[None], poses)
+    poses_along(reference.stages, reference.params, reference.memory.copy(), argument[None], poses)
     return poses[0]

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
 from controllers.state import Array
 from experiments.config.maps import RobotArm
@@ -100,5 +100,5 @@ def tilted(circle: Trajectory) -> Trajectory:
 
 def _evaluated(compiled: CompiledMap, points: Array) -> Array:
     poses = np.empty((len(points), len(ARM_JOINTS)))
-    poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
+    poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
     return poses

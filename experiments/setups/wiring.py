@@ -196,7 +196,7 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
         argument = (stylus_pose if parts.walking is None else servo.argument)[None]
         poses = np.empty((1, whole_map.nq))
-        poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
+        poses_along(reference.stages, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends and world.has_figure:
             lower_start(packed_legs(world.body), poses[0], parts.maps.size)
         figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None

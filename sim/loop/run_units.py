@@ -1,5 +1,6 @@
 """The compilation units that a servo loop needs, listed before any of them is compiled."""
 
+import numpy as np
 from numba import typeof, types
 
 from controllers.fields.algebra.law import Program
@@ -9,7 +10,7 @@ from sim.compilation.units import Unit
 from sim.devices.device import device_units
 from sim.loop.loop import make_logs
 from sim.loop.servo import Servo, run_block
-from sim.reference.reference import NO_MAP, poses_unit
+from sim.reference.reference import poses_unit
 
 
 def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
@@ -24,12 +25,12 @@ def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
     """
     ticks, frames = make_logs(servo, servo.figure_ticks)
     number, flag, reference = types.int64, types.boolean, servo.reference
-    maps = units_of_map(reference.kind, reference.params) if reference.kind != NO_MAP else ()
+    stages = np.concatenate([reference.stages, servo.field.maps.stages])
     return (
         Unit.of(run_block, typeof(servo), number, number, flag, typeof(ticks), typeof(frames)),
         *device_units(servo.device),
         *follow_units(servo.figure, reference),
-        *maps,
+        *units_of_map(stages),
         *units_of_laws(program),
         poses_unit(),
     )

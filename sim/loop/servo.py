@@ -24,7 +24,7 @@ from numba import njit
 
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.fields.algebra.law import Program
-from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.map_feed import Maps, feed_maps, unlinked_maps
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers, feed_walkers, fresh_walkers
 from controllers.lent import lend
@@ -35,9 +35,8 @@ from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array, IntArray
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import law_units, linked_walkers, map_units
+from sim.compilation.kernel_units import law_units, linked_stages, linked_walkers
 from sim.devices.device import DeviceState, actuate, advance, link_device, sense
-from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
 from sim.world.plant import Plant
 
@@ -46,9 +45,9 @@ class Field(NamedTuple):
     """A compiled field, its limiter and its energy tank: program, parameters, memory, and the last wrench and force.
 
     `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
-    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` says which laws are given values
-    of the haptic map (see `controllers.fields.algebra.map_feed`), `walkers` are the state of figures that are
-    led, which laws and the map read.
+    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` are the haptic
+    maps whose values laws are given (see `controllers.fields.algebra.map_feed`), `walkers` the state of figures that
+    are led, which laws and the map read.
     """
 
     units: IntArray
@@ -56,7 +55,7 @@ class Field(NamedTuple):
     params: Array
     memory: Array
     slots: IntArray
-    maps: IntArray
+    maps: Maps
     walkers: Walkers
     limits: Array
     limiter: Array
@@ -71,7 +70,8 @@ class Field(NamedTuple):
 
     def linked(self, program: Program) -> "Field":
         """The same field with the addresses of its kernels; compiles those that are not in the cache."""
-        return self._replace(units=law_units(program), walkers=linked_walkers(self.walkers))
+        maps = self.maps._replace(stages=linked_stages(self.maps.stages))
+        return self._replace(units=law_units(program), maps=maps, walkers=linked_walkers(self.walkers))
 
 
 def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:
@@ -82,10 +82,10 @@ def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) ->
     )  # fmt: skip
 
 
-def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray, Walkers]:
+def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, Maps, Walkers]:
     """The first seven attributes of a `Field`, those that depend on the program."""
     slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
-    memory, maps = program.fresh_memory(), feed_rows(program.map_feeds)
+    memory, maps = program.fresh_memory(), unlinked_maps(program.map_feeds)
     walkers = fresh_walkers(program.walker_feeds)
     return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps, walkers
 
@@ -111,9 +111,7 @@ class Servo(NamedTuple):
     def linked(self, program: Program) -> "Servo":
         """The same servo with the addresses of all kernels it calls; compiles those that are not in the cache."""
         link_device(self.device)
-        reference = self.reference
-        if reference.kind != NO_MAP:
-            reference = reference._replace(units=map_units([(reference.kind, reference.params)]))
+        reference = self.reference._replace(stages=linked_stages(self.reference.stages))
         return self._replace(
             units=follow_addresses(self.figure, reference), field=self.field.linked(program),
             reference=reference,
@@ -187,7 +185,7 @@ class FrameLog(NamedTuple):
 def field_force(servo: Servo) -> None:
     """Evaluate the field at the measured hand, and command its force within the safety limits."""
     field, device = servo.field, servo.device
-    feed_maps(servo.reference.units, field.maps, field.params, field.memory, device.hand)
+    feed_maps(field.maps, field.params, field.memory, device.hand)
     feed_walkers(field.walkers, field.params, field.memory, device.hand)
     evaluate(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
     command_force(

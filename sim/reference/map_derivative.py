@@ -5,24 +5,22 @@ from numba import types
 
 from controllers.fields.algebra.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
-from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import map_units
+from sim.compilation.kernel_units import linked_stages
 from sim.compilation.units import Unit
 
 
 @entry_point
-def _derivative(
-    units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
-) -> None:
-    evaluate_map_jacobian(units, kind, params, x, memory, pose, jacobian)
+def _derivative(stages: IntArray, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    evaluate_map_jacobian(stages, params, x, memory, pose, jacobian)
 
 
 def derivative_unit() -> Unit:
     """The compilation unit of `map_derivative`, without the map's kernels."""
-    matrix, units = types.Array(types.float64, 2, "C"), types.Array(types.int64, 1, "C")
-    return Unit.of(_derivative, units, types.int64, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
+    matrix, stages = types.Array(types.float64, 2, "C"), types.Array(types.int64, 2, "C")
+    return Unit.of(_derivative, stages, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
 
 
 def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
@@ -32,7 +30,7 @@ def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
     -------
     Array, shape (nv, 6)
     """
-    kind, params, memory = haptic_map.compiled()
+    stages, params, memory, _ = haptic_map.compiled()
     pose, jacobian = np.empty(haptic_map.nq), np.empty((haptic_map.nv, STYLUS_TANGENT))
-    _derivative(map_units([(kind, params)]), kind, params, x, memory, pose, jacobian)
+    _derivative(linked_stages(stages), params, x, memory, pose, jacobian)
     return jacobian

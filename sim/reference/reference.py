@@ -7,15 +7,15 @@ import numpy as np
 from numba import typeof, types
 
 from controllers.fields.algebra.instructions import VECTOR
-from controllers.haptic_map.base import CompiledMap, HapticMap
-from controllers.haptic_map.evaluate import evaluate_map, kinds_of
-from controllers.haptic_map.river_clips import RIVER_CLIPS
+from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.map_stages import CompiledMap, evaluate_map, kernels_of
+from controllers.haptic_map.river_clips import river_clips_map
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
 from controllers.lent import Lent, lend
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import map_units
+from sim.compilation.kernel_units import linked_stages
 from sim.compilation.units import Unit
 from sim.errors import SimError
 from sim.reference.reference_state import CompiledReference
@@ -28,42 +28,42 @@ _ROUNDS = 8  # fixed-point iterations of `begin_in_motion`; each gains at least 
 
 
 @entry_point
-def _poses_along(units: IntArray, kind: int, params: Array, memory: Array, points: Array, poses: Array) -> None:
+def _poses_along(stages: IntArray, params: Array, memory: Array, points: Array, poses: Array) -> None:
     for i in range(points.shape[0]):
-        evaluate_map(units, kind, params, points[i], memory, poses[i])
+        evaluate_map(stages, params, points[i], memory, poses[i])
 
 
-def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: Array) -> None:
+def poses_along(stages: IntArray, params: Array, memory: Array, points: Array, poses: Array) -> None:
     """Evaluate a map along a path of the stylus.
 
     Parameters
     ----------
-    kind, params, memory
+    stages, params, memory
         The map; its memory is updated.
     points : Array
         Positions in H and orientations wxyz, shape (n, 7).
     poses : Array
         Written, shape (n, 75).
     """
-    _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
+    _poses_along(linked_stages(stages), params, memory, points, poses)
 
 
 def map_poses(haptic_map: HapticMap, points: Array, memory: Array | None = None) -> Array:
     """Poses (n, nq) of a map along a path of the stylus (n, 7); a memory is updated, by default that of a new run."""
-    kind, params, fresh = haptic_map.compiled()
+    stages, params, fresh, _ = haptic_map.compiled()
     poses = np.empty((len(points), haptic_map.nq))
-    poses_along(kind, params, fresh if memory is None else memory, points, poses)
+    poses_along(stages, params, fresh if memory is None else memory, points, poses)
     return poses
 
 
 def poses_unit() -> Unit:
     """The compilation unit of `poses_along`, without the map's kernels."""
-    return Unit.of(_poses_along, types.Array(types.int64, 1, "C"), types.int64, VECTOR, VECTOR, _MATRIX, _MATRIX)
+    return Unit.of(_poses_along, types.Array(types.int64, 2, "C"), VECTOR, VECTOR, _MATRIX, _MATRIX)
 
 
 def update_unit(reference: CompiledReference) -> Unit:
     """The compilation unit that advances a reference by one period (`sim.reference.update`), called by its address."""
-    plays = RIVER_CLIPS in kinds_of(reference.kind, reference.params)
+    plays = river_clips_map in kernels_of(reference.stages)
     return Unit.of(update_river_reference if plays else update_reference, Lent(typeof(reference)), VECTOR, VECTOR)
 
 
@@ -86,7 +86,7 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
     poses : Array
         Written, shape (n, 75).
     """
-    linked = reference._replace(units=map_units([(reference.kind, reference.params)]))
+    linked = reference._replace(stages=linked_stages(reference.stages))
     # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
     points, traces = np.ascontiguousarray(points), np.ascontiguousarray(traces)
     _reference_along(update_unit(linked).address(), linked, points, traces, poses)
@@ -179,22 +179,18 @@ def make_reference(
     )  # fmt: skip
 
 
-NO_MAP = -1
-"""Kind of map of a reference without a map."""
-
-
-def no_reference(compiled: CompiledMap | None = None) -> CompiledReference:
-    """The empty reference of a servo without a figure; `compiled` is a haptic map that its field uses, if any."""
-    nothing = CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
-    return _at_rest(compiled or nothing, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
+def no_reference() -> CompiledReference:
+    """The empty reference of a servo without a figure."""
+    nothing = CompiledMap(np.zeros((0, 3), dtype=np.int64), np.zeros(0), np.zeros(0))
+    return _at_rest(nothing, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
 
 
 def _at_rest(compiled: CompiledMap, sizes: tuple[int, int], transition: Transition) -> CompiledReference:
     """State of a reference before its first update, of a body with poses of nq and tangents of nv numbers."""
-    (kind, params, memory), (nq, nv) = compiled, sizes
+    (stages, params, memory, size), (nq, nv) = compiled, sizes
     return CompiledReference(
-        figure_model=0, smoothing=0.0, period=1.0, units=np.zeros(0, dtype=np.int64), kind=kind, params=params,
-        memory=memory, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
+        figure_model=0, smoothing=0.0, period=1.0, stages=stages, params=params, memory=memory,
+        size=size, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=transition, clip_seconds=0.0,
         settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq),

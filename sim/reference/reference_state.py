@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.map_stages import evaluate_map
 from controllers.haptic_map.river_memory import even_pace
 from controllers.state import Array, IntArray
 from sim.reference.stylus_filter import turned_on
@@ -22,10 +22,8 @@ class CompiledReference(NamedTuple):
         θ = exp(−ω T) of the tracking filter, for its period T.
     period : float
         T [s].
-    units : IntArray
-        Addresses of the map's kernels (see `sim.compilation.kernel_units`).
-    kind, params, memory
-        The haptic map and its state (such as the frame of the lap).
+    stages, params, memory, size
+        The haptic map and its state, such as the frame of the lap (`controllers.haptic_map.map_stages.CompiledMap`).
     hand : Array
         Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
     trail : Array
@@ -54,10 +52,10 @@ class CompiledReference(NamedTuple):
     figure_model: int
     smoothing: float
     period: float
-    units: IntArray
-    kind: int
+    stages: IntArray
     params: Array
     memory: Array
+    size: float
     hand: Array
     trail: Array
     going: Array
@@ -84,9 +82,7 @@ def look_around(reference: CompiledReference, hand: Array) -> None:
     _look_now(reference, hand)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
         _go(reference, hand, sign)
-        evaluate_map(
-            reference.units, reference.kind, reference.params, reference.scratch_x, reference.scratch_memory, pose
-        )
+        evaluate_map(reference.stages, reference.params, reference.scratch_x, reference.scratch_memory, pose)
 
 
 @njit
@@ -96,9 +92,7 @@ def look_around_in_river(reference: CompiledReference, params: Array, hand: Arra
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
         _go(reference, hand, sign)
         even_pace(params, reference.memory, reference.scratch_x, sign * reference.period, reference.scratch_memory)
-        evaluate_map(
-            reference.units, reference.kind, reference.params, reference.scratch_x, reference.scratch_memory, pose
-        )
+        evaluate_map(reference.stages, reference.params, reference.scratch_x, reference.scratch_memory, pose)
 
 
 @njit
@@ -106,7 +100,7 @@ def _look_now(reference: CompiledReference, hand: Array) -> None:
     """Pose of the map at the hand's position."""
     x = reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
-    evaluate_map(reference.units, reference.kind, reference.params, x, reference.memory, reference.pose)
+    evaluate_map(reference.stages, reference.params, x, reference.memory, reference.pose)
 
 
 @njit

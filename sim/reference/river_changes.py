@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numba import njit
 
-from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.map_stages import evaluate_map
 from controllers.haptic_map.river_memory import (
     AHEAD,
     PHASE,
@@ -25,7 +25,6 @@ from controllers.haptic_map.river_memory import (
     stop_clip,
     take_course,
 )
-from controllers.haptic_map.sized import size_of
 from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_way
 from controllers.rotations import rotate
@@ -41,13 +40,13 @@ def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pos
     memory = reference.scratch_memory
     memory[:] = reference.memory
     ahead_in_clip(params, memory, seconds)
-    evaluate_map(reference.units, reference.kind, reference.params, reference.scratch_x, memory, pose)
+    evaluate_map(reference.stages, reference.params, reference.scratch_x, memory, pose)
 
 
 @njit
 def _place(reference: CompiledReference, pose: Array, x: float, y: float, turn: float) -> None:
     """As `place_clip`, in lengths of the figure that is shown; the lap's frame is in those of the clips."""
-    size = size_of(reference.kind, reference.params)
+    size = reference.size
     place_clip(reference.memory, pose[:2] / size, x / size, y / size, turn)
 
 
@@ -122,7 +121,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     river that has waited long enough is let through regardless.
     """
     transition, memory, x = reference.transition, reference.scratch_memory, reference.scratch_x
-    size = size_of(reference.kind, reference.params)
+    size = reference.size
     if waits_no_longer(transition):
         return True
     if not stands(transition, reference.pose, reference.velocity[2], size):
@@ -131,9 +130,9 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
         memory[:] = reference.memory
         change_clip(params, memory, river, phase)
         # Evaluated first to get the phase from the hand's position: the field may time the curve unlike the clip.
-        evaluate_map(reference.units, reference.kind, reference.params, x, memory, transition.ahead[0])
+        evaluate_map(reference.stages, reference.params, x, memory, transition.ahead[0])
         ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
-        evaluate_map(reference.units, reference.kind, reference.params, x, memory, transition.ahead[0])
+        evaluate_map(reference.stages, reference.params, x, memory, transition.ahead[0])
         if leaps(transition, transition.ahead[0], size):
             return False
     return True
@@ -153,7 +152,7 @@ def go_along(reference: CompiledReference, params: Array, river: float) -> None:
     scratch, x = reference.scratch_memory, reference.scratch_x
     x[:3], x[3:] = reference.hand[0], reference.orientation
     scratch[:] = reference.memory
-    evaluate_map(reference.units, reference.kind, reference.params, x, scratch, reference.before)
+    evaluate_map(reference.stages, reference.params, x, scratch, reference.before)
     take_course(params, reference.memory, river, x, scratch[SHOWN])
 
 
@@ -164,10 +163,10 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
     old, new, phase, ahead = reference.before, reference.after, memory[PHASE], memory[AHEAD]
     scratch[:] = memory
     hold_at_gate(params, scratch, gate)
-    evaluate_map(reference.units, reference.kind, reference.params, x, scratch, old)
+    evaluate_map(reference.stages, reference.params, x, scratch, old)
     begin_change(memory, river, change, gate)
     hold_at_gate(params, memory, gate)
-    evaluate_map(reference.units, reference.kind, reference.params, x, memory, new)
+    evaluate_map(reference.stages, reference.params, x, memory, new)
     _place(reference, new, old[0], old[1], heading_between(new, old))
     go_on(memory, phase, ahead)
 

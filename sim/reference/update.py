@@ -7,6 +7,7 @@ figure is shown in (`sim.reference.river_changes`). Only such a map needs that c
 from numba import njit
 
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
+from controllers.haptic_map.map_stages import first_params
 from controllers.haptic_map.river_memory import (
     COURSE,
     changing,
@@ -17,7 +18,6 @@ from controllers.haptic_map.river_memory import (
     phase_rate,
     takes_over,
 )
-from controllers.haptic_map.sized import innermost, size_of
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around, look_around_in_river
@@ -56,7 +56,7 @@ def update_river_reference(reference: CompiledReference, stylus: Array, trace: A
     _smooth(reference, stylus)
     reference.transition.since[0] += reference.period
     follow_trail(reference)
-    _, params = innermost(reference.kind, reference.params)
+    params = first_params(reference.stages, reference.params)
     even_pace(params, reference.memory, reference.hand[0], reference.period, reference.memory)
     _play(reference, params, trace)
     look_around_in_river(reference, params, reference.hand)
@@ -119,7 +119,6 @@ def _differentiate(reference: CompiledReference) -> None:
 def _settle(reference: CompiledReference) -> None:
     """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
     s, period, transition = reference.settled, reference.period, reference.transition
-    size = size_of(reference.kind, reference.params)
     for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
         share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
-        lower_to_floor(transition.limbs, transition.ends, share, pose, size)
+        lower_to_floor(transition.limbs, transition.ends, share, pose, reference.size)

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
+from controllers.haptic_map.map_stages import evaluate_map, evaluate_map_jacobian
 from controllers.legs.limbs import Limb
-from sim.compilation.kernel_units import map_units
+from sim.compilation.kernel_units import linked_stages
 
 JOINTS = 3
 # The three joints as a leg: hip, knee that flexes about y, ankle.
@@ -58,11 +58,11 @@ def stylus(r, angle, z):
 
 
 def assert_same_compiled(h_map, x):
-    """Assert that the kernels found by the map's kind give its pose and derivative at a stylus pose to the last bit."""
-    (kind, params, memory), pose, other = h_map.compiled(), *np.empty((2, h_map.nq))
-    units, jacobian = map_units([(kind, params)]), np.empty((h_map.nv, 6))
-    evaluate_map(units, kind, params, x, memory, pose)
-    evaluate_map_jacobian(units, kind, params, x, memory, other, jacobian)
+    """Assert that the kernels of the map's stages give its pose and derivative at a stylus pose to the last bit."""
+    (stages, params, memory, _), pose, other = h_map.compiled(), *np.empty((2, h_map.nq))
+    stages, jacobian = linked_stages(stages), np.empty((h_map.nv, 6))
+    evaluate_map(stages, params, x, memory, pose)
+    evaluate_map_jacobian(stages, params, x, memory, other, jacobian)
     np.testing.assert_array_equal(pose, h_map.pose(x))
     np.testing.assert_array_equal(other, pose)
     np.testing.assert_array_equal(jacobian, h_map.jacobian(x))

@@ -12,6 +12,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.map_stages import kernels_of
 from controllers.state import Array
 
 _SHORT = 16  # an array of more numbers than this is described by a hash
@@ -35,8 +36,9 @@ def described(value: object) -> object:
     if isinstance(value, Trajectory):
         return {"curve": digest(value.packed())}
     if isinstance(value, HapticMap):
-        kind, params, memory = value.compiled()
-        return {"map": type(value).__name__, "kind": kind, "numbers": digest(params, memory)}
+        stages, params, memory, _ = value.compiled()
+        kernels = [getattr(kernel, "__name__", "") for kernel in kernels_of(stages)]
+        return {"map": type(value).__name__, "kernels": kernels, "numbers": digest(params, memory)}
     if isinstance(value, np.ndarray):
         array = np.asarray(value, dtype=np.float64)
         return array.tolist() if array.size <= _SHORT else {"shape": list(array.shape), "numbers": digest(array)}

@@ -3,41 +3,69 @@
 The servo calls `feed_maps` before `evaluate`, so the kernels of the laws do not depend on those of the maps.
 """
 
+from enum import IntEnum
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from controllers.fields.algebra.law import MapFeed
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT
-from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HAND_POSITION, Array, IntArray
 
 
-def feed_rows(feeds: tuple[MapFeed, ...]) -> IntArray:
-    """A field's `map_feeds` as numbers, shape (n, 6): slot, at, kind of map, number of parameters, nq, nv."""
-    rows = np.zeros((len(feeds), 6), dtype=np.int64)
+class _Row(IntEnum):
+    """Places in a row of `Maps.feeds`."""
+
+    SLOT = 0
+    AT = 1
+    FIRST = 2
+    LAST = 3
+    NQ = 4
+    NV = 5
+
+
+class Maps(NamedTuple):
+    """The haptic maps of a field.
+
+    Attributes
+    ----------
+    feeds : IntArray, shape (n, 6)
+        A row each: `slot`, `at`, its first stage in `stages` and the one after its last, nq, nv.
+    stages : IntArray, shape (m, 3)
+        Stages of all maps, linked or not (`controllers.haptic_map.map_stages`).
+    """
+
+    feeds: IntArray
+    stages: IntArray
+
+
+def unlinked_maps(feeds: tuple[MapFeed, ...]) -> Maps:
+    """The maps of a field's `map_feeds`, without the addresses of their kernels."""
+    rows, stages = np.zeros((len(feeds), len(_Row)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
     for row, (slot, at, haptic_map) in zip(rows, feeds, strict=True):
-        kind, params, _ = haptic_map.compiled()
-        row[:] = slot, at, kind, len(params), haptic_map.nq, haptic_map.nv
-    return rows
+        first, stages = len(stages), np.concatenate([stages, haptic_map.compiled().stages])
+        row[:] = slot, at, first, len(stages), haptic_map.nq, haptic_map.nv
+    return Maps(rows, stages)
 
 
 @njit
-def feed_maps(units: IntArray, feeds: IntArray, params: Array, memory: Array, hand: Array) -> None:
+def feed_maps(maps: Maps, params: Array, memory: Array, hand: Array) -> None:
     """Write h and h_* of the maps of a field into its memory, where its laws find them.
 
     Parameters
     ----------
-    units : IntArray
-        Addresses of the maps' kernels (see `controllers.haptic_map.evaluate`).
-    feeds : IntArray
-        See `feed_rows`.
+    maps : Maps
+        With the addresses of the maps' kernels.
     params, memory, hand
         As in `controllers.fields.algebra.program.evaluate`.
     """
     stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
-    for n in range(feeds.shape[0]):
-        slot, at, kind = feeds[n, 0], feeds[n, 1], feeds[n, 2]
-        size, nq, nv = feeds[n, 3], feeds[n, 4], feeds[n, 5]
+    for n in range(maps.feeds.shape[0]):
+        row = maps.feeds[n]
+        slot, nq, nv = row[_Row.SLOT], row[_Row.NQ], row[_Row.NV]
         first, last = slot + nq, slot + nq + nv * STYLUS_TANGENT
         pose, jacobian = memory[slot:first], memory[first:last].reshape((nv, STYLUS_TANGENT))
-        evaluate_map_jacobian(units, kind, params[at : at + size], stylus, memory[last:], pose, jacobian)
+        stages = maps.stages[row[_Row.FIRST] : row[_Row.LAST]]
+        evaluate_map_jacobian(stages, params[row[_Row.AT] :], stylus, memory[last:], pose, jacobian)

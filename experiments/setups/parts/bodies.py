@@ -1,6 +1,6 @@
 """What follows the hand in a run: the body's control and its reference, by kind of body."""
 
-from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.map_stages import CompiledMap
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.part_types import Parts, Settings
 from models.world.scene import FIGURE
@@ -45,7 +45,7 @@ def _kinematic(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyS
 
 
 def _none(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    return no_figure(), no_reference(compiled if parts.program.map_feeds else None)
+    return no_figure(), no_reference()
 
 
 def _robot(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:

@@ -49,7 +49,7 @@ def learned_eye(servo: Servo, places: Array) -> Eye:
 
     def poses(points: Array) -> Array:
         found = np.empty((len(points), len(reference.pose)))
-        poses_along(reference.kind, reference.params, reference.memory.copy(), stylus_path(points), found)
+        poses_along(reference.stages, reference.params, reference.memory.copy(), stylus_path(points), found)
         return found
 
     effects = np.stack([

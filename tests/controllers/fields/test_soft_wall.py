@@ -5,14 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.fields.algebra.map_feed import feed_maps, feed_rows
+from controllers.fields.algebra.map_feed import feed_maps, unlinked_maps
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.soft_wall import SoftWall, _is_clear, wall_slope  # pyright: ignore[reportPrivateUsage]
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
 from experiments.setups.robot_arm import robot_arm_map
 from models.robot_arm.spec import arm_limits, arm_model
-from sim.compilation.kernel_units import map_units
+from sim.compilation.kernel_units import linked_stages
 
 FPS, K, MARGIN, DAMPING, SPEED = 30.0, 2.0, 0.1, 0.02, 6.0
 
@@ -166,10 +166,11 @@ def test_far_away_and_on_the_axis_the_force_is_finite():
 def test_the_compiled_sum_with_another_field_is_the_same_to_the_last_bit():
     program = WALL.program() + BRAKE.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
-    units = map_units([MAP.compiled()[:2]])
+    maps = unlinked_maps(program.map_feeds)
+    maps = maps._replace(stages=linked_stages(maps.stages))
     for angle in np.linspace(0.0, 6.0, 30):
         hand = HandState.at(place(0.065, angle, 0.02), (0.2, -0.1, 0.05))
-        feed_maps(units, feed_rows(program.map_feeds), program.params, memory, hand.vector())
+        feed_maps(maps, program.params, memory, hand.vector())
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
         np.testing.assert_array_equal(wrench[:3], WALL.wrench(hand).force + BRAKE.wrench(hand).force)
 

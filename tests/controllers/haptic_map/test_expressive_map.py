@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
+from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, stylus_turn, yielded
 from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging, wxyz
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
@@ -138,14 +138,6 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     rng = np.random.default_rng(5)
     for _ in range(20):
         assert_same_compiled(MAP, anywhere(rng))
-
-
-def test_what_is_wrapped_can_be_asked_for_what_it_does_apart_from_poses():
-    base, whole = BASE.compiled(), MAP.compiled()
-    for asked in (whole, base):
-        kind, params = base_of(asked.kind, asked.params)
-        assert kind == base.kind
-        np.testing.assert_array_equal(params, base.params)
 
 
 def test_the_lap_of_the_base_goes_on():

@@ -4,10 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import HapticMap
-from controllers.haptic_map.evaluate import MAP_KERNELS
+from controllers.haptic_map.base import HapticMap, KernelMap
+from controllers.haptic_map.map_stages import kernels_of
+from sim.reference.reference import map_poses
+from tests.controllers.clips_for_maps import assert_same_compiled
 
 X = np.array([0.04, -0.01, 0.02, 0.8, 0.0, 0.6, 0.0])
 RATE = 3.0  # [rad/m]
@@ -22,9 +25,10 @@ class Turned(HapticMap):
 
 
 def kernel_of(haptic_map: HapticMap, x: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    kind, params, memory = haptic_map.compiled()
+    stages, params, memory, _ = haptic_map.compiled()
     pose, jacobian = np.empty(haptic_map.nq), np.empty((rows, 6))
-    MAP_KERNELS[kind](params, x, memory, pose, jacobian)
+    (kernel,) = kernels_of(stages)
+    kernel(params, x, memory, pose, jacobian)
     return pose, jacobian
 
 
@@ -132,3 +136,23 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
     kernel_of(wrong, np.array([-0.04, 0, 0, 1.0, 0, 0, 0]), 0)
     with pytest.raises(ParameterError, match=r"gave a pose of shape \(10,\); expected 11 finite numbers"):
         wrong.check()
+
+
+def test_a_compiled_map_of_one_s_own_needs_no_entry_in_the_library() -> None:
+    rate = RATE  # a kernel of one process, which reads a number of this function
+
+    @njit
+    def slide(params, x, memory, pose, jacobian):
+        jacobian[:] = 0.0
+        for i in range(3):
+            pose[i] = params[0] * rate * x[i]
+            if jacobian.shape[0]:
+                jacobian[i, i] = params[0] * rate
+
+    class Slide(KernelMap):
+        map_kernel = staticmethod(slide)
+        nq, nv = 3, 3
+
+    made = Slide(np.array([2.0]))
+    assert_same_compiled(made, X)
+    np.testing.assert_array_equal(map_poses(made, X[None]), 2.0 * RATE * X[None, :3])

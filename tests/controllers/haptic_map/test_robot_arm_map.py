@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.rotations import exponential, multiply
 from experiments.setups.robot_arm import HOME, ORIENTATION, robot_arm_map
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
-from sim.compilation.kernel_units import map_units
+from tests.controllers.clips_for_maps import assert_same_compiled
 
 MODEL, SCALE = arm_model(), 1.5
 LIMITS = arm_limits(MODEL)
@@ -89,16 +88,8 @@ def test_it_is_smooth_over_the_edge_of_its_domain():
         assert np.abs(np.diff(second, axis=0)).max() < 0.05 * np.ptp(second, axis=0).max()
 
 
-def test_the_servo_s_dispatch_is_the_same_map():
-    rng = np.random.default_rng(5)
-    x = random_stylus(rng, 0.2, 1.0)
-    pose, jacobian = np.empty(7), np.empty((7, 6))
-    kind, params, memory = MAP.compiled()
-    units = map_units([(kind, params)])
-    evaluate_map(units, kind, params, x, memory, pose)
-    np.testing.assert_array_equal(pose, MAP.pose(x))
-    evaluate_map_jacobian(units, kind, params, x, memory, pose, jacobian)
-    np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+def test_the_servo_evaluates_the_same_map():
+    assert_same_compiled(MAP, random_stylus(np.random.default_rng(5), 0.2, 1.0))
 
 
 def test_a_domain_that_the_arm_cannot_serve_is_refused_with_the_place():

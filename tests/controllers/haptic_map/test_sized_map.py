@@ -6,15 +6,14 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import finite_differences
-from controllers.haptic_map.cylindrical import CYLINDRICAL, Cylindrical
-from controllers.haptic_map.evaluate import evaluate_map_jacobian, kinds_of
-from controllers.haptic_map.expressive import EXPRESSIVE
-from controllers.haptic_map.sized import SIZED, Sized, innermost, size_of
+from controllers.haptic_map.cylindrical import Cylindrical, cylindrical_map
+from controllers.haptic_map.expressive import express
+from controllers.haptic_map.map_stages import first_params, kernels_of
+from controllers.haptic_map.sized import Sized, size_pose
 from experiments.setups.parts.expression import expressive_figure
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.mocap.library import embedded
-from sim.compilation.kernel_units import map_units
-from tests.controllers.clips_for_maps import stylus
+from tests.controllers.clips_for_maps import assert_same_compiled, stylus
 
 WALK = embedded("walk")
 BASE = expressive_figure(Cylindrical([(WALK.poses, WALK.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
@@ -40,19 +39,14 @@ def test_the_derivative_is_that_of_the_pose() -> None:
 
 
 def test_the_tick_evaluates_it_as_python_does() -> None:
-    kind, params, memory = MAP.compiled()
-    pose, jacobian = np.empty(MAP.nq), np.empty((MAP.nv, 6))
-    evaluate_map_jacobian(map_units([(kind, params)]), kind, params, STYLUS, memory, pose, jacobian)
-    np.testing.assert_array_equal(pose, MAP.pose(STYLUS))
-    np.testing.assert_array_equal(jacobian, MAP.jacobian(STYLUS))
+    assert_same_compiled(MAP, STYLUS)
 
 
-def test_it_needs_the_kernels_of_all_that_it_wraps() -> None:
-    kind, params, _ = MAP.compiled()
-    assert kinds_of(kind, params) == (SIZED, EXPRESSIVE, CYLINDRICAL)
-    assert innermost.py_func(kind, params)[0] == CYLINDRICAL
-    assert size_of.py_func(kind, params) == SIZE
-    assert size_of.py_func(*BASE.compiled()[:2]) == 1.0
+def test_its_kernels_are_called_after_those_of_all_that_it_is_made_of() -> None:
+    stages, params, _, size = MAP.compiled()
+    assert kernels_of(stages) == (cylindrical_map, express, size_pose)
+    np.testing.assert_array_equal(first_params.py_func(stages, params), BASE.base.compiled().params)
+    assert (size, BASE.compiled().size) == (SIZE, 1.0)
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, np.inf, np.nan])

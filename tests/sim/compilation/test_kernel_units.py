@@ -1,6 +1,7 @@
 """Units of compiled code: a run compiles what it uses, the next process finds it, and every path gives the same."""
 
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -14,47 +15,53 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
-from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, evaluate_map, kinds_of
-from controllers.haptic_map.expressive import EXPRESSIVE
-from controllers.haptic_map.robot_arm import ROBOT_ARM
+from controllers.haptic_map.cylindrical import Cylindrical, cylindrical_map
+from controllers.haptic_map.expressive import express
+from controllers.haptic_map.map_stages import MAP_ARGUMENTS, evaluate_map, kernels_of
+from controllers.haptic_map.robot_arm import robot_arm_map
 from controllers.state import HandState
-from experiments.setups.robot_arm import robot_arm_map
+from experiments.setups.parts.expression import expressive_figure
+from experiments.setups.robot_arm import robot_arm_map as default_arm_map
+from models.mocap.library import embedded
 from models.robot_arm.spec import arm_model
 from sim.compilation import kernel_units
-from sim.compilation.kernel_units import law_units, map_units
+from sim.compilation.kernel_units import law_units, linked_stages
 from sim.compilation.unit_cache import cache_folder
+from sim.compilation.units import Unit
 from sim.reference.map_derivative import map_derivative
 from sim.reference.reference import poses_along
 
-ARM = robot_arm_map(arm_model(), 1.5)
+ARM = default_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
 
 
-def test_only_what_is_used_has_an_address():
-    maps, laws = map_units([ARM.compiled()[:2]]), law_units((FIELD + FIELD).limited(2.0))
-    assert np.flatnonzero(maps).tolist() == [ROBOT_ARM]
+def test_a_map_and_a_law_are_linked_by_the_addresses_of_their_kernels():
+    stages, laws = linked_stages(ARM.compiled().stages), law_units((FIELD + FIELD).limited(2.0))
+    assert kernels_of(stages) == (robot_arm_map,)
     assert len(laws) == 1
     assert laws.all()
-    np.testing.assert_array_equal(map_units([ARM.compiled()[:2]]), maps)
-    assert max(MAP_KERNELS) < len(maps)
+    assert stages[0, 2] == Unit.of(robot_arm_map, *MAP_ARGUMENTS).address() != 0
+    np.testing.assert_array_equal(linked_stages(ARM.compiled().stages), stages)
 
 
-def test_a_map_about_another_one_needs_both():
-    assert kinds_of(ROBOT_ARM, np.zeros(0)) == (ROBOT_ARM,)
-    assert kinds_of(EXPRESSIVE, np.array([ROBOT_ARM, 0.0])) == (EXPRESSIVE, ROBOT_ARM)
+def test_a_map_from_another_process_has_the_kernels_of_this_one():
+    walk = embedded("walk")
+    made = expressive_figure(Cylindrical([(walk.poses, walk.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
+    copied = pickle.loads(pickle.dumps(made))
+    assert kernels_of(copied.compiled().stages) == (cylindrical_map, express)
 
 
 def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
     compiled, rng = ARM.compiled(), np.random.default_rng(1)
     points = np.hstack((rng.uniform(-0.05, 0.05, (20, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))))
     poses = np.empty((20, ARM.nq))
-    poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
+    poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
     np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
 
 
 def test_a_unit_answers_python_too():
-    map_units([ARM.compiled()[:2]])
-    kernel: Any = MAP_KERNELS[ROBOT_ARM]
+    linked_stages(ARM.compiled().stages)
+    kernel: Any = robot_arm_map
     units = list(kernel.overloads)
     assert MAP_ARGUMENTS in units
     ARM.pose(np.array([0.05, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
@@ -80,20 +87,20 @@ def test_a_field_kept_on_disk_is_the_field_of_python_to_the_last_bit():
 
 
 def test_what_is_not_compiled_is_an_error_and_no_crash():
-    kind, params, memory = ARM.compiled()
-    with pytest.raises(ControllerError, match="map is not compiled"):
-        evaluate_map(np.zeros(8, dtype=np.int64), kind, params, np.zeros(7), memory, np.empty(ARM.nq))
+    stages, params, memory, _ = ARM.compiled()
+    with pytest.raises(ControllerError, match="map is not compiled; its stages are not linked"):
+        evaluate_map(stages, params, np.zeros(7), memory, np.empty(ARM.nq))
     units, hand = np.zeros(1, dtype=np.int64), HandState.at((0.0, 0.0, 0.0)).vector()
     with pytest.raises(ControllerError, match="kernel of a law of this field is not compiled"):
         evaluate(units, FIELD.ops, FIELD.params, FIELD.fresh_memory(), hand, np.empty(6))
 
 
 _PROCESS = """
-import numpy as np
-from controllers.haptic_map.robot_arm import ROBOT_ARM
+from controllers.haptic_map.map_stages import MAP_ARGUMENTS
+from controllers.haptic_map.robot_arm import robot_arm_map
 from sim.compilation import kernel_units
-from sim.compilation.units import unit_function
-kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
+from sim.compilation.units import Unit, unit_function
+Unit.of(robot_arm_map, *MAP_ARGUMENTS).address()
 unit = unit_function("controllers.haptic_map.robot_arm", "robot_arm_map")
 print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()), kernel_units.__file__)
 """

@@ -17,7 +17,11 @@ from controllers.fields.follow import follow_wrench
 from controllers.fields.governor import governor_wrench
 from controllers.fields.higher_order import higher_order_wrench
 from controllers.fields.stretchy_tubes import stretchy_wrench
-from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS
+from controllers.haptic_map.cylindrical import cylindrical_map
+from controllers.haptic_map.expressive import express
+from controllers.haptic_map.lifted_kernel import lifted_map
+from controllers.haptic_map.map_stages import MAP_ARGUMENTS
+from controllers.haptic_map.river_clips import river_clips_map
 from controllers.lent import Lent
 from sim.compilation import unit_key as unit_key_module
 from sim.compilation.unit_key import UnknownIngredient, UnknownName, describe_type, reached_functions, unit_key
@@ -78,6 +82,7 @@ def test_what_changes_the_code_changes_the_key_of_what_reaches_it_only(keys, old
     assert other_now == other
 
 
+MAPS = (cylindrical_map, lifted_map, river_clips_map, express)
 LAWS = (follow_wrench, bunny_wrench, governor_wrench, higher_order_wrench, stretchy_wrench)
 
 
@@ -156,7 +161,7 @@ def test_numba_s_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):
 
 def test_everything_that_a_run_compiles_has_a_key_of_its_own():
     given = [(run_block, ())] + [(kernel, LAW_ARGUMENTS) for kernel in LAWS]
-    given += [(kernel, MAP_ARGUMENTS) for kernel in MAP_KERNELS.values()]
+    given += [(kernel, MAP_ARGUMENTS) for kernel in MAPS]
     keys = {unit_key(function.py_func, arguments, {}) for function, arguments in given}  # pyright: ignore
     assert len(keys) == len(given)
 
@@ -178,7 +183,7 @@ def test_what_is_chosen_by_the_type_of_a_device_is_part_of_the_loop() -> None:
 
 
 def test_instructions_and_names_are_read_as_python_s_own_module_reads_them() -> None:
-    kernels = (run_block, *LAWS, *MAP_KERNELS.values())
+    kernels = (run_block, *LAWS, *MAPS)
     for function in {id(f): f for kernel in kernels for f in reached_functions(kernel.py_func)}.values():
         code = function.__code__
         read = [one for one in dis.get_instructions(code) if one.opname != "EXTENDED_ARG"]
