@@ -117,6 +117,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     clip, report = retarget(motion, roles, hints)
     copies = [joint for own in people if len(own) > 1 for joint in own] if hints.roles is None else []
     remarks = (
+        *motion.remarks,
         *copy_remarks([motion.joints[joint] for joint in copies], report.taken["pelvis"]),
         *report.remarks,
         *floor_remarks(contacts(clip).clearance, clip.fps),

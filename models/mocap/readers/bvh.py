@@ -54,7 +54,7 @@ def read_bvh(path: Path) -> SourceMotion:
     """
     lines = numbered_lines(path)
     joints, n_columns = _read_hierarchy(lines, path)
-    frames, fps = _read_frames(lines, len(joints), n_columns, path)
+    frames, fps, remarks = _read_frames(lines, len(joints), n_columns, path)
     offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
     tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
@@ -69,7 +69,7 @@ def read_bvh(path: Path) -> SourceMotion:
             turn = quaternions.about_axis(axis, np.deg2rad(frames[:, column]))
             rotations[:, index] = quaternions.product(rotations[:, index], turn)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
-    return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None)
+    return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None, remarks=remarks)
 
 
 def _displaced(joints: list[_Joint], frames: Array) -> bool:
@@ -188,8 +188,14 @@ def _read_end_site(tokens: _Tokens) -> list[float]:
     return tip
 
 
-def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int, path: Path) -> tuple[Array, float]:
-    """The frames' channels, shape (frames, channels), and their rate."""
+def _read_frames(
+    lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int, path: Path
+) -> tuple[Array, float, tuple[str, ...]]:
+    """The frames' channels, shape (frames, channels), their rate, and a remark if there is one more than declared.
+
+    Exporters miscount by one, or write a reference pose in front that they do not count: no line then tells which frame
+    is not meant, so all are read. More lines than that mean a damaged file.
+    """
     rest = ((line, text) for line, text in lines if text.strip())
     line, text = next(rest, (0, ""))
     match = re.fullmatch(r"\s*Frames\s*:\s*(\S+)\s*", text, re.IGNORECASE)
@@ -206,14 +212,19 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int
     for line, text in rest:
         tokens = text.split()
         found += 1
-        if found > n_frames:
-            raise MotionFileError(
-                path, line, f"more lines than the {n_frames} frames declared", "as many as Frames says"
-            )
+        if found > n_frames + 1 or (found > n_frames and len(tokens) != n_columns):
+            what = f"more lines than the {_frames(n_frames)} declared"
+            raise MotionFileError(path, line, what, "as many as Frames says")
         if len(tokens) != n_columns:
             raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
         values.extend(numbers(tokens, path, line))
     # The frames of a skeleton without channels are empty lines, which are skipped.
     if found < n_frames and n_columns:
         raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
-    return np.array(values).reshape(n_frames, n_columns), fps
+    told = f"the file has {_frames(found)}, one more than the {n_frames} it declares: the last one is read, too"
+    frames = np.array(values).reshape(max(found, n_frames), n_columns)
+    return frames, fps, (told,) if found > n_frames else ()
+
+
+def _frames(n: int) -> str:
+    return f"{n} frame{'s' * (n != 1)}"

@@ -46,6 +46,8 @@ class SourceMotion:
         Whether the motion is cyclic, if the file states it.
     timed : bool
         Whether the file states its frame rate.
+    remarks : tuple of str
+        What the reader found amiss in the file and read nevertheless.
     """
 
     path: Path
@@ -60,6 +62,7 @@ class SourceMotion:
     up: str | None = None
     loops: bool | None = None
     timed: bool = True
+    remarks: tuple[str, ...] = ()
 
     @property
     def n_frames(self) -> int:

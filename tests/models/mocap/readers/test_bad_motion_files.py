@@ -57,7 +57,12 @@ WRONG_BVH = {
     "short line": (BVH.replace("0 8 1 1", "0 8 1"), "x.bvh:23: frame of 17 numbers; expected 18, one a channel"),
     "long line": (BVH.replace("0 8 1 1", "0 8 1 1 1"), "x.bvh:23: frame of 19 numbers; expected 18, one a channel"),
     "truncated": (BVH.replace("0 8 1 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15\n", ""), "x.bvh:22: file ends after 1 of 2"),
-    "too many lines": (BVH + "0 " * 18, "x.bvh:24: more lines than the 2 frames declared"),
+    "too many lines": (BVH + 2 * ("0 " * 18 + "\n"), "x.bvh:25: more lines than the 2 frames declared"),
+    "more than one frame": (
+        BVH.replace("Frames: 2", "Frames: 1") + "0 " * 18,
+        "x.bvh:24: more lines than the 1 frame declared",
+    ),
+    "a piece of a line too many": (BVH + "0 " * 17, "x.bvh:24: more lines than the 2 frames declared"),
     "1e9 frames": (BVH.replace("Frames: 2", "Frames: 1000000000"), "x.bvh:20: number of frames is '1000000000'"),
     "many numbers": (
         BVH.replace("Frames: 2", "Frames: 1000000"),

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.mocap.library import read_motion
+from models.mocap.library import load, read_motion
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic
+from tests.models.mocap.readers.motion_files import BVH
 
 CHAIN = """HIERARCHY
 ROOT Hips
@@ -135,6 +136,20 @@ Frame Time: 0.04
 90 0 0 2 0 0 0 0 0
 """
     np.testing.assert_allclose(places(read_text(tmp_path, text))[:, 1], [[0, 1, 0], [0, 2, 0]], atol=1e-15)
+
+
+def test_one_frame_more_than_declared_is_read_and_said(tmp_path):
+    motion = read_text(tmp_path, CHAIN.replace("Frames: 2", "Frames: 1"))
+    np.testing.assert_array_equal(places(motion), places(read_text(tmp_path, CHAIN)))
+    assert motion.remarks == ("the file has 2 frames, one more than the 1 it declares: the last one is read, too",)
+    assert read_text(tmp_path, CHAIN).remarks == ()
+
+
+def test_what_a_reader_remarks_is_in_the_report(tmp_path):
+    (tmp_path / "motion.bvh").write_text(BVH.replace("Frames: 2", "Frames: 1"))
+    report = load(tmp_path / "motion.bvh").report
+    assert report is not None
+    assert "the file has 2 frames, one more than the 1 it declares: the last one is read, too" in report.lines()
 
 
 def test_frame_times_are_taken_for_whole_rates_only_when_they_are_rounded_ones(tmp_path):
