@@ -9,6 +9,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from models.mocap.readers.source_motion import SourceMotion
 FPS = 120.0  # [1/s], CMU's: an AMC file does not say its own
 _INCH = 0.0254  # [m]
 _FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
+_Row: TypeAlias = dict[str, list[float]]  # a frame: the values of each bone's freedoms
 
 
 @dataclass
@@ -227,38 +229,53 @@ def _read_children(skeleton: _Skeleton, fields: list[str], path: Path, line: int
 def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
     """Whether angles are in degrees, and the frames: one row each, the freedoms of all bones in the joints' order."""
     moving = {name: skeleton.bones[name] for name in ("root", *skeleton.parents) if skeleton.bones[name].freedoms}
-    degrees, values, n_frames = True, array("d"), 0
-    row: dict[str, list[float]] = {}
-    line = 0
+    degrees, values = True, array("d")
+    shown: list[int] = []  # the numbers of the frames
+    first: _Row = {}
+    row, begin, line = first, 0, 0
     for line, fields in _fields(path):
         if fields[0].startswith(":"):
             degrees = degrees and fields[0].lower() != ":radians"
         elif len(fields) == 1:
-            if n_frames:
-                _append(values, row, moving, path, line)
-            if not (fields[0].isascii() and fields[0].isdigit()):
-                raise MotionFileError(path, line, f"found {quoted(fields[0])}", "the number of a frame")
-            row, n_frames = {}, n_frames + 1
-            check_size(n_frames, len(skeleton.bones), len(values), path, line)
+            next_number = _frame_number(fields[0], shown, path, line)
+            if shown:
+                _append(values, row, first, moving, path, begin)
+                row = {}
+            shown.append(next_number)
+            begin = line
+            check_size(len(shown), len(skeleton.bones), len(values), path, line)
         else:
             bone = moving.get(fields[0])
-            if bone is None or n_frames == 0 or fields[0] in row:
+            if bone is None or not shown or fields[0] in row:
                 raise MotionFileError(path, line, f"found {quoted(fields[0])}", "each moving bone once a frame")
             if len(fields) - 1 != len(bone.freedoms):
                 what = f"{quoted(bone.name)} has {len(fields) - 1} numbers"
                 raise MotionFileError(path, line, what, f"{len(bone.freedoms)}: {' '.join(bone.freedoms)}")
             row[bone.name] = numbers(fields[1:], path, line)
-    if n_frames == 0:
+    if not shown:
         raise MotionFileError(path, line, "no frames", "frame numbers, each followed by its bones")
-    _append(values, row, moving, path, line)
-    return degrees, np.array(values).reshape(n_frames, -1)
+    _append(values, row, first, moving, path, begin)
+    return degrees, np.array(values).reshape(len(shown), -1)
 
 
-def _append(
-    values: "array[float]", row: dict[str, list[float]], moving: dict[str, _Bone], path: Path, line: int
-) -> None:
-    """Append a frame's row: bones that it does not mention have angles 0, but the root must be given."""
-    if "root" in moving and "root" not in row:
-        raise MotionFileError(path, line, "frame without 'root'", "the root in every frame")
+def _frame_number(word: str, shown: list[int], path: Path, line: int) -> int:
+    """The number of the frame after those with the numbers `shown`; where it jumps, frames are lost."""
+    if not (word.isascii() and word.isdigit() and len(word) <= 12):
+        raise MotionFileError(path, line, f"found {quoted(word)}", "the number of a frame")
+    found = int(word)
+    if shown:
+        step = max((shown[1] if len(shown) > 1 else found) - shown[0], 1)
+        if found != shown[-1] + step:
+            expected = f"{shown[-1] + step}: frame numbers rise by a constant step"
+            raise MotionFileError(path, line, f"frame {found} after frame {shown[-1]}", expected)
+    return found
+
+
+def _append(values: "array[float]", row: _Row, first: _Row, moving: dict[str, _Bone], path: Path, line: int) -> None:
+    """Append the row of a frame that begins at `line`: bones that no frame mentions have angles 0, but not the root."""
     for name, bone in moving.items():
+        if (name in row) != (name in first or name == "root"):
+            odd = quoted(name)
+            what = f"frame with {odd}, which none before it has" if name in row else f"frame without {odd}"
+            raise MotionFileError(path, line, what, "the root and the same bones in every frame")
         values.extend(row.get(name) or [0.0] * len(bone.freedoms))

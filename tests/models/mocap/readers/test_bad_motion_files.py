@@ -121,12 +121,26 @@ WRONG_ASF = {
     "1e5 bones": (":bonedata\n" + "".join(f"begin\nname b{k}\nend\n" for k in range(100_000)), "1.asf:3000: too many"),
     "empty": ("", "1.asf:1: file is empty"),
 }
+FRAME = "{}" + AMC[AMC.index("\nroot", AMC.index("\n2\n")) :]
 WRONG_AMC = {
     "no frames": (":DEGREES\n", "1_1.amc:1: no frames"),
     "unknown bone": (AMC.replace("ltibia 7", "tail 7", 1), "1_1.amc:7: found 'tail'"),
     "bone before a frame": ("root 0 0 0 0 0 0\n", "1_1.amc:1: found 'root'"),
     "bone twice": (AMC.replace("rtibia 8", "ltibia 8", 1), "1_1.amc:8: found 'ltibia'"),
-    "missing root": (re.sub(r"root .*\n", "", AMC, count=1), "1_1.amc:8: frame without 'root'"),
+    "missing root": (re.sub(r"root .*\n", "", AMC, count=1), "1_1.amc:3: frame without 'root'"),
+    "bone missing in one frame": (AMC[::-1].replace("\n7 aibitl", "", 1)[::-1], "1_1.amc:9: frame without 'ltibia'"),
+    "bone in one frame alone": (AMC.replace("ltibia 7\n", "", 1), "1_1.amc:8: frame with 'ltibia', which none before"),
+    "cut off between bones": (AMC[: AMC.rindex("ltibia")], "1_1.amc:9: frame without 'ltibia'; expected the root and"),
+    "cut off after a frame's number": (AMC[: AMC.rindex("root")], "1_1.amc:9: frame without 'root'"),
+    "cut off in a bone's name": (AMC[: AMC.rindex("ibia")], "1_1.amc:14: found 'rt'; expected the number of a frame"),
+    "bone without numbers": (AMC.replace("rfemur 4 5 6", "rfemur", 1), "1_1.amc:6: found 'rfemur'; expected the numb"),
+    "frames lost": (AMC + FRAME.format(50), "1_1.amc:15: frame 50 after frame 2; expected 3: frame numbers rise"),
+    "frames lost after every second": (
+        AMC.replace("\n2\n", "\n3\n") + FRAME.format(6),
+        "1_1.amc:15: frame 6 after frame 3; expected 5",
+    ),
+    "a frame twice": (AMC.replace("\n2\n", "\n1\n"), "1_1.amc:9: frame 1 after frame 1; expected 2"),
+    "frame number of 5000 digits": (AMC.replace("\n2\n", "\n" + "2" * 5000 + "\n"), "1_1.amc:9: found '222"),
     "short line": (
         AMC.replace("lfemur 1 2 3", "lfemur 1 2", 1),
         "1_1.amc:5: 'lfemur' has 2 numbers; expected 3: rx ry",

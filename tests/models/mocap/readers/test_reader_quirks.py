@@ -230,6 +230,20 @@ def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path)
     assert (degrees.fps, degrees.timed) == (120.0, False)
 
 
+def test_amc_frames_may_be_numbered_from_anywhere_at_any_constant_step(tmp_path):
+    asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
+    amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25")
+    plain = read_acclaim(tmp_path, asf, amc)
+    every_second = read_acclaim(tmp_path, asf, amc.replace("\n1\n", "\n100\n").replace("\n2\n", "\n102\n"))
+    np.testing.assert_array_equal(places(every_second), places(plain))
+
+
+def test_a_bone_that_no_amc_frame_mentions_is_not_turned(tmp_path):
+    asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
+    amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25").replace("thigh 15 -25\n", "")
+    np.testing.assert_allclose(read_acclaim(tmp_path, asf, amc).rotations[:, 1], [[1, 0, 0, 0]] * 2, atol=1e-12)
+
+
 def deepmimic_row(duration, x, turn):
     half = turn / 2
     return [duration, x, 1.0, 0.0, np.cos(half), 0.0, np.sin(half), 0.0, *([1.0, 0, 0, 0] * 3), 0.0,
