@@ -113,6 +113,13 @@ class _Tokens:
                 )
         return " ".join(words)
 
+    def joint(self, parent: int) -> _Joint:
+        """A joint whose ROOT or JOINT is the last word."""
+        line = self.line
+        if not (name := self.name()):
+            raise MotionFileError(self.path, line, "joint without a name", "a name after ROOT or JOINT")
+        return _Joint(name, parent, line)
+
     def vector(self) -> list[float]:
         """Three numbers."""
         return [number(self.next("three numbers"), self.path, self.line) for _ in range(3)]
@@ -129,7 +136,7 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
         raise tokens.error(f"file begins with {quoted(word)}", "HIERARCHY: is this a BVH file?")
     if (word := tokens.next("ROOT")).upper() != "ROOT":
         raise tokens.error(f"found {quoted(word)}", "ROOT")
-    joints = [_Joint(tokens.name(), -1, tokens.line)]
+    joints = [tokens.joint(-1)]
     open_joints, n_columns = [0], 0
     while open_joints:
         joint = joints[open_joints[-1]]
@@ -145,7 +152,7 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
             if len(joints) >= JOINT_LIMIT:
                 raise tokens.error("too many joints", f"at most {JOINT_LIMIT}")
             open_joints.append(len(joints))
-            joints.append(_Joint(tokens.name(), open_joints[-2], tokens.line))
+            joints.append(tokens.joint(open_joints[-2]))
         elif keyword == "END":
             tip = _read_end_site(tokens)
             joint.tip = joint.tip or tip
