@@ -2,6 +2,7 @@
 
 import math
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -44,7 +45,7 @@ def quoted(text: str) -> str:
 
 
 def read_text(path: Path, limit: int = FILE_LIMIT, kind: str = "motion file") -> bytes:
-    """A text file's content with lines ended by LF alone, from any mixture of LF, CR LF and CR.
+    """A text file's content with lines ended by LF alone, from any mixture of LF, CR LF and CR; from UTF-16 as UTF-8.
 
     Parameters
     ----------
@@ -68,6 +69,8 @@ def read_text(path: Path, limit: int = FILE_LIMIT, kind: str = "motion file") ->
         raise MotionFileError(path, 0, f"cannot be opened ({reason})", f"a readable {kind}") from None
     if len(content) > limit:
         raise MotionFileError(path, 0, "file is too large", f"a {kind} of at most {limit / 1e6:g} MB")
+    if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        content = content.decode("utf-16", errors="replace").encode()
     if b"\0" in content:
         line = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise MotionFileError(path, line, "binary content (a zero byte)", "a text file")

@@ -99,6 +99,8 @@ def test_rotations_may_stand_before_positions(tmp_path):
         lambda text: text.replace("\n", "  \t\n"),
         lambda text: text.replace("\n", "\n\n"),
         lambda text: "\ufeff" + text,
+        lambda text: ("\ufeff" + text).encode("utf-16-le"),
+        lambda text: ("\ufeff" + text.replace("\n", "\r\n")).encode("utf-16-be"),
         lambda text: text.replace("Frames: 2", "Frames:2").replace("Frame Time: .", "Frame Time:\t."),
         lambda text: text.replace("\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 0 0\n\t\t}\n", ""),
         lambda text: text.replace("Xrotation", "XROTATION").replace("End Site", "END SITE").replace("ROOT", "Root"),
