@@ -22,6 +22,9 @@ _RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: th
 # a flight of 1 s rises by 1.2 m. The longest of the 28 captures of docs/validation/prepared-captures.md lasts 0.5 s.
 _ALOFT, _FLIGHT = 0.1, 1.0
 _BENEATH = 0.1  # least depth beneath the floor that is reported [m]: in the same captures nothing is deeper
+# Legs of a human, hip to ankle [m]: 0.49 of a grown-up's stature (Winter 2009, figure 4.1), of the tallest known 1.33;
+# about 0.3 of a child that begins to walk. Units are mistaken by factors above 2, so the bounds may be wide.
+_SHORTEST_LEG, _LONGEST_LEG = 0.3, 1.5
 COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 _UNITS = (
     ("metres", 1.0),
@@ -193,7 +196,9 @@ def axis_name(direction: Array) -> str:
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
     """The unit in which the performer's legs are about as long as the figure's."""
     if unit is not None:
-        return f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+        told = f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+        human = _SHORTEST_LEG <= leg * unit <= _LONGEST_LEG
+        return told if human else f"{told}, which are no human's: the file's unit is another"
     name, unit = min(_UNITS, key=lambda known: abs(np.log(leg * known[1] / own_leg)))
     likely = abs(np.log(leg * unit / own_leg)) < np.log(1.3)
     return f"{name} (worked out), legs {leg * unit:.2f} m" if likely else f"unknown, legs {leg:.4g} units"
