@@ -8,6 +8,7 @@ from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.followed import Followed
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
+from models.mocap.preparation.bounds import FLYING, beyond
 from models.mocap.preparation.laps import likeness
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
@@ -140,11 +141,14 @@ def advice(made: Prepared) -> tuple[str, ...]:
     change = made.feasible
     if made.near:
         return ()
-    beyond = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
+    excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
+    lacks = f"{100 * change.residual:.0f} % of weight"
+    if change.residual > FLYING:
+        lacks = f"{beyond(100 * change.residual, 100 * FLYING)} % of weight, more than {100 * FLYING:.0f}"
     return (
         f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
-        f"lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {beyond:.0f}° beyond its "
-        f"range, and still lacks {100 * change.residual:.0f} % of weight",
+        f"lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
+        f"range, and still lacks {lacks}",
         "try --loop START:END for a part without what is not feasible, --loop open if it "
         "does not repeat, or a capture whose support is feet and hands alone",
     )

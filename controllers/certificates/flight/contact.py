@@ -20,6 +20,7 @@ import numpy as np
 from controllers.certificates.flight.flight_fit import NOISE
 from controllers.certificates.flight.tolerance import ContactTolerance
 from controllers.state import Array, Mask
+from models.mocap.preparation.bounds import beyond
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +68,10 @@ def contact_doubts(
     unheld = _longest(touched.supported & ~touched.held) / fps
     figures |= {"unheld": unheld, "skate": touched.skate}
     if unheld > tolerance.unheld:
-        doubts.append(f"glides for {unheld:.2f} s with nothing at rest, longer than {tolerance.unheld:g}")
+        doubts.append(f"for {unheld:.2f} s it is low and nothing of it is at rest, longer than {tolerance.unheld:g}")
     if touched.skate > tolerance.skate:
-        doubts.append(f"a foot that stands slides by {100 * touched.skate:.0f} cm, more than {100 * tolerance.skate:g}")
+        slides = beyond(100 * touched.skate, 100 * tolerance.skate)
+        doubts.append(f"a foot that stands slides by {slides} cm, more than {100 * tolerance.skate:g}")
     return doubts + _jumps(touched, com, fps, tolerance, figures), figures
 
 

@@ -4,8 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.arrays import Array
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.motion.quaternions import rotated
 from models.mocap.preparation.bounds import beyond
 from models.mocap.preparation.looping import Looped
 from models.mocap.preparation.poses import resampled
@@ -13,6 +15,9 @@ from models.mocap.preparation.poses import resampled
 # Largest RMS distances of joints of a gait and of another motion [rad], and of the root [m]: in a prototype of the
 # preparation gaits moved by 1.7 to 3°, fighting and a punch by 7 to 8°, roots by 2.3 to 6.6 cm.
 GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
+# Distance of the points to the left of a root that fix its heading [m]: an arm's length.
+_LEFT = 0.7
+_Y = np.array([0.0, 1.0, 0.0])
 _LISTED = 5  # joints listed
 _TRAVELS = 0.4  # way of a lap beyond which a closed clip that does not turn over is a gait [m]
 
@@ -43,7 +48,7 @@ class Fidelity(NamedTuple):
     joints : float
         RMS over joints and time of the angle between their rotations [rad].
     root : float
-        RMS distance of the roots [m], both over the floor as the best planar displacement lays them upon each other.
+        RMS distance of the roots [m], over the floor after the best displacement of the body on it.
     extremes : tuple of Extreme
         The five joints that differ most, the largest first.
     gait : bool
@@ -95,10 +100,7 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
     original = resampled(Clip(captured.poses, captured.fps * pace, captured.name), clip.fps)
     shown, shows = common_frames(clip, captured, part, pace)
     ours, theirs = clip.poses[shown], original.poses[shows]
-    # The rotation about the vertical and the translation that minimise the distance of the roots over the floor.
-    a, b = ours[:, :2] - ours[:, :2].mean(axis=0), theirs[:, :2] - theirs[:, :2].mean(axis=0)
-    turn = np.exp(-1j * np.angle(np.sum((a @ (1, 1j)).conj() * (b @ (1, 1j)))))
-    level = np.abs(b @ (1, 1j) * turn - a @ (1, 1j))
+    level = _apart(ours, theirs)
     height = theirs[:, 2] - ours[:, 2]
     angles = np.linalg.norm(pose_difference(ours, theirs)[:, 6:].reshape(len(ours), -1, 3), axis=2)
     instants = (shown.start + angles.argmax(axis=0)) / clip.fps
@@ -108,6 +110,22 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
         tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in most),
         clip.closes() and not clip.turns_over and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
     )  # fmt: skip
+
+
+def _apart(ours: Array, theirs: Array) -> Array:
+    """Distances of two roots over the floor after the best displacement of one of them [m], from poses (n, 75).
+
+    Its rotation about the vertical and its translation minimise the distances of the roots and of points to the left
+    of them. The path alone of a body that stays about its place would be laid upon the other with the body turned away.
+    """
+    places, left = [], []
+    for poses in (ours, theirs):
+        place = poses[:, :2] @ (1, 1j)
+        places.append(place - place.mean())
+        left.append(_LEFT * (rotated(poses[:, 3:7], _Y)[:, :2] @ (1, 1j)))
+    (a, b), (c, d) = places, left
+    turn = np.exp(-1j * np.angle(np.sum(a.conj() * b + c.conj() * d)))
+    return np.abs(b * turn - a)
 
 
 def common_frames(clip: Clip, captured: Clip, part: Looped, pace: float) -> tuple[slice, slice]:

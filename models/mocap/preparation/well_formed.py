@@ -103,7 +103,7 @@ class WellFormed:
                 f"feet skate by {beyond(1000 * self.skate, 1000 * SKATE)} mm in a stance; {1000 * SKATE:.0f} at most"
             )
         if self.outliers:
-            found.append(f"{self.outliers} frames stand out by their acceleration; none")
+            found.append(f"{self.outliers} frames stand out by their acceleration; 0 at most")
         if self.closed and self.seam > SEAM:
             found.append(f"velocities at the seam differ by {beyond(self.seam, SEAM)} rad/s; {SEAM} at most")
         if not self.closed and self.seam > REST:

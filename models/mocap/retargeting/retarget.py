@@ -37,10 +37,14 @@ from models.mocap.retargeting.retarget_report import (
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import check_sides, check_stature, up_axis
+from models.mocap.retargeting.upright import check_sides, check_stature, propped_seconds, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
+_PROPPED = (
+    "for {:.1f} s the body's weight is beside its feet and all else that is low: what it sits, hangs or leans on is "
+    "not in the file, and the figure has to do without"
+)
 _SITS = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
     "{} cm in height, so that feet that stand stay on the floor"
@@ -95,12 +99,14 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     if slope:  # levelling changes the heading of a body that does not face along the slope
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
+    propped = propped_seconds(lines, frames.positions[:, body], up.axis, motion.fps)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *([_SITS.format(round(100.0 * sits))] if sits else ()),
+        *([_PROPPED.format(propped)] if propped else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, roles),
         *(calibration_remarks(calibrated, roles, motion.n_frames - frames.dropped) if rest is None else ()),

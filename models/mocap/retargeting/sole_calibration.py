@@ -16,10 +16,12 @@ _PATIENCE = (1.0, 2.0, 4.0)  # factors on it and `AT_REST`, tried in turn: runs,
 # the joints of 19 captures by 0.5° RMS, twice by 0.02°.
 _LOW = 0.05
 _ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
-# Largest angle of a sole from that of the mean ankle [rad]: up to 25° in the 28 captures of
+# Largest angle of a sole from what ankle or toes let expect [rad]: from the mean ankle up to 25° in the 28 captures of
 # docs/validation/prepared-captures.md, 30° in one of fifty others. A squat on the toes, and single poses with a foot in
 # the air, have 37 to 114°.
 _STRANGE = np.deg2rad(35.0)
+# Angle of the line from ankle to toes beneath the sole [rad]: 21 ± 8° in 329 feet of 200 captures.
+_PITCH = np.deg2rad(21.0)
 _SHIFTS = 20  # iterations of the mean shift to the mode of a sole's normals: half or twice changes none of 17 captures
 # Standard deviation of a sole's likely inclination about that of the mean ankle: half or twice turns the joints of 19
 # captures by 0.3 or 0.2° RMS, in one of them by 3.5°.
@@ -93,13 +95,18 @@ def calibrated_foot(
     -------
     rotations : array of shape (frames, 4)
     used : int
-        Number of stance frames from which the sole's normal is taken; 0 if it is that of an ankle in rest pose.
+        Number of stance frames from which the sole's normal is taken; 0 if it is a guess, by an ankle in rest
+        pose or the toes of a single pose.
     """
     back = quaternions.conjugate(source)
     resting = carried(source, shank, straight)
     neutral, forward = (quaternions.rotated(back, quaternions.rotated(resting, axis))[0] for axis in (_Z, _X))
-    normal, used = _normal(quaternions.rotated(back[flat], up), neutral, min(_LEAST, len(source)))
     ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
+    # A single pose has no mean ankle, and its feet may hang: they stand if that is how their toes lie.
+    single, has_toes = len(source) == 1, bool(np.isfinite(ahead).all())
+    expected = _along_toes(ahead, np.cross(neutral, forward)) if single and has_toes else neutral
+    flat = flat if has_toes or not single else flat[:0]
+    normal, used = _normal(quaternions.rotated(back[flat], up), neutral, expected, min(_LEAST, len(source)))
     x = ahead - normal * (ahead @ normal)
     if not np.linalg.norm(x) >= _POINTING:  # no toes, or toes below the ankle: the heading of the shank
         x = forward - normal * (forward @ normal)
@@ -109,21 +116,28 @@ def calibrated_foot(
     return quaternions.product(source, constant), used
 
 
-def _normal(vertical: Array, neutral: Array, least: int) -> tuple[Array, int]:
+def _along_toes(toes: Array, left: Array) -> Array:
+    """Normal of a sole whose toes are `_PITCH` beneath it; unit vector to the toes, and about to the left."""
+    left = unit(left - toes * (left @ toes))
+    return np.cos(_PITCH) * np.cross(toes, left) - np.sin(_PITCH) * toes
+
+
+def _normal(vertical: Array, neutral: Array, expected: Array, least: int) -> tuple[Array, int]:
     """Normal of a sole in the axes of the file's foot, and the number of frames from which it is taken.
 
-    `vertical` (m, 3) is the vertical in the stance frames, `neutral` the normal of an ankle in rest pose on average:
-    the result where fewer than `least` frames agree, or where theirs would bend the ankle throughout.
+    `vertical` (m, 3) is the vertical in the stance frames, `neutral` the normal of an ankle in rest pose on average,
+    `expected` that of a single pose by its toes, or the same: the result where fewer than `least` frames agree, or
+    where theirs would bend the foot throughout.
     """
     alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
     # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
     likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
     used = alike[np.argmax(alike @ likely)] if len(vertical) else np.zeros(0, dtype=bool)
     if used.sum() < least:
-        return neutral, 0
+        return expected, 0
     # Mean shift to the mode of the likely normals: a frame more or less of a rolling foot changes it little.
     normal = unit(vertical[used].mean(axis=0))
     for _ in range(_SHIFTS):
         near = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _ALIKE) ** 2) / 2.0)
         normal = unit((near * likely) @ vertical)
-    return (neutral, 0) if normal @ neutral < np.cos(_STRANGE) else (normal, int(used.sum()))
+    return (expected, 0) if normal @ expected < np.cos(_STRANGE) else (normal, int(used.sum()))

@@ -14,7 +14,10 @@ What programs write by custom is evidence besides: in most files floors are at z
 in their zero pose. A body that lies throughout stands along an axis of the floor as well as one that stands, and is
 refused where it is flat on the plane zero of +Y or +Z, along which its rig stands. Runs whose curves leave their weight
 beside their feet need a lower score where both confirm it. A body that stands along an axis of which all others are far
-behind needs no least score: it climbs over boxes or stairs.
+behind needs no least score: it climbs over boxes or stairs. Where the best axis is not the one along which the rig is
+drawn, it has to lead by more, and by far if the body turns towards that at times: what falls is calm only where it
+lies. A body that sits, trunk and shanks along the axis of its rig and thighs across, is upright, though its weight is
+beside its feet.
 """
 
 from dataclasses import replace
@@ -23,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.arrays import Array, IntArray, Mask
+from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines, unit
@@ -41,9 +45,20 @@ _LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
 # an axis leads over the vertical by 0.1 at most. Of 891 windows of 0.5 to 20 s of 120 captures, no wrong axis that had
 # less than its least score had both: the nearest had 0.87 and 1.1.
 _STANDING, _ALONE = 0.9, 1.0
-# The lead from which it needs none where the rig's zero pose and the trunk are along it, too: in 1344 windows of 0.5 to
-# 20 s of 168 captures this finds ten more axes, and no wrong one.
-_ALONE_AS_DRAWN = 0.7
+# Cosine of trunk and b in some frame to the axis along which the rig is drawn, and its lead, from which that needs no
+# least score: in 3271 windows of 0.5 to 20 s of 180 captures this finds 41 more axes, and no wrong one.
+_AS_DRAWN, _LEADS = 0.95, 0.5
+# Least lead of an axis along which the rig is not drawn, and cosine of trunk or b to that of the rig in some frame
+# from which it needs the second; none suffices where the body stands as drawn at times. Of 23 wrong axes of 4878 such
+# windows, of falls, jumps and climbs, those with a larger cosine lead by 0.96 at most, the others by 0.67; two whole
+# captures whose rigs are drawn otherwise by 0.72 and 1.55.
+_AHEAD, _FAR_AHEAD, _TURNED = 0.7, 1.2, 0.5
+# Mean cosine of trunk and shanks of a body that sits to the vertical, and largest one of its thighs: 0.9 and more, and
+# 0.06 to 0.59, in 27 captures of people on chairs and a bicycle.
+_SITS, _ACROSS = 0.85, 0.7
+# Distance of the body's middle outside its lowest joints [leg lengths] beyond which something that is not in the file
+# bears it, and for longer than what [s]: of 200 captures, people on chairs, cliffs and ropes, and three others.
+_BESIDE, _STAYS = 0.25, 1.0
 _VOLUME = 10.0  # height of the highest capture volumes [leg lengths]: what climbs more has its root in another unit
 _CALM = 0.4  # least share of the frames that are judged
 _BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
@@ -92,23 +107,41 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
-    zero, trunk = _zero_pose(motion, roles), unit(lines.trunk[frames]).mean(axis=0)
+    zero, trunks = _zero_pose(motion, roles), unit(lines.trunk)
     if (lying := _lies_along(best, zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
     lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
-    along = min(zero @ AXES[best], trunk @ AXES[best]) > _ALONG
+    along = min(zero @ AXES[best], trunks[frames].mean(axis=0) @ AXES[best]) > _ALONG
     confirmed = along and np.median(np.abs(lowest)) < _OVER_ZERO
     least = _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
-    upright = float((_standing(lines)[frames] @ AXES[best]).mean()) > _STANDING
-    if upright and lead > (_ALONE_AS_DRAWN if along else _ALONE) and np.ptp(lowest) < _VOLUME:
+    standing = _standing(lines)
+    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _ALONG), None)
+    turned = [float((part[~lost] @ AXES[drawn]).max(initial=0.0)) for part in (standing, trunks)] if drawn else [0.0]
+    alone = float((standing[frames] @ AXES[best]).mean()) > _STANDING and lead > _ALONE
+    as_drawn = min(turned) > _AS_DRAWN
+    if (alone or (drawn == best and as_drawn and lead > _LEADS)) and np.ptp(lowest) < _VOLUME:
         least = -np.inf
+    ahead = np.inf if as_drawn else _FAR_AHEAD if max(turned) > _TURNED else _AHEAD
+    if drawn not in (best, None) and lead < ahead:
+        least, second = np.inf, drawn
     if np.isnan(lines.ankles).any():
         least = np.inf  # knees of a squat are no support
+    elif drawn and _sits(lines, frames, np.array(AXES[drawn])):
+        best, lead, least = drawn, max(lead, _CERTAIN), -np.inf
     if lead < _CERTAIN or scores[best] < least:
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
         )
     return Up(np.array(AXES[best], dtype=np.float64), lead)
+
+
+def _sits(lines: BodyLines, frames: IntArray, up: Array) -> bool:
+    """Whether trunk and shanks are along an axis, and thighs across it."""
+    thighs, shanks = lines.hips - lines.knees, lines.knees - lines.ankles
+    trunk, thigh, shank = (
+        float((unit(part)[frames] @ up).mean()) for part in (lines.trunk, thighs.mean(axis=1), shanks.mean(axis=1))
+    )
+    return min(trunk, shank) > _SITS and thigh < _ACROSS
 
 
 def _lies_along(best: str, zero: Array, positions: Array) -> str | None:
@@ -154,7 +187,14 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> f
     heights = positions[frames] @ up
     lowest = heights.min(axis=1)
     spread = float(np.subtract(*np.quantile(lowest, (0.95, 0.05)))) / lines.leg
-    bearing = heights < lowest[:, None] + _BEARING * lines.leg
+    balance = float(_outside(lines, positions, frames, up).mean()) / lines.leg
+    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
+
+
+def _outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> Array:
+    """Distance of the middle of hips and shoulders outside the hull of the lowest joints, seen along an axis, (m,)."""
+    heights = positions[frames] @ up
+    bearing = heights < heights.min(axis=1)[:, None] + _BEARING * lines.leg
     first, second = np.roll(up, 1), np.roll(up, 2)
     middle = (lines.middle + lines.top)[frames] / 2.0
     outside = np.zeros(len(frames))
@@ -162,8 +202,25 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> f
         along = np.cos(angle) * first + np.sin(angle) * second
         furthest = np.where(bearing, positions[frames] @ along, -np.inf).max(axis=1)
         outside = np.maximum(outside, middle @ along - furthest)
-    balance = float(outside.mean()) / lines.leg
-    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
+    return outside
+
+
+def propped_seconds(lines: BodyLines, positions: Array, up: Array, fps: float) -> float:
+    """Time for which the body stays with its weight beside all that is low: on a chair, against a wall, on a rope [s].
+
+    Parameters
+    ----------
+    lines : BodyLines
+        The body in n frames.
+    positions : Array
+        Its joints, shape (n, joints, 3).
+    up : Array
+        Upward unit vector, one of the file's axes.
+    fps : float
+        Frame rate [1/s].
+    """
+    beside = _outside(lines, positions, np.arange(len(positions)), up) > _BESIDE * lines.leg
+    return sum(end - start for start, end in spans(beside) if end - start > _STAYS * fps) / fps
 
 
 def check_stature(motion: SourceMotion, lines: BodyLines, up: Array) -> None:

@@ -30,6 +30,17 @@ def test_a_clip_elsewhere_on_the_floor_is_as_captured(walk):
     assert found.faults() == ()
 
 
+def test_a_path_is_not_laid_upon_the_other_with_the_body_turned_away():
+    """A body that sways forth and back by 10 cm is 14 cm RMS from one that sways the other way, not as captured."""
+    rest = np.zeros((241, 75))
+    rest[:, 3::4] = 1.0
+    sway = 0.1 * np.sin(np.arange(241) * 2.0 * np.pi / 120.0)
+    forth, back = rest.copy(), rest.copy()
+    forth[:, 0], back[:, 0] = sway, -sway
+    found = fidelity(Clip(forth, 120.0, "forth"), Clip(back, 120.0, "back"), whole(Clip(back, 120.0, "back")), 1.0)
+    assert found.root == pytest.approx(0.2 / np.sqrt(2.0), rel=1e-2)
+
+
 def test_a_turned_joint_is_the_first_of_the_extremes(walk):
     poses, knee = walk.poses.copy(), JOINTS.index("left_knee")
     columns = slice(7 + 4 * knee, 11 + 4 * knee)

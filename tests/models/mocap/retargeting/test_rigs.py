@@ -324,6 +324,34 @@ def posed(turns, clip):
     return Clip(poses, clip.fps, f"{clip.name} posed")
 
 
+def test_a_body_that_sits_on_a_chair_tells_what_is_up(motions, tmp_path):
+    """Its weight is behind its feet; trunk and shanks are as its rig is drawn, and thighs across."""
+    bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+            for part, degrees in (("thigh", -85.0), ("shank", 85.0))]  # fmt: skip
+    for up in ("+Y", "+Z"):
+        write_rig(Rig(up=up, zero="upright T"), posed(bend, motions.whole("cheer")), tmp_path / "r.bvh")
+        assert load(tmp_path / "r.bvh").report.up == up
+
+
+@pytest.mark.parametrize(("thigh", "shank", "frames"), [(0, 0, 24), (0, 0, 36), (-40, 60, 24), (-40, 60, 36)])
+def test_a_fall_after_which_the_body_lies_does_not_tell_what_is_up(thigh, shank, frames, motions, tmp_path):
+    """It is calm only where it lies, along the floor as if that was up; but at first it stands as its rig is drawn."""
+    clip = motions.whole("cheer", 30.0)
+    bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+            for part, degrees in (("thigh", thigh), ("shank", shank))]  # fmt: skip
+    fallen = np.clip((np.arange(frames) - 3) / 15.0, 0.0, 1.0)[:, None]
+    poses = (1.0 - fallen) * clip.poses[:frames] + fallen * posed(bend, clip).poses[:frames]
+    turns = Rotation.from_rotvec(np.pi / 2.0 * fallen**2 * (0.0, 1.0, 0.0))
+    poses[:, :3] = turns.apply(poses[:, :3])
+    quats = poses[:, 3:].reshape(frames, -1, 4)
+    quats /= np.linalg.norm(quats, axis=2, keepdims=True)
+    quats[:, 0] = (turns * Rotation.from_quat(quats[:, 0], scalar_first=True)).as_quat(scalar_first=True)
+    write_rig(Rig(zero="upright T"), Clip(poses, clip.fps, "fall"), tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=r"does not tell what is up .*; expected .*--up \+Y"):
+        load(tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh", Hints(up="+Y")).report.up == "+Y"
+
+
 def test_a_body_that_kneels_is_not_mirrored(motions, tmp_path):
     """Its toes point back in the room, and ahead of their own shanks."""
     bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
