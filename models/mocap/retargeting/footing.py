@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array
+from models.arrays import Array, IntArray
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
 from models.mocap.motion import quaternions
 
@@ -20,14 +20,13 @@ _LEVEL = 0.06
 # Quantile of the heights of level soles that is the floor: half of it moves the floor of 19 captures by 2 mm, twice
 # by 4 (10 in one of them).
 _SHARE = 0.25
-# Largest speed of a standing sole [m/s]: with half of it the slope of one of 17 captures goes unseen, twice moves
-# floors by 2 mm.
+# Largest speed of a standing sole [m/s]: with half of it one of the 28 captures of docs/validation/prepared-captures.md
+# gets a slope of 1.4°, with twice one keeps its slope.
 _STILL = 0.4
 _SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
 # Least number of stances: half of it changes none of 17 captures, twice leaves one of them its slope.
 _STEPS = 4
-# Probability of a slope as large on a level floor, two-sided: twice changes none of the 28 captures of
-# docs/validation/prepared-captures.md, half leaves snu/backflip its slope.
+# Probability of a slope as large on a level floor, two-sided: half or twice changes none of the 28 captures.
 _CHANCE = 0.02
 # Smaller slopes are none, larger ones are not due to calibration. With 1° two of 17 captures keep theirs; 0.25, 4 or
 # 16° change none.
@@ -35,6 +34,9 @@ _SLOPE = np.deg2rad((0.5, 8.0))
 # RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]: half or twice changes none of
 # 17 captures.
 _UNEVEN = 0.025
+# Least share of the slope that either foot's own stances have: 0.7 and more in 18 captures of level volumes that were
+# calibrated askew, −1.0 in a dance.
+_AGREE = 0.5
 # Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
 # than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
@@ -102,7 +104,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     stands = (np.ptp(points[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
     begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also where the other foot takes over
     stances = int(begins.sum())
-    slopes = _slopes(middle[lower][stands], stances) if stances >= _STEPS else np.zeros(2)
+    slopes = _slopes(middle[lower][stands], lower[1][stands], stances) if stances >= _STEPS else np.zeros(2)
     angle = float(np.arctan(np.linalg.norm(slopes)))
     if not _SLOPE[0] < angle < _SLOPE[1]:
         return root, segments, 0.0
@@ -112,20 +114,30 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     return quaternions.rotated(level, root), quaternions.product(level, segments), angle
 
 
-def _slopes(points: Array, stances: int) -> Array:
-    """Slopes dz/dx, dz/dy of the plane through points of standing soles; 0 in directions without significance."""
-    flat = points[:, :2] - points[:, :2].mean(axis=0)
-    height = points[:, 2] - points[:, 2].mean()
+def _slopes(points: Array, feet: IntArray, stances: int) -> Array:
+    """Slopes dz/dx, dz/dy of parallel planes through points of standing soles; 0 in directions without significance.
+
+    A plane for either foot (0, 1): their soles need not lie at the same height in the file.
+    """
+    centred, both = np.zeros_like(points), np.unique(feet)
+    for foot in both:
+        centred[feet == foot] = points[feet == foot] - points[feet == foot].mean(axis=0)
+    flat, height = centred[:, :2], centred[:, 2]
     _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
     spread = sizes / np.sqrt(len(points))
     told = np.where(spread > _SPREAD, 1.0, 0.0)
     slopes = told * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
     off = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
     # Through few stances a plane fits well whatever its slope: Student's t with the degrees of freedom that are left.
-    free = stances - 1 - int(told.sum())
-    least = float(stdtrit(free, 1.0 - _CHANCE / 2.0)) * off / np.sqrt(free)
+    free = stances - len(both) - int(told.sum())
+    least = float(stdtrit(free, 1.0 - _CHANCE / 2.0)) * off / np.sqrt(free) if free > 0 else np.inf
     sure = np.abs(slopes) * spread > least
-    return np.zeros(2) if off > _UNEVEN else directions.T @ (slopes * sure)
+    found = directions.T @ (slopes * sure)
+    rises = flat @ found
+    agree = all(
+        rises[feet == foot] @ height[feet == foot] >= _AGREE * np.sum(rises[feet == foot] ** 2) for foot in both
+    )
+    return found if off <= _UNEVEN and agree else np.zeros(2)
 
 
 def _floor(heights: Array) -> float:

@@ -324,13 +324,36 @@ def posed(turns, clip):
     return Clip(poses, clip.fps, f"{clip.name} posed")
 
 
+def test_a_foot_that_hangs_in_a_single_pose_is_not_laid_level(motions, tmp_path):
+    """A pose has no stance to compare with: how the toes lie tells a foot that stands from one that hangs."""
+    still = Clip(motions.whole("cheer").poses[:1], 30.0, "pose")
+
+    def down(clip):
+        """How far the left toes point down [°]."""
+        ahead = quaternions.rotated(
+            global_rotations(clip.poses)[0, BODIES.index("left_foot")], np.array([1.0, 0.0, 0.0])
+        )
+        return np.rad2deg(np.arcsin(-ahead[2]))
+
+    for shank, hangs in ((18.0, False), (70.0, True)):
+        pose = posed([("left_thigh", "y", -30.0), ("left_shank", "y", shank), ("left_foot", "y", 0.0)], still)
+        write_rig(Rig(), pose, tmp_path / "r.bvh")
+        loaded = load(tmp_path / "r.bvh", Hints(up="+Y"))
+        assert down(loaded.clip) == pytest.approx(down(pose), abs=6.0)
+        assert any("the left one in no frames" in remark for remark in loaded.report.remarks) == hangs
+
+
 def test_a_body_that_sits_on_a_chair_tells_what_is_up(motions, tmp_path):
     """Its weight is behind its feet; trunk and shanks are as its rig is drawn, and thighs across."""
     bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
             for part, degrees in (("thigh", -85.0), ("shank", 85.0))]  # fmt: skip
     for up in ("+Y", "+Z"):
         write_rig(Rig(up=up, zero="upright T"), posed(bend, motions.whole("cheer")), tmp_path / "r.bvh")
-        assert load(tmp_path / "r.bvh").report.up == up
+        report = load(tmp_path / "r.bvh").report
+        assert report.up == up
+        assert any("what it sits, hangs or leans on is not in the file" in remark for remark in report.remarks)
+    write_rig(Rig(), motions.whole("squat_dance"), tmp_path / "r.bvh")
+    assert not any("what it sits" in remark for remark in load(tmp_path / "r.bvh").report.remarks)
 
 
 @pytest.mark.parametrize(("thigh", "shank", "frames"), [(0, 0, 24), (0, 0, 36), (-40, 60, 24), (-40, 60, 36)])
