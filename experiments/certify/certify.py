@@ -40,6 +40,7 @@ from experiments.setups.certified_law import certified_laws, governor_drag, left
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.defaults import resolved
 from models.humanoid.skeleton import DEFAULT_STATURE
+from models.mocap.library import embedded_names, load
 from models.mocap.motion.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
@@ -153,12 +154,13 @@ def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
     ModelError
         If there is no such clip, or the file cannot be read.
     """
-    (clip,), remarks = load_clips([name], raw=True)
+    (clip,), _ = load_clips([name], raw=True)
     held = _held(out, clip_inputs(clip, judging))
     if held is not None:
         return held
-    scaled = f"lengths, and gravity with them, are scaled to the figure; {remarks[1]}" if remarks else ""
-    found = clip_ballistics(clip, judging, (scaled,) if scaled else ())
+    report = None if name in embedded_names() else load(Path(name)).report
+    assumed = () if report is None else (f"lengths, and gravity with them, are scaled to the figure: {report.scaling}",)
+    found = clip_ballistics(clip, judging, assumed)
     _write(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
     return found.certificate
 

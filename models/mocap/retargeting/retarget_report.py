@@ -73,13 +73,18 @@ class RetargetReport(NamedTuple):
     confidence: float = np.inf
     remarks: tuple[str, ...] = ()
 
+    @property
+    def scaling(self) -> str:
+        """The file's unit, and what becomes of it, in words."""
+        return f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs"
+
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
         how = "the format or you said so" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
         named = ", ".join(self.unused[:_NAMED])
         lines = (
             f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",
-            f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs",
+            self.scaling,
             "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
             "unused: " + (named or "none") + (f", … ({len(self.unused)} joints)" if len(self.unused) > _NAMED else ""),
             *([] if self.missing else ["missing: none"]),

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from controllers.certificates.flight.tolerance import JUDGING
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from experiments.certify import certified_field
@@ -18,6 +19,7 @@ from experiments.certify.certify import (
     PAGE,
     PLOT,
     certified_rivers,
+    certify_clip_into,
     certify_into,
 )
 from experiments.cli import main
@@ -25,6 +27,8 @@ from experiments.config.words import run_config
 from experiments.files import certificate_files
 from experiments.files.certificate_files import read_certificate, verify_certificate
 from experiments.setups.certified_law import left_out
+from models.mocap.library import embedded
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 
@@ -180,3 +184,12 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err
     assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
     assert "expected a certificate.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rig", [Rig(), Rig(leading=1), Rig(without=("head", "neck"), leading=1)])
+def test_flights_of_a_capture_are_judged_whatever_there_is_to_say_of_its_file(rig, tmp_path):
+    write_rig(rig, embedded("walk"), tmp_path / "walker.bvh")
+    certificate = certify_clip_into(str(tmp_path / "walker.bvh"), tmp_path / "out", JUDGING)
+    assumed = certificate.verdicts["ballistic"].assumptions[-1]
+    assert assumed.startswith("lengths, and gravity with them, are scaled to the figure: unit: ")
+    assert "one unit becomes" in assumed
