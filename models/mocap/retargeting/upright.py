@@ -107,32 +107,70 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     scores = {name: _score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
-    zero, trunks = _zero_pose(motion, roles), unit(lines.trunk)
-    if (lying := _lies_along(best, zero, positions[frames] / lines.leg)) is not None:
+    rig = _rig(_zero_pose(motion, roles), lines, ~lost)
+    if (lying := _lies_along(best, rig.zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
-    lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
-    along = min(zero @ AXES[best], trunks[frames].mean(axis=0) @ AXES[best]) > _ALONG
-    confirmed = along and np.median(np.abs(lowest)) < _OVER_ZERO
-    least = _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
-    standing = _standing(lines)
-    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _ALONG), None)
-    turned = [float((part[~lost] @ AXES[drawn]).max(initial=0.0)) for part in (standing, trunks)] if drawn else [0.0]
-    alone = float((standing[frames] @ AXES[best]).mean()) > _STANDING and lead > _ALONE
-    as_drawn = min(turned) > _AS_DRAWN
-    if (alone or (drawn == best and as_drawn and lead > _LEADS)) and np.ptp(lowest) < _VOLUME:
-        least = -np.inf
-    ahead = np.inf if as_drawn else _FAR_AHEAD if max(turned) > _TURNED else _AHEAD
-    if drawn not in (best, None) and lead < ahead:
-        least, second = np.inf, drawn
+    least = _least_score(best, lead, rests, rig, lines, positions, frames)
+    if rig.drawn is not None and _sits(lines, frames, np.array(AXES[rig.drawn])):
+        best, lead, least = rig.drawn, max(lead, _CERTAIN), -np.inf
+    elif rig.contradicts(best, lead):
+        least, second = np.inf, str(rig.drawn)
     if np.isnan(lines.ankles).any():
         least = np.inf  # knees of a squat are no support
-    elif drawn and _sits(lines, frames, np.array(AXES[drawn])):
-        best, lead, least = drawn, max(lead, _CERTAIN), -np.inf
     if lead < _CERTAIN or scores[best] < least:
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
         )
     return Up(np.array(AXES[best], dtype=np.float64), lead)
+
+
+class _Rig(NamedTuple):
+    """How a rig is drawn.
+
+    Attributes
+    ----------
+    zero : array of shape (3,)
+        Direction from the feet to the trunk's upper end with all rotations zero; 0 where there is none.
+    drawn : str or None
+        The axis of +Y and +Z along which that is.
+    turned : float
+        Largest cosine of trunk or body to it in any frame; −1 without such an axis.
+    stands : bool
+        Whether both are along it at times.
+    """
+
+    zero: Array
+    drawn: str | None
+    turned: float
+    stands: bool
+
+    def contradicts(self, best: str, lead: float) -> bool:
+        """Whether the rig is drawn along another axis than the best one, which does not lead by far enough for that."""
+        least = np.inf if self.stands else _FAR_AHEAD if self.turned > _TURNED else _AHEAD
+        return self.drawn not in (best, None) and lead < least
+
+
+def _rig(zero: Array, lines: BodyLines, kept: Mask) -> _Rig:
+    """How the rig is drawn, and how the body turns towards that in the frames that are kept."""
+    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _ALONG), None)
+    if drawn is None or not kept.any():
+        return _Rig(zero, drawn, -1.0, False)
+    most = [float((part[kept] @ AXES[drawn]).max()) for part in (_standing(lines), unit(lines.trunk))]
+    return _Rig(zero, drawn, max(most), min(most) > _AS_DRAWN)
+
+
+def _least_score(
+    best: str, lead: float, rests: bool, rig: _Rig, lines: BodyLines, positions: Array, frames: IntArray
+) -> float:
+    """Score that the best axis needs; −inf if it stands out by its lead alone."""
+    lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
+    alone = float((_standing(lines)[frames] @ AXES[best]).mean()) > _STANDING and lead > _ALONE
+    as_drawn = rig.drawn == best and rig.stands and lead > _LEADS
+    if (alone or as_drawn) and np.ptp(lowest) < _VOLUME:
+        return -np.inf
+    along = min(rig.zero @ AXES[best], unit(lines.trunk)[frames].mean(axis=0) @ AXES[best]) > _ALONG
+    confirmed = along and np.median(np.abs(lowest)) < _OVER_ZERO
+    return _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
 
 
 def _sits(lines: BodyLines, frames: IntArray, up: Array) -> bool:
