@@ -154,13 +154,13 @@ def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
     ModelError
         If there is no such clip, or the file cannot be read.
     """
-    (clip,), _ = load_clips([name], raw=True)
+    (clip,), notes = load_clips([name], raw=True)
     held = _held(out, clip_inputs(clip, judging))
     if held is not None:
         return held
     report = None if name in embedded_names() else load(Path(name)).report
-    assumed = () if report is None else (f"lengths, and gravity with them, are scaled to the figure: {report.scaling}",)
-    found = clip_ballistics(clip, judging, assumed)
+    scaled = () if report is None else (f"lengths, and gravity with them, are scaled to the figure: {report.scaling}",)
+    found = clip_ballistics(clip, judging, (*scaled, *notes))
     _write(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
     return found.certificate
 

@@ -14,6 +14,7 @@ from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
 
 _ADDED = {"way back": "the way back", "open": "coming to rest at both ends"}
+_NAMED = 3  # flights whose reasons are in the line for the terminal
 _MOST = 0.5  # share of the file's own motion below which it is told
 _CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
 
@@ -68,7 +69,10 @@ class PreparedFile(NamedTuple):
 
 def summary(outcome: PreparedFile) -> str:
     """One line for the terminal."""
-    made, faults = outcome.made, outcome.faults()
+    made, flights = outcome.made, outcome.flights
+    if len(flights) > _NAMED + 1:
+        flights = (*flights[:_NAMED], f"{len(flights) - _NAMED} more flights are refuted, as the report lists")
+    faults = outcome._replace(flights=flights).faults()
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; "
         f"contact lacks {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "

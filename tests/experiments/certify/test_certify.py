@@ -190,6 +190,10 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
 def test_flights_of_a_capture_are_judged_whatever_there_is_to_say_of_its_file(rig, tmp_path):
     write_rig(rig, embedded("walk"), tmp_path / "walker.bvh")
     certificate = certify_clip_into(str(tmp_path / "walker.bvh"), tmp_path / "out", JUDGING)
-    assumed = certificate.verdicts["ballistic"].assumptions[-1]
-    assert assumed.startswith("lengths, and gravity with them, are scaled to the figure: unit: ")
-    assert "one unit becomes" in assumed
+    assumed = certificate.verdicts["ballistic"].assumptions
+    (scaled,) = (
+        line for line in assumed if line.startswith("lengths, and gravity with them, are scaled to the figure:")
+    )
+    assert "one unit becomes" in scaled
+    cut = "walker.bvh: left out: the first frame, a pose that is not of the motion"
+    assert (cut in assumed) == (rig.leading == 1)

@@ -119,6 +119,10 @@ def test_a_loaded_capture_is_prepared_as_on_the_way_into_a_run(
 def test_a_prepared_file_is_its_clip_its_measures_and_a_line(capture: Path, tmp_path: Path) -> None:
     made = hvf.prepare(capture, tmp_path / "ready.bvh")
     assert "well-formed" in str(made)
+    many = made._replace(flights=tuple(f"flight {k}" for k in range(7)))
+    assert "flight 2; 4 more flights are refuted, as the report lists" in str(many)
+    assert "flight 3" not in str(many)
+    assert set(many.flights) <= set(many.faults())
     np.testing.assert_allclose(hvf.load(tmp_path / "ready.bvh").poses, made.clip.poses, atol=1e-5)
     with pytest.raises(hvf.ModelError, match="exists"):
         hvf.prepare(capture, tmp_path / "ready.bvh")
