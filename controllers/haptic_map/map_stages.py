@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numba import njit, types
 
-from controllers.errors import ControllerError
+from controllers.errors import ControllerError, ParameterError
 from controllers.kernel_call import announce, kernel_call
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
@@ -28,7 +28,15 @@ _registered: list[Kernel] = []  # of this process, in the order in which classes
 
 
 def register(kernel: Kernel) -> None:
-    """Make a kernel, an ``njit`` function, one that a map may be made of; `HapticMap` does so for every class."""
+    """Make a kernel, an ``njit`` function, one that a map may be made of; `HapticMap` does so for every class.
+
+    Raises
+    ------
+    ParameterError
+        If it is not compiled by numba.
+    """
+    if not hasattr(kernel, "py_func"):
+        raise ParameterError(f"the kernel of a map is {kernel!r}; expected a function compiled by numba's njit")
     if kernel not in _registered:
         announce(kernel, MAP_ARGUMENTS)
         _registered.append(kernel)

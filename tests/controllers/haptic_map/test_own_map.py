@@ -138,6 +138,11 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
         wrong.check()
 
 
+def test_a_kernel_in_plain_python_is_refused_where_its_class_is_made() -> None:
+    with pytest.raises(ParameterError, match="expected a function compiled by numba's njit"):
+        type("Plain", (KernelMap,), {"map_kernel": staticmethod(lambda params, x, memory, pose, jacobian: None)})
+
+
 def test_a_compiled_map_of_one_s_own_needs_no_entry_in_the_library() -> None:
     rate = RATE  # a kernel of one process, which reads a number of this function
 
