@@ -97,11 +97,10 @@ def evaluate_map_jacobian(
     stages: IntArray, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
 ) -> None:
     """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
+    first = 0
     for n in range(stages.shape[0]):
         if stages[n, _ADDRESS] == 0:
             raise ControllerError("a kernel of this haptic map is not compiled; its stages are not linked")
-    first = 0
-    for n in range(stages.shape[0]):
         end = stages[n, _END]
         _call(stages[n, _ADDRESS], (params[first:end], x, memory, pose, jacobian))
         first = end
