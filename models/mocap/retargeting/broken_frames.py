@@ -66,9 +66,7 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
     broken = np.zeros(motion.n_frames, dtype=bool)
     if motion.n_frames < FEWEST:
         return Repaired(motion, (), (), False)
-    used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
-    pelvis = ancestry(roles.segments["pelvis"], motion.parents)
-    thigh = float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
+    used = used_joints(motion, roles)
     longest = max(1, int(_LONGEST * motion.fps))
     lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
     edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _TURN))
@@ -77,29 +75,37 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
         broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
     motion = _interpolated(motion, broken)
 
-    def tracked() -> tuple[_Track, ...]:
-        root = motion.translations[:, pelvis].sum(axis=1, keepdims=True)
-        return (_Track(motion.rotations[:, used], _TURN, _angles, _turned_off),
-                _Track(root, _WAY * thigh, _ways, _moved_off))  # fmt: skip
-
     # Shorter gaps first: between two of them, the frames that are right would look like a gap.
     tracks: tuple[_Track, ...] = ()
     for length in range(1, longest + 1):
-        tracks = tracks or tracked()
+        tracks = tracks or _tracks(motion, roles)
         found = np.concatenate([track.gaps(length) for track in tracks])
         for k in found:
             broken[k + 1 : k + 1 + length] = True
         if len(found):
             motion, tracks = _interpolated(motion, broken), ()
-    shortened = rest != motion.n_frames - 1 and any(track.ends_off() for track in tracks or tracked())
+    shortened = rest != motion.n_frames - 1 and any(track.ends_off() for track in tracks or _tracks(motion, roles))
     if shortened:
         motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
     steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
     left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
     lost = motion.at_rest(used)
     left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
-    left |= _cuts(motion.translations[:, pelvis].sum(axis=1), _WAY * thigh)
+    left |= _cuts(_root(motion, roles)[:, 0], _WAY * _thigh(motion, roles))
     return Repaired(motion, _indices(broken), _indices(left), shortened)
+
+
+def begins_off(motion: SourceMotion, roles: Roles) -> bool:
+    """Whether a joint or the root leaves the first frame by a step that is large beside its usual ones and the next.
+
+    Of some 220 captures of other people such a step is in those alone that have a calibration pose in front.
+    """
+    return motion.n_frames >= FEWEST and any(track.begins_off() for track in _tracks(motion, roles))
+
+
+def used_joints(motion: SourceMotion, roles: Roles) -> list[int]:
+    """Joints that segments of the figure follow, and those above them."""
+    return sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
 
 
 class _Track:
@@ -124,8 +130,14 @@ class _Track:
 
     def ends_off(self) -> bool:
         """Whether the last step is large beside the usual ones and the one before it, which a fast start is not."""
-        least = np.maximum(np.maximum(self.limits, self.least), _TIMES * self.steps[-2])
-        return bool(np.any(self.steps[-1] > least))
+        return self._is_off(self.steps[::-1])
+
+    def begins_off(self) -> bool:
+        """Whether the first step is so beside the usual ones and the next."""
+        return self._is_off(self.steps)
+
+    def _is_off(self, steps: Array) -> bool:
+        return bool(np.any(steps[0] > np.maximum(np.maximum(self.limits, self.least), _TIMES * steps[1])))
 
     def gaps(self, length: int) -> npt.NDArray[np.intp]:
         """Frames before the gaps of a length."""
@@ -139,6 +151,21 @@ class _Track:
         first = np.flatnonzero(odd.any(axis=1))
         across = self.apart(values[first], values[first + length + 1])
         return first[(odd[first] & (across < _BACK * lesser[first])).any(axis=1)]
+
+
+def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:
+    """Rotations of the joints, and places of the root."""
+    rotations = motion.rotations[:, used_joints(motion, roles)]
+    return (_Track(rotations, _TURN, _angles, _turned_off),
+            _Track(_root(motion, roles), _WAY * _thigh(motion, roles), _ways, _moved_off))  # fmt: skip
+
+
+def _root(motion: SourceMotion, roles: Roles) -> Array:
+    return motion.translations[:, ancestry(roles.segments["pelvis"], motion.parents)].sum(axis=1, keepdims=True)
+
+
+def _thigh(motion: SourceMotion, roles: Roles) -> float:
+    return float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
 
 
 def _limits(measures: Array, own: int) -> Array:

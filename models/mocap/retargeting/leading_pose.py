@@ -8,7 +8,8 @@ Between the pose and the motion is one step, v₀, that the motion does not go o
 - a body with straight legs and straight arms at least 30° off the trunk, alike on both sides, as T- and A-poses are,
   whose step is no part of the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
-  interpolation has spread the one step.
+  interpolation has spread the one step;
+- a first step by which a broken frame is told at the end, too (`broken_frames.begins_off`).
 
 The jump is sought in the first quarter of a motion. Where a pose is held without any change, as no living body stands,
 it is sought where that ends, however late; such a pose is told by its zero rotations or its straight limbs alone.
@@ -23,7 +24,7 @@ from models.arrays import Array, Mask
 from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
-from models.mocap.retargeting.broken_frames import FEWEST
+from models.mocap.retargeting.broken_frames import FEWEST, begins_off, used_joints
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 # Half or twice of each of these numbers finds no such pose in 17 captures, none of which has one.
@@ -45,7 +46,7 @@ _OFF, _AHEAD = np.sin(np.deg2rad([30.0, 25.0]))
 
 def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     """Number of frames in front of a motion that are a calibration pose."""
-    used = sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
+    used = used_joints(motion, roles)
     rotations = motion.rotations[:, used]
     turns = quaternions.logarithm(quaternions.product(quaternions.conjugate(rotations[:-1]), rotations[1:]))
     if motion.n_frames < 4:
@@ -56,7 +57,8 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     begun, ended = _spread(_size(turns), round(_BLENDED * motion.fps))
     soon = ended <= _SHARE * motion.n_frames or _stands(_size(turns)) == begun
     told = soon and (at_rest[: begun + 1].all() or _calibrating(lines))
-    return max(jumped, ended) if told else jumped
+    led = max(jumped, ended) if told else jumped
+    return led or int(begins_off(motion, roles))
 
 
 def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:

@@ -192,7 +192,8 @@ def walked(tmp_path):
 
     def loaded(rows):
         text = "\n".join(" ".join(map(str, row)) for row in rows)
-        (tmp_path / "b.bvh").write_text(f"{head}Frame Time: {seconds}\n{text}\n")
+        counted = re.sub(r"Frames: \d+", f"Frames: {len(rows)}", head)
+        (tmp_path / "b.bvh").write_text(f"{counted}Frame Time: {seconds}\n{text}\n")
         return load(tmp_path / "b.bvh")
 
     return table, loaded
@@ -234,6 +235,16 @@ def test_a_last_frame_that_jumps_away_is_left_out(walked, columns):
         "the last frame did not belong to the motion before it: left out"
     ]
     assert not any("last frame" in line for line in loaded(table).report.remarks)
+
+
+@pytest.mark.parametrize("columns", [slice(30, 33), slice(0, 3), slice(0, None)], ids=["joint", "root", "all"])
+def test_a_first_frame_that_jumps_away_is_left_out(walked, columns):
+    table, loaded = walked
+    popped = table.copy()
+    popped[0, columns] += 120.0
+    clip, report, _ = loaded(popped)
+    assert clip.n_frames == len(table) - 1 and report.dropped == 1
+    assert largest_angle(clip, loaded(table[1:]).clip) < 1.0
 
 
 def test_a_root_that_is_elsewhere_for_a_frame_is_interpolated(walked):
