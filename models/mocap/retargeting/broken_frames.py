@@ -33,6 +33,14 @@ FEWEST = 10  # least number of frames that define usual steps
 _BESIDE = 3  # frames on either side of a gap through which it is interpolated
 
 
+class JointJump(NamedTuple):
+    """A joint, by its index, that turns by an angle [rad] in the step after a frame, and not in the steps beside."""
+
+    frame: int
+    joint: int
+    angle: float
+
+
 class Repaired(NamedTuple):
     """A motion without its short gaps.
 
@@ -47,12 +55,15 @@ class Repaired(NamedTuple):
         a cut between two takes.
     shortened : bool
         Whether the last frame is left out.
+    joints : tuple of JointJump
+        Single joints that jump for good while the rest of the body does not, as with markers that are exchanged.
     """
 
     motion: SourceMotion
     frames: tuple[int, ...]
     jumps: tuple[int, ...]
     shortened: bool
+    joints: tuple[JointJump, ...]
 
 
 def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
@@ -65,7 +76,7 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
     """
     broken = np.zeros(motion.n_frames, dtype=bool)
     if motion.n_frames < FEWEST:
-        return Repaired(motion, (), (), False)
+        return Repaired(motion, (), (), False, ())
     used = used_joints(motion, roles)
     longest = max(1, int(_LONGEST * motion.fps))
     lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
@@ -91,8 +102,11 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
     left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
     lost = motion.at_rest(used)
     left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
-    left |= _cuts(_root(motion, roles)[:, 0], _WAY * _thigh(motion, roles))
-    return Repaired(motion, _indices(broken), _indices(left), shortened)
+    root = _root(motion, roles)[:, 0]
+    left |= _cuts(_ways(root[:-1], root[1:]), _WAY * _thigh(motion, roles))
+    single = np.argwhere(_cuts(steps, _TURN) & ~left[:, None])
+    joints = tuple(JointJump(int(k), used[i], float(steps[k, i])) for k, i in single)
+    return Repaired(motion, _indices(broken), _indices(left), shortened, joints)
 
 
 def begins_off(motion: SourceMotion, roles: Roles) -> bool:
@@ -173,11 +187,11 @@ def _limits(measures: Array, own: int) -> Array:
     return _TIMES * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
 
 
-def _cuts(root: Array, least: float) -> npt.NDArray[np.bool_]:
-    """Steps of the root that are large beside its usual ones and beside both that are next to them, shape (n − 1,)."""
-    ways = _ways(root[:-1], root[1:])
-    beside = np.maximum(np.append(0.0, ways[:-1]), np.append(ways[1:], 0.0))
-    return (ways > least) & (ways > _limits(ways, 2)) & (ways > _TIMES * beside)
+def _cuts(steps: Array, least: float) -> npt.NDArray[np.bool_]:
+    """Which steps (n − 1, …) are large beside the usual ones and beside both that are next to them."""
+    still = np.zeros_like(steps[:1])
+    beside = np.maximum(np.concatenate((still, steps[:-1])), np.concatenate((steps[1:], still)))
+    return (steps > least) & (steps > _limits(steps, 2)) & (steps > _TIMES * beside)
 
 
 def _indices(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:

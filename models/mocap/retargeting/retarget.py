@@ -33,6 +33,7 @@ from models.mocap.retargeting.retarget_report import (
     calibration_remarks,
     endless_limb_remarks,
     frame_remarks,
+    joint_jump_remarks,
     unit_name,
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
@@ -75,7 +76,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     """
     rest = hints.rest_frame
     _check_channels(motion, rest)
-    motion, broken, jumps, shortened = repaired(motion, roles, rest)
+    motion, broken, jumps, shortened, odd = repaired(motion, roles, rest)
     frames = _frames(motion, roles, rest)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
@@ -104,6 +105,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
+        *joint_jump_remarks([jump for jump in odd if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *([_SITS.format(round(100.0 * sits))] if sits else ()),
         *([_PROPPED.format(propped)] if propped else ()),

@@ -10,7 +10,9 @@ from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import printable
+from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import SIDES, BodyLines
+from models.mocap.retargeting.broken_frames import JointJump
 from models.mocap.retargeting.calibration import Calibration
 from models.mocap.retargeting.skeleton_roles import Roles
 
@@ -156,6 +158,18 @@ def frame_remarks(
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
+
+
+def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iterator[str]:
+    """Single joints that turn on for good within a frame: the largest jumps, by the file's names."""
+    if jumps:
+        largest = sorted(sorted(jumps, key=lambda jump: -jump.angle)[:4])
+        which = ", ".join(
+            f"{motion.joints[joint]} by {np.rad2deg(angle):.0f}° at {k / motion.fps:.2f} s"
+            for k, joint, angle in largest
+        )
+        others = f" and {len(jumps) - len(largest)} more" if len(jumps) > len(largest) else ""
+        yield f"joints jump within a frame, the others do not: {which}{others}; see whether the file has it so"
 
 
 def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:

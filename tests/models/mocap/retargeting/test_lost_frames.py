@@ -139,7 +139,7 @@ def test_a_motion_that_begins_anywhere_keeps_its_frames(name, tmp_path):
         for first in range(0, motion.n_frames - 12 * every, max(1, motion.n_frames // 12)):
             part = reduced(motion, slice(first, None, every))
             assert leading(part, roles) == 0, (every, first)
-            assert repaired(part, roles)[1:] == ((), (), False), (every, first)
+            assert repaired(part, roles)[1:] == ((), (), False, ()), (every, first)
 
 
 @pytest.mark.parametrize("name", embedded_names())
@@ -243,7 +243,7 @@ def test_a_first_frame_that_jumps_away_is_left_out(walked, columns):
     popped = table.copy()
     popped[0, columns] += 120.0
     clip, report, _ = loaded(popped)
-    assert clip.n_frames == len(table) - 1 and report.dropped == 1
+    assert (clip.n_frames, report.dropped) == (len(table) - 1, 1)
     assert largest_angle(clip, loaded(table[1:]).clip) < 1.0
 
 
@@ -268,6 +268,16 @@ def test_a_cut_between_two_takes_is_said(walked):
     cut[20:, [0, 2]] += np.abs(table[:, 1]).max()
     assert not any("jumps" in line for line in loaded(table).report.remarks)
     assert any("the whole body jumps in a frame at 0.63 s:" in line for line in loaded(cut).report.remarks)
+
+
+def test_a_joint_that_turns_for_good_within_a_frame_is_said(walked):
+    table, loaded = walked
+    exchanged = table.copy()
+    exchanged[20:, 30] += 80.0
+    said = [line for line in loaded(exchanged).report.remarks if "jump within a frame" in line]
+    assert len(said) == 1
+    assert re.match(r"joints jump within a frame, the others do not: \w+ by 80° at 0.63 s;", said[0])
+    assert not any("jump within" in line for line in loaded(table).report.remarks)
 
 
 def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
