@@ -72,7 +72,7 @@ def _circle(
 
 
 def _tilted_circle(config: RunConfig, part: RobotArm, timed: _Timed) -> dict[str, Trajectory]:
-    from experiments.setups.robot_arm import tilted
+    from experiments.setups.maps.robot_arm import tilted
 
     return {"": timed(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
 

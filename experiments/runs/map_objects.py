@@ -17,20 +17,16 @@ from experiments.config.maps import MapFile
 from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
-from experiments.setups.figure_maps import (
-    CORNERS,
-    PARTS,
-    Place,
-    check_clips,
-    composite_parts,
-    cylindrical_parts,
-    for_size_of,
-    lifted_parts,
-    reached,
-)
+from experiments.setups.maps.about_circle import check_clips
+from experiments.setups.maps.composite import PARTS, composite_parts
+from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
+from experiments.setups.maps.map_file import lifted_parts
+from experiments.setups.maps.of_stature import for_size_of
+from experiments.setups.maps.place import Place
+from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
+from experiments.setups.parts.pace import reached
 from experiments.setups.parts.part_types import ClipMapParts
-from experiments.setups.robot_arm import arm_parts
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.world.world import World

@@ -28,13 +28,11 @@ from experiments.console.estimates import check_length
 from experiments.runs.map_objects import BodyMap, RobotArm
 from experiments.runs.run_result import Run, check_record
 from experiments.runs.short_text import short_text
-from experiments.setups.figure_maps import (
-    own_parts,
-    reached,
-)
+from experiments.setups.maps.own_map import own_parts
 from experiments.setups.parts.budget import SPAN, fastest, tank_for
 from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import TRACED, intent_of, participant
+from experiments.setups.parts.pace import reached
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import assemble, check_rates, check_seconds

@@ -7,7 +7,12 @@ import mujoco
 
 from experiments.config.maps import Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
-from experiments.setups.figure_maps import MAP_SETUPS, for_size_of
+from experiments.setups.maps.composite import composite_setup
+from experiments.setups.maps.cylindrical import cylindrical_setup
+from experiments.setups.maps.map_file import map_file_setup
+from experiments.setups.maps.of_stature import for_size_of
+from experiments.setups.maps.river_clips import river_clips_setup
+from experiments.setups.maps.robot_arm import robot_arm_parts
 from experiments.setups.modes.bunny import bunny_parts
 from experiments.setups.modes.follow import follow_parts
 from experiments.setups.modes.lead import lead_parts
@@ -15,8 +20,7 @@ from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.led_figure import led_clips, led_parts
-from experiments.setups.parts.part_types import MapParts, Parts
-from experiments.setups.robot_arm import robot_arm_parts
+from experiments.setups.parts.part_types import ClipMapParts, MapParts, Parts
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
@@ -28,6 +32,14 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
     "lead": lead_parts,
 }
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
+
+MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
+    "cylindrical": cylindrical_setup,
+    "composite": composite_setup,
+    "rivers": river_clips_setup,
+    "file": map_file_setup,
+}
+"""By kind of map of the figure: the function that makes the map's parts from configuration, map, clips and figure."""
 
 
 def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:

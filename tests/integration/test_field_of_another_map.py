@@ -5,7 +5,7 @@ import pytest
 
 import hvf
 from controllers.fields.soft_wall import SoftWall
-from experiments.setups.robot_arm import robot_arm_map
+from experiments.setups.maps.robot_arm import robot_arm_map
 from models.robot_arm.spec import arm_model
 
 

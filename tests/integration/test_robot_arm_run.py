@@ -14,8 +14,8 @@ from experiments.cli import main
 from experiments.config.run_config import load_config
 from experiments.config.words import run_config
 from experiments.results.pages.report_of import write_report_of
+from experiments.setups.maps.robot_arm import HOME
 from experiments.setups.parts.defaults import resolved
-from experiments.setups.robot_arm import HOME
 from experiments.setups.wiring import wire
 from models.world.scene import PEDESTAL
 from sim.body.robot import RobotState

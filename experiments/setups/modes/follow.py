@@ -22,3 +22,8 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     springs = ((mode.stiffness, mode.tube),)
     field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
     return fixed_curve_parts(config, mode, maps, field)
+
+
+def flows_parallel(config: RunConfig) -> bool:
+    """Whether the field keeps the pace of a hand that is pushed off its curve."""
+    return isinstance(config.mode, Follow) and config.mode.flow == "parallel"

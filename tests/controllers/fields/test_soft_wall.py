@@ -10,7 +10,7 @@ from controllers.fields.algebra.program import evaluate
 from controllers.fields.soft_wall import SoftWall, _is_clear, wall_slope  # pyright: ignore[reportPrivateUsage]
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
-from experiments.setups.robot_arm import robot_arm_map
+from experiments.setups.maps.robot_arm import robot_arm_map
 from models.robot_arm.spec import arm_limits, arm_model
 from sim.compilation.kernel_units import linked_stages
 

@@ -20,8 +20,8 @@ from controllers.haptic_map.expressive import express
 from controllers.haptic_map.map_stages import MAP_ARGUMENTS, evaluate_map, kernels_of
 from controllers.haptic_map.robot_arm import robot_arm_map
 from controllers.state import HandState
+from experiments.setups.maps.robot_arm import robot_arm_map as default_arm_map
 from experiments.setups.parts.expression import expressive_figure
-from experiments.setups.robot_arm import robot_arm_map as default_arm_map
 from models.mocap.library import embedded
 from models.robot_arm.spec import arm_model
 from sim.compilation import kernel_units

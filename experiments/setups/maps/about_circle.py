@@ -1,0 +1,62 @@
+"""Maps of clips about a circle: the motions that they take, their pace in a lap, and the parts of a run."""
+
+from collections.abc import Sequence
+from functools import cache, partial
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.animation import AnimationMap
+from controllers.motion.strides import in_step
+from controllers.state import Array
+from experiments.fitting.blendable import closed_loops, grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.setups.maps.place import Place
+from experiments.setups.modes.rivers import default_choice
+from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.pace import course_of
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import Clip
+
+
+def about_circle(
+    place: Place, made: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None
+) -> ClipMapParts:  # fmt: skip
+    """Map parts of a map of clips about a circle.
+
+    `timing` is the clip whose pace an advised lap keeps, by default the first that does not fly (`grounded`).
+    """
+    curve, reach = place.curve, place.reach
+    played = [clips[i % len(clips)] for i in range(len(made.loops))]
+    off = off_pace(played, made.loops, curve.duration, made.laps, grounded(clips) if timing is None else timing)
+    return ClipMapParts(
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
+        rivers=lambda mode: default_choice(mode, curve, reach),
+        river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
+        course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
+        held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off),
+    )  # fmt: skip
+
+
+def check_clips(clips: Sequence[Clip], most: int, name: str) -> None:
+    """Refuse more clips than a map takes, or none.
+
+    Raises
+    ------
+    ParameterError
+        The map, and how many it takes.
+    """
+    if not 1 <= len(clips) <= most:
+        raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; expected so many --clips")
+
+
+def motions_of(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:
+    """Poses and frame rates of as many motions as a map takes; if there are fewer clips, they are repeated."""
+    check_clips(clips, most, name)
+    return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
+
+
+def out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
+    """Whether a lap [s] with all clips in step would play some of them too far from their own pace.
+
+    `count` is the number of clips that the map takes; if there are fewer, they are repeated.
+    """
+    played = [clips[i % len(clips)] for i in range(count)]
+    return not same(clips) and not keeps_pace(played, in_step(closed_loops(played), lap), lap)

@@ -1,0 +1,53 @@
+"""Set-up of the composite map: the lower body of one clip, an upper body blended between two more."""
+
+from dataclasses import replace
+
+import mujoco
+
+from controllers.haptic_map.composite import Composite as CompositeMap
+from experiments.config.maps import Composite
+from experiments.config.run_config import RunConfig
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.leg_choice import carried
+from experiments.fitting.similarity import arms, carries_alike, upper_joints
+from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
+from experiments.setups.maps.place import Place, place_of
+from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import Clip
+
+PARTS = 3  # number of clips
+
+
+def composite_setup(
+    config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel
+) -> ClipMapParts:
+    """Map parts of a configured composite map; see `composite_parts`."""
+    return composite_parts(clips, place_of(part), figure, flows_parallel(config))
+
+
+def composite_parts(
+    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+) -> ClipMapParts:
+    """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
+
+    `parallel` is as for a cylinder.
+
+    Raises
+    ------
+    ControllerError
+        If there are none, or more than three, or they do not fit together.
+    """
+    lower, red, blue = motions_of(clips, PARTS, "composite")
+    legs, radii = figure_legs(figure), place.radii()
+    lap = place.curve.duration
+    apart = out_of_step(clips, 3, lap)
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
+
+    def refined() -> tuple[CompositeMap, tuple[str, ...]]:
+        if carries_alike(made, lap):
+            return made, ()
+        only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
+        return carried(lambda _: only, [clips[0].name], lap, parallel)
+
+    return replace(about_circle(place, made, clips, timing=0), refined=refined)

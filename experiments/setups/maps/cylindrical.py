@@ -1,0 +1,87 @@
+"""Set-up of the cylindrical map: four clips at the corners of a hollow cylinder's cross-section."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from controllers.blending.clip_arrays import clip_arrays
+from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
+from controllers.haptic_map.cylindrical import correction_shape
+from controllers.legs.limbs import Limb
+from controllers.state import Array
+from experiments.config.maps import Cylindrical
+from experiments.config.run_config import RunConfig
+from experiments.files.array_cache import kept_array
+from experiments.fitting.balance import balanced
+from experiments.fitting.blendable import grounded, keep_own_pace, same
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.leg_choice import carried, unbearable
+from experiments.fitting.similarity import arms, moves_alike
+from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
+from experiments.setups.maps.place import Place, place_of
+from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import CLOSES, Clip
+from sim.compilation.sources import kept_folder
+
+CORNERS = 4  # number of clips
+
+
+def cylindrical_setup(
+    config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel
+) -> ClipMapParts:
+    """Map parts of a configured cylindrical map; see `cylindrical_parts`."""
+    return cylindrical_parts(clips, place_of(part), figure, flows_parallel(config))
+
+
+def cylindrical_parts(
+    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+) -> ClipMapParts:
+    """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
+
+    `parallel` says whether the field keeps the pace of a hand that is pushed off its curve.
+
+    Raises
+    ------
+    ControllerError
+        If there are none, or more than four, or they do not fit together.
+    """
+    motions, reach = motions_of(clips, CORNERS, "cylindrical"), place.reach
+    radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
+
+    def with_legs_of(owner: int) -> CylindricalMap:
+        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
+
+    def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
+        return carried(with_legs_of, [clip.name for clip in clips], lap, parallel)
+
+    if out_of_step(clips, len(motions), lap):
+        return replace(about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
+    made = _cylinder(motions, radii, (-reach, reach), legs, lap)
+
+    def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
+        if same(clips):
+            alone = balanced(made, figure, lap)
+            # An open clip is played there and back. Backwards it needs the same forces, but is followed less well.
+            as_prepared = clips[0].closes(CLOSES) and keep_own_pace(clips[:1], made.loops[:1], lap)
+            return alone, () if as_prepared else unbearable(alone, clips[0].name, lap, parallel)
+        return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else carrying()
+
+    return replace(about_circle(place, made, clips), refined=refined)
+
+
+def _cylinder(
+    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...],
+    lap: float,
+) -> CylindricalMap:  # fmt: skip
+    """The map of four clips; its corrections are cached beside the compiled code."""
+
+    def find() -> Array:
+        return CylindricalMap(clips, radii, heights, legs, None, lap).corrections
+
+    # The corrections do not depend on the radii and heights between which the clips blend.
+    made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
+    folder = kept_folder(CylindricalMap.__module__)
+    corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    return CylindricalMap(clips, radii, heights, legs, corrections, lap)

@@ -1,0 +1,88 @@
+"""Set-up of maps from files, lifted ones among them."""
+
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+
+import mujoco
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.lifted import Lifted
+from experiments.config.maps import Circle, MapFile
+from experiments.config.modes import Rivers
+from experiments.config.run_config import RunConfig
+from experiments.files.map_files import load_figure_map, map_digest
+from experiments.fitting.blendable import not_blendable
+from experiments.fitting.push_trials import followed_map
+from experiments.fitting.similarity import arms
+from experiments.fitting.transition_places import carried_over
+from experiments.setups.maps.about_circle import about_circle
+from experiments.setups.maps.place import place_of
+from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.modes.lifted_runs import (
+    HELD_GAINS,
+    best_transition,
+    curve_number,
+    default_pushes,
+    lifted_choice,
+    lifted_curve,
+)
+from experiments.setups.parts.pace import course_of
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import Clip
+
+LIFTED_CARRY = 0.3  # factor on the default hand's distances on a lifted map, whose curves are near each other
+
+
+def map_file_setup(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    """Map parts of a map that a file holds.
+
+    Raises
+    ------
+    ControllerError, ModelError, SimError
+        If the file cannot be read, or a lap, a radius or a curve is given to a map that has none.
+    """
+    path = Path(part.file)
+    made, clips = load_figure_map(path)
+    if isinstance(made, Lifted):
+        if part.around != Circle():
+            raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
+        parts = lifted_parts(made, clips, part)
+        pushed = config.user.does == "push" and config.figure.kind == "physical"
+        if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
+            parts = replace(parts, refined=partial(carried_over, made, best_transition(made, part.curve)))
+        elif pushed and not isinstance(config.mode, Rivers):
+            number = curve_number(made, part.curve)
+            followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), flows_parallel(config))
+            parts = replace(parts, refined=followed)
+    elif part.curve:
+        raise ParameterError("only a lifted map has curves by name; leave out --curve, or name a lifted map")
+    else:
+        parts = about_circle(place_of(part), made, clips)
+    remark = f"the clips are those of the map: {', '.join(made.names)}"
+    return replace(parts.with_remarks((remark,)), static={"map_sha256": map_digest(path)})
+
+
+def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:
+    """Map parts of a lifted map, beginning on one of its curves.
+
+    Raises
+    ------
+    ParameterError
+        If the map has no curve of that name.
+    SimError
+        If the Phantom does not reach it.
+    """
+    curve = lifted_curve(made, part.curve)
+    ends = (
+        f"the clip is open: the hand, and with it the figure, is held at its curve's end after {curve.duration:.1f} s"
+    )
+    between = not_blendable(clips)
+    return ClipMapParts(
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=curve.duration, reach=part.reach,
+        rivers=lambda mode: lifted_choice(made, mode),
+        river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
+        course=cache(partial(course_of, curve)),
+        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
+        remarks=between if curve.periodic else (ends, *between),
+    )  # fmt: skip

@@ -1,0 +1,39 @@
+"""Set-up of a user-defined map, about a curve and without clips."""
+
+from typing import Any, cast
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import HapticMap
+from experiments.config.maps import Circle
+from experiments.setups.parts.pace import reached
+from experiments.setups.parts.part_types import ClipMapParts
+from models.humanoid.skeleton import N_POSE
+
+_COMPARED = 5  # places of a lap at which a user-defined derivative is compared: few symmetries of a map have all five
+
+
+def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
+    """Map parts of a user-defined map about a curve, without clips.
+
+    Raises
+    ------
+    ParameterError
+        If its poses are not poses of the figure, or its derivative is not that of its poses.
+    """
+    if haptic_map.nq != N_POSE:
+        name = type(haptic_map).__name__
+        raise ParameterError(f"poses of {name} have {haptic_map.nq} numbers; the figure's have {N_POSE}")
+
+    haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _COMPARED, endpoint=False)))
+
+    def none(*_: object) -> Any:
+        raise ParameterError("a map of one's own has no rivers; expected another field")
+
+    return ClipMapParts(
+        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=reached(curve), reach=Circle().radius, rivers=none,
+        river_pushes=none, course=lambda damping, stiffness: curve,
+    )  # fmt: skip

@@ -1,0 +1,75 @@
+"""Set-up of the rivers' map: a clip on each river, in rounds of one or more laps of the hand."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
+from controllers.motion.strides import in_step
+from experiments.config.maps import RiverClips
+from experiments.config.modes import Rivers
+from experiments.config.run_config import RunConfig
+from experiments.fitting.blendable import closed_loops, furthest_off, keep_own_pace, same
+from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.rest_phases import with_rests
+from experiments.fitting.river_changes import with_changes
+from experiments.fitting.river_tour import not_followed
+from experiments.setups.maps.about_circle import about_circle, motions_of
+from experiments.setups.maps.place import place_of
+from experiments.setups.modes.rivers import river_bundle
+from experiments.setups.parts.part_types import ClipMapParts
+from models.mocap.motion.clip import Clip
+
+_MOST_LAPS = 4  # in a round: with more, a hand waits long for a change, and there are many changes to compute
+
+
+def river_clips_setup(
+    config: RunConfig, part: RiverClips, clips: tuple[Clip, ...], figure: mujoco.MjModel
+) -> ClipMapParts:
+    """Map parts of clips on rivers; fewer than three clips are repeated.
+
+    Raises
+    ------
+    ControllerError
+        If the mode has no river for each clip, or the clips do not fit together.
+    """
+    mode = config.mode
+    if not isinstance(mode, Rivers) or mode.crossing == "sum":
+        raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
+    motions, place = motions_of(clips, 3, part.kind), place_of(part)
+    curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
+    laps, apart = _round(clips, 3, place.curve.duration)
+    made = RiverClipsMap(
+        curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
+    )  # fmt: skip
+    parts, names = about_circle(place, made, clips), [clips[i % len(clips)].name for i in range(3)]
+
+    def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
+        ready = with_rests(made, figure)
+        if config.figure.kind != "physical" or same(clips):
+            return ready, ()
+        changing = with_changes(ready, config.figure.blend, figure)
+        return changing, not_followed(changing, names, config.figure, figure)
+
+    told = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
+    return replace(parts.with_remarks((told,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
+
+
+def _round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
+    """Laps in a round of clips on `count` rivers, and whether strides are apart: the fewest laps that keep their pace.
+
+    If none do, the laps in which the clip furthest from its own pace is nearest to it.
+    """
+    if same(clips):
+        return 1, False
+    played, best = [clips[i % len(clips)] for i in range(count)], (np.inf, 1, True)
+    loops = closed_loops(played)
+    for laps in range(1, _MOST_LAPS + 1):
+        for apart in (False, True):
+            fitted = in_step(loops, laps * lap, apart)
+            if keep_own_pace(played, fitted, laps * lap):
+                return laps, apart
+            best = min(best, (furthest_off(fitted, laps * lap), laps, apart))
+    return best[1:]
