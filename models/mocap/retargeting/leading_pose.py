@@ -37,7 +37,7 @@ _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns 
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it goes on.
 _BLENDED, _FASTER = 0.1, 1.5
-_HELD = 0.1  # largest step while the pose is held, as a share of the jump
+_HELD = 0.1  # farthest that a pose which is held is from that before the jump, as a share of the jump
 # Of a calibration pose: bend of its limbs, difference of its sides, least angle of its arms to the trunk's line and
 # largest to the trunk's plane.
 _STRAIGHT, _ALIKE = np.cos(np.deg2rad([20.0, 12.0]))
@@ -48,20 +48,20 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     """Number of frames in front of a motion that are a calibration pose."""
     used = used_joints(motion, roles)
     rotations = motion.rotations[:, used]
-    turns = quaternions.logarithm(quaternions.product(quaternions.conjugate(rotations[:-1]), rotations[1:]))
     if motion.n_frames < 4:
         return 0
+    turns = _turns(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    jumped = _jumped(turns, at_rest, lines)
-    begun, ended = _spread(_size(turns), round(_BLENDED * motion.fps))
+    jumped = _jumped(rotations, turns, at_rest, lines)
+    begun, ended = _spread(rotations, _size(turns), round(_BLENDED * motion.fps))
     soon = ended <= _SHARE * motion.n_frames or _stands(_size(turns)) == begun
     told = soon and (at_rest[: begun + 1].all() or _calibrating(lines))
     led = max(jumped, ended) if told else jumped
     return led or int(begins_off(motion, roles))
 
 
-def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:
+def _jumped(rotations: Array, turns: Array, at_rest: Mask, lines: BodyLines) -> int:
     """Number of frames before a jump from a calibration pose; 0 if there is none."""
     n = len(turns) + 1
     steps = _size(turns)
@@ -73,10 +73,10 @@ def _jumped(turns: Array, at_rest: Mask, lines: BodyLines) -> int:
         jump = int(np.argmax(early))
         usual = float(np.quantile(np.delete(steps, jump), 0.99))
         # The pose is held still; if there is motion before the jump, the jump is a fault of the capture.
-        if _held(steps, jump) and steps[jump] >= _TIMES * usual:
+        if _held(rotations, jump, steps[jump]) and steps[jump] >= _TIMES * usual:
             return jump + 1
     jump = int(np.argmax(early >= _TURN))
-    if not _held(steps, jump) or jump + 1 >= n - 1:
+    if not _held(rotations, jump, steps[jump]) or jump + 1 >= n - 1:
         return 0
     leaves = float(_size(turns[jump] - turns[jump + 1]))
     as_zero = at_rest[: jump + 1].all() and not at_rest[jump + 1] and leaves > steps[jump + 1]
@@ -89,7 +89,7 @@ def _stands(steps: Array) -> int:
     return int(np.argmax(np.append(steps > _STILL, True)))
 
 
-def _spread(steps: Array, longest: int) -> tuple[int, int]:
+def _spread(rotations: Array, steps: Array, longest: int) -> tuple[int, int]:
     """From and to which step a pose is left by steps that are all larger than the motion's; 0 and 0 if none are."""
     if longest < 2 or len(steps) < max(FEWEST, 4 * longest):
         return 0, 0
@@ -99,7 +99,7 @@ def _spread(steps: Array, longest: int) -> tuple[int, int]:
     ended = begun + int(np.argmin(np.append(large[begun:], False)))
     burst = steps[begun:ended]
     told = len(burst) <= longest and burst.sum() > 3.0 * _TURN
-    return (begun, ended) if told and steps[:begun].max(initial=0.0) < _HELD * burst.max() else (0, 0)
+    return (begun, ended) if told and _held(rotations, begun, burst.max()) else (0, 0)
 
 
 def _size(turns: Array) -> Array:
@@ -107,8 +107,14 @@ def _size(turns: Array) -> Array:
     return np.sqrt((turns**2).sum(axis=-1).mean(axis=-1))
 
 
-def _held(steps: Array, jump: int) -> bool:
-    return bool(steps[:jump].max(initial=0.0) < _HELD * steps[jump])
+def _turns(ours: Array, theirs: Array) -> Array:
+    """Rotation vectors from rotations to others."""
+    return quaternions.logarithm(quaternions.product(quaternions.conjugate(ours), theirs))
+
+
+def _held(rotations: Array, last: int, jump: float) -> bool:
+    """Whether the pose until a frame, after which it jumps, is held: slow motion is not, however small its steps."""
+    return bool(_size(_turns(rotations[:last], rotations[last])).max(initial=0.0) < _HELD * jump)
 
 
 def _calibrating(lines: BodyLines) -> bool:
