@@ -166,7 +166,15 @@ def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
 
 
 def _held(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
-    """The certificate in a folder, if its page is there and it has these inputs; else None."""
+    """The certificate in a folder, if its page is there and it has these inputs; else None.
+
+    Raises
+    ------
+    SimError
+        If the folder holds a page of that name that is no certificate's.
+    """
+    if (out / PAGE).exists() and not (out / CERTIFICATE).exists():
+        raise SimError(f"{out / PAGE}: is there already, without a certificate; choose another --out, or move it")
     if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
         return None
     try:

@@ -79,6 +79,14 @@ class Outcome:
         """All attributes by name, as plain data."""
         return {**asdict(self), "link": self.link._asdict()}
 
+    def _under_force(self, name: str) -> list[str]:
+        return [
+            f"{name}: {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from the curve, at most "
+            f"{self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
+            f"The twin predicted a tick within {1e3 * self.apart:.3f} mm RMS; the hand pushed with at most "
+            f"{self.hand_force:.2f} N.",
+        ]
+
     def lines(self) -> list[str]:
         """The outcome in words, faults and failures first."""
         wrong = [f"The device let go: {self.fault}."] if self.fault else []
@@ -87,12 +95,10 @@ class Outcome:
         wrong += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
         wrong += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
         micro = [" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness)]
+        name = f"{self.device} ({self.transport})"
         return [
             *wrong,
-            f"{self.device} ({self.transport}): {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from "
-            f"the curve, at most {self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
-            f"The twin predicted a tick within {1e3 * self.apart:.3f} mm RMS; the hand pushed with at most "
-            f"{self.hand_force:.2f} N.",
+            *(self._under_force(name) if self.active > 0.0 else [f"{name}: it was never under force."]),
             f"{self.ticks} ticks, {self.missed} deadlines missed; p50 / p99 / p99.9: computing {micro[0]} µs, late by "
             f"{micro[1]} µs.",
             f"The device answered: {'; '.join(self.link.lines())}.",

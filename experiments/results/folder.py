@@ -23,6 +23,7 @@ from sim.world.world import BodyKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
+_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE)
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
@@ -36,9 +37,13 @@ def check_folder(out: Path, overwrite: bool) -> None:
 
 
 def check_holds(out: Path, overwrite: bool) -> None:
-    """Refuse a folder that holds a run, unless it may be replaced."""
-    if (out / RECORDING).exists() and not overwrite:
+    """Refuse a folder that holds a run, or other files of the names that a run writes, unless they may be replaced."""
+    if overwrite:
+        return
+    if (out / RECORDING).exists():
         raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
+    if taken := [name for name in (*_FILES, FIGURES) if (out / name).exists()]:
+        raise SimError(f"{out}: holds {', '.join(taken)}, not of a run; choose another --out, or --overwrite them")
 
 
 @contextmanager
@@ -68,9 +73,10 @@ def claimed(out: Path) -> Generator[None]:
 def clear_folder(out: Path) -> None:
     """Create the folder, and remove the files of an earlier run from it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE):
+    if (out / RECORDING).exists():
+        shutil.rmtree(out / FIGURES, ignore_errors=True)
+    for name in _FILES:
         (out / name).unlink(missing_ok=True)
-    shutil.rmtree(out / FIGURES, ignore_errors=True)
 
 
 def config_of(recording: Recording) -> RunConfig:

@@ -185,6 +185,12 @@ class Simulation:
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
             raise ParameterError(SIMULATED_TOO)
+        period = self.clock.servo_period
+        if self.tank is not None and not np.isclose(self.tank.period, period, rtol=1e-9, atol=0.0):
+            raise ParameterError(
+                f"tank has a period of {self.tank.period:g} s, by which it is refilled at each tick; expected that of "
+                f"the clock, {period:g} s"
+            )
 
     def __repr__(self) -> str:
         return short_text(self)

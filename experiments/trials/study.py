@@ -16,7 +16,7 @@ from experiments.config.part import to_json
 from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
-from experiments.trials.analysis.tidy import table, write_table
+from experiments.trials.analysis.tidy import TABLE_CSV, TABLE_PARQUET, table, write_table
 from experiments.trials.design.code_hash import code_hash
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import Trial, planned
@@ -149,6 +149,7 @@ class Study:
         measures, trials = self._measures(), self.trials
         if self.config.recordings:
             check_place(self.config.recordings)
+        _check_folder(folder)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             warm((trial.config for trial in trials), SHELF, console)
             with executor(where) as runs:
@@ -204,6 +205,14 @@ class Study:
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
         return {trial.meeting.number: kept_stability(trial.config).used for trial in _one_each(trials)}
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder without this study that holds files of the names that a study writes."""
+    names = (REPORT, SUMMARY, TABLE_PARQUET, TABLE_CSV)
+    taken = [] if (folder / DATABASE).exists() else [name for name in names if (folder / name).exists()]
+    if taken:
+        raise StudyError(f"{folder}: holds {', '.join(taken)}, not of a study; choose another --out")
 
 
 def _one_each(trials: Sequence[Trial]) -> list[Trial]:

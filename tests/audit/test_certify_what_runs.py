@@ -123,6 +123,18 @@ def test_a_program_is_looked_at_as_it_runs():
     assert shaking.radius >= exact - 1e-3
 
 
+def test_a_law_of_time_is_looked_at_in_the_first_lap():
+    """And not at the times of the curve that is slowed down for the plant: there this law is as stiff as a wall."""
+
+    @hvf.law
+    def later(hand, k=0.01):
+        return 0.0, 0.0, -k * hand.t
+
+    seen = looked_at((Follow(CIRCLE, 300.0, 8.0, 0.25) + later).program(), river(), 0.02, [HandImpedance()], n=4)
+    assert seen.radius < 1.0
+    assert seen.strongest < 10.0
+
+
 @pytest.mark.slow
 def test_the_command_refutes_the_run_that_shakes(tmp_path):
     field = ["--clips", "backflip", "--governor", "--governor-drag", "200"]

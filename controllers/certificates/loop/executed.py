@@ -80,16 +80,16 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
     return wrench[:3].copy()
 
 
-def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v: Array) -> Differenced:
-    """The linear loop of `river` with the program's derivatives at hands p, v (n, 3); use it with k_r = 1, b_d = 0.
+def differenced(linear: LinearLoop, program: Program, river: River, states: States) -> Differenced:
+    """The linear loop of `river` with the program's derivatives at n hands; use it with k_r = 1, b_d = 0.
 
-    `linear` has the plant at the same phases; p and v need not be on the curve. Where the force has no derivative,
-    that is zero.
+    `linear` has the plant at the same phases, of a curve that may be slowed down; hands need not be on the curve. Their
+    time is their phase, as in the first lap. Where the force has no derivative, that is zero.
     """
     by_theta, by_omega = np.zeros((2, *linear.weight_theta.shape)), np.zeros((2, *linear.weight_theta.shape))
-    smooth = np.ones(len(p), dtype=np.bool_)
+    smooth = np.ones(len(states.p), dtype=np.bool_)
     numbers = river.device.numbers
-    for i, (place, velocity, phase) in enumerate(zip(p, v, linear.phases, strict=True)):
+    for i, (place, velocity, phase) in enumerate(zip(states.p, states.v, states.phases, strict=True)):
         theta = np.array(river.device.angles(place))
         memory = program.fresh_memory()
         # One evaluation, so that the memory contains the phase.
@@ -157,7 +157,7 @@ def _worst(program: Program, river: River, states: Sequence[States], hands: Sequ
     for phases, asked, v in states:
         reached = np.array([_reaches(river, place) for place in asked])
         p = np.where(reached[:, None], asked, river.curve.point(phases))
-        law, smooth = differenced(plants[0][1], program, river, p, v)
+        law, smooth = differenced(plants[0][1], program, river, States(phases, p, v))
         fresh = program.fresh_memory()
         sizes = np.linalg.norm(
             [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)], axis=1

@@ -110,22 +110,24 @@ def trace_summary(recording: Recording) -> TraceSummary:
     ticks, force = recording.groups["ticks"], 0.0
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         force = max(force, float(np.linalg.norm(ticks["user"][first : first + BLOCK_ROWS], axis=1).max()))
-    return TraceSummary(_deviation_mm(recording, SETTLING), force)
+    away = _deviation(recording, SETTLING)
+    return TraceSummary(1e3 * away.root if away.count else None, force)
 
 
 def _replay_summary(recording: Recording) -> ReplaySummary | None:
     if "replayed" not in recording.texts:
         return None
-    return ReplaySummary(recording.texts["replayed"], _deviation_mm(recording, 0.0), recording.text("distance_from"))
+    away = _deviation(recording, 0.0)
+    return ReplaySummary(recording.texts["replayed"], 1e3 * away.root, recording.text("distance_from"))
 
 
-def _deviation_mm(recording: Recording, since: float) -> float:
-    """Distance of the stylus from the curve from the time `since` [s] on, RMS [mm]."""
+def _deviation(recording: Recording, since: float) -> MeanSquare:
+    """Distance of the stylus from the curve from the time `since` [s] on [m]."""
     ticks, distance = recording.groups["ticks"], MeanSquare()
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         rows = slice(first, first + BLOCK_ROWS)
         distance.add(ticks["distance"][rows][ticks["t"][rows] >= since])
-    return 1e3 * distance.root
+    return distance
 
 
 class PathMeasure:
@@ -208,8 +210,8 @@ class PathMeasure:
         stopped = self._moved if self._time - self._moved >= SETTLING else None
         moving = (seconds if stopped is None else stopped - self._first) or math.inf
         pace = None if math.isnan(clip) or not self._along else laps * clip / moving
-        alone = 1e3 * self._alone.root if self._alone.count else None
-        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes), stopped, pace)
+        alone, most = (1e3 * self._alone.root, 1e3 * self._alone.largest) if self._alone.count else (None, None)
+        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace)
 
 
 def _joined(before: PushSummary, after: PushSummary) -> PushSummary:

@@ -41,9 +41,9 @@ class PathSummary:
 
     Attributes
     ----------
-    deviation_rms_mm, deviation_max_mm : float
+    deviation_rms_mm, deviation_max_mm : float or None
         Distance from the curve after the first second, without the times in which the hand exerts a force and the
-        second after them; the RMS is None if nothing is left.
+        second after them; None if nothing is left, as of a hand that traces, or in a run of a second.
     laps : float
         Phase travelled over the duration of the curve: laps, if the curve is closed.
     lap_seconds : float or None
@@ -59,7 +59,7 @@ class PathSummary:
     """
 
     deviation_rms_mm: float | None
-    deviation_max_mm: float
+    deviation_max_mm: float | None
     laps: float
     lap_seconds: float | None
     pushes: tuple[PushSummary, ...]
@@ -111,21 +111,19 @@ class TraceSummary:
 
     Attributes
     ----------
-    deviation_rms_mm : float
-        Distance of the stylus from the curve after the first second.
+    deviation_rms_mm : float or None
+        Distance of the stylus from the curve after the first second; None in a shorter run.
     peak_force : float
         Largest force of the hand [N].
     """
 
-    deviation_rms_mm: float
+    deviation_rms_mm: float | None
     peak_force: float
 
     def line(self) -> str:
         """Summary in a sentence."""
-        return (
-            f"The hand traced the curve by itself, within {self.deviation_rms_mm:.2f} mm RMS and with up to "
-            f"{self.peak_force:.1f} N."
-        )
+        away = "" if self.deviation_rms_mm is None else f"within {self.deviation_rms_mm:.2f} mm RMS and "
+        return f"The hand traced the curve by itself, {away}with up to {self.peak_force:.1f} N."
 
 
 @dataclass(frozen=True)

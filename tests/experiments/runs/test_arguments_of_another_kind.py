@@ -129,3 +129,13 @@ def test_a_curve_beyond_the_phantom_s_reach_is_refused_as_on_the_command_line(
             replace(SIM, field=field).session(1.0)
     with pytest.raises(hvf.SimError, match=f"^{re.escape(said)}$"):
         replace(SIM, user=hvf.User(traces=far)).session(1.0)
+
+
+def test_a_tank_of_another_period_than_the_clock_is_refused():
+    """It would be refilled at each tick for the time of its own: with twice the power at half the period."""
+    tank = hvf.EnergyTank(1e-3, power=0.5, capacity=1.0)
+    curve = hvf.circle(0.0477, 4.0)
+    parts = {"field": hvf.Follow(curve, 300.0, 8.0), "haptic_map": hvf.Cylindrical(hvf.clips("walk"), around=curve)}
+    hvf.Simulation(**parts, tank=tank)
+    with pytest.raises(hvf.ParameterError, match=r"tank has a period of 0.001 s.*expected that of the clock, 0.0005 s"):
+        hvf.Simulation(**parts, tank=tank, clock=hvf.Clock(servo_period=5e-4))

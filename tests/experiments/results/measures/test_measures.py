@@ -143,6 +143,7 @@ def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     assert [len(path.pushes) for path in paths] == [0, 1, 1]
     assert paths[1].pushes[0].start == pytest.approx(2.0, abs=0.01)
     assert [path.deviation_rms_mm for path in paths] == [pytest.approx(0.2), None, pytest.approx(0.2)]
+    assert paths[1].deviation_max_mm is None
     assert [animation.unpushed_deg for _, animation, _, _ in parts] == [0.0, 0.0, 0.0]
     flights = [figure.flight_seconds for _, _, figure, _ in parts]
     assert flights == pytest.approx([0.2, 0.0, 0.0])
@@ -167,6 +168,8 @@ def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
     assert trace.peak_force == pytest.approx(3.0)
     lines = replace(summary, trace=trace).lines()
     assert any(line.startswith("The hand traced the curve by itself, within ") for line in lines)
+    brief = replace(trace, deviation_rms_mm=None)
+    assert brief.line() == "The hand traced the curve by itself, with up to 3.0 N."
     assert not any("push" in line.lower() for line in lines)
 
 
