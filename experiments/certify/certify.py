@@ -42,6 +42,7 @@ from experiments.setups.parts.defaults import resolved
 from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.library import embedded_names, load
 from models.mocap.motion.clip import Clip
+from sim.errors import SimError
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
 _MOMENT = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"

@@ -220,13 +220,13 @@ def _own_trunk(has_arms: bool) -> Array:
 def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
     """Align the figure's trunk and shoulder lines with the source's, whose spine has joints in other places.
 
-    Abdomen, chest, head and clavicles turn together by some degrees; then the clavicles turn, if the source has them.
-    Changes `segments`.
+    Abdomen, chest and clavicles turn together by some degrees, more where the spine bends; then the clavicles turn, if
+    the source has them. The head looks where the source's does. Changes `segments`.
     """
     model = figure_model()
     abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
     sides = [BODIES.index(f"{side}_clavicle") for side in SIDES]
-    carried = [BODIES.index(body) for body in ("abdomen", "chest", "head")] + sides
+    carried = [BODIES.index(body) for body in ("abdomen", "chest")] + sides
     for _ in range(_ROUNDS):
         ends = [
             quaternions.rotated(segments[:, 2], model.body(BODIES[clavicle]).pos)

@@ -81,8 +81,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
+    check_stature(motion, lines)
     up = up_axis(motion, roles, lines, frames.positions[:, body], hints.up)
-    check_stature(motion, lines, up.axis)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, frames.positions)
     calibrated = _calibrated(motion, roles, frames, up.axis, rest)

@@ -32,6 +32,6 @@ def test_a_folder_of_figures_goes_with_its_run_alone(tmp_path: Path) -> None:
 def test_a_study_does_not_go_into_a_folder_with_other_results(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text("mine")
     study = hvf.Study.load("examples/studies/quick.toml")
-    with pytest.raises(SimError, match="holds summary.json, not of a study"):
+    with pytest.raises(SimError, match=r"holds summary\.json, not of a study"):
         study.run(tmp_path)
     assert not (tmp_path / "study.sqlite").exists()
