@@ -28,6 +28,7 @@ _TIMES = 5.5
 _TURN = np.deg2rad(15.0)  # least jump of a joint [rad]
 _WAY = 0.25  # least jump of the root [thigh lengths]
 _BACK = 0.3  # largest step across a gap, as a share of the lesser jump
+_CAME = 0.2  # least step before a turning point of the motion, as a share of the next: 0.3 to 0.9 in two captures
 _JOINTS = 0.25  # least share of the joints that jump at once where the whole pose does
 FEWEST = 10  # least number of frames that define usual steps
 _BESIDE = 3  # frames on either side of a gap through which it is interpolated
@@ -164,7 +165,17 @@ class _Track:
         odd &= lesser > self.least
         first = np.flatnonzero(odd.any(axis=1))
         across = self.apart(values[first], values[first + length + 1])
-        return first[(odd[first] & (across < _BACK * lesser[first])).any(axis=1)]
+        gap = odd[first] & (across < _BACK * lesser[first]) & ~self._returns(first, first + length + 1, lesser[first])
+        return first[gap.any(axis=1)]
+
+    def _returns(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], lesser: Array) -> Array:
+        """Whether the motion goes back from `last` by the way it came to `first`, as when it is played there and back.
+
+        The step before is no small part of the jump then, and what is two steps apart agrees, too.
+        """
+        before, after = np.maximum(first - 1, 0), np.minimum(last + 1, len(self.values) - 1)
+        came = self.steps[before]
+        return (came > _CAME * lesser) & (self.apart(self.values[before], self.values[after]) < _BACK * came)
 
 
 def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:

@@ -247,6 +247,15 @@ def test_a_first_frame_that_jumps_away_is_left_out(walked, columns):
     assert largest_angle(clip, loaded(table[1:]).clip) < 1.0
 
 
+def test_the_turning_point_of_a_motion_there_and_back_is_no_broken_frame(walked):
+    """However fast it is: the frames beside it are the same, but the motion comes and goes."""
+    table, loaded = walked
+    there = table[:9].copy()
+    there[:, 30] += np.array([0.0, 0.0, 0.0, 2.0, 4.0, 8.0, 12.0, 26.0, 58.0])
+    both = np.vstack((there, there[-2::-1]))
+    assert not any("did not belong" in line for line in loaded(both).report.remarks)
+
+
 def test_a_root_that_is_elsewhere_for_a_frame_is_interpolated(walked):
     table, loaded = walked
     popped = table.copy()
