@@ -28,7 +28,9 @@ _TIMES = 5.5
 _TURN = np.deg2rad(15.0)  # least jump of a joint [rad]
 _WAY = 0.25  # least jump of the root [thigh lengths]
 _BACK = 0.3  # largest step across a gap, as a share of the lesser jump
-_CAME = 0.2  # least step before a turning point of the motion, as a share of the next: 0.3 to 0.9 in two captures
+# Least step before a turning point of a motion there and back, as a share of the next, 0.31 to 0.9 in two captures, and
+# largest distance between before and after, as a share of it.
+_CAME, _ALIKE = 0.3, 0.1
 _JOINTS = 0.25  # least share of the joints that jump at once where the whole pose does
 FEWEST = 10  # least number of frames that define usual steps
 _BESIDE = 3  # frames on either side of a gap through which it is interpolated
@@ -173,9 +175,11 @@ class _Track:
 
         The step before is no small part of the jump then, and what is two steps apart agrees, too.
         """
-        before, after = np.maximum(first - 1, 0), np.minimum(last + 1, len(self.values) - 1)
+        within = (first > 0) & (last < len(self.values) - 1)
+        before, after = np.where(within, first - 1, 0), np.where(within, last + 1, 0)
         came = self.steps[before]
-        return (came > _CAME * lesser) & (self.apart(self.values[before], self.values[after]) < _BACK * came)
+        same = self.apart(self.values[before], self.values[after]) < _ALIKE * came
+        return within[:, None] & (came > _CAME * lesser) & same
 
 
 def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:
