@@ -173,13 +173,13 @@ class _Track:
     def _returns(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], lesser: Array) -> Array:
         """Whether the motion goes back from `last` by the way it came to `first`, as when it is played there and back.
 
-        The step before is no small part of the jump then, and what is two steps apart agrees, too.
+        The step before is no small part of the jump then, but as usual, and what is two steps apart agrees, too.
         """
         within = (first > 0) & (last < len(self.values) - 1)
         before, after = np.where(within, first - 1, 0), np.where(within, last + 1, 0)
         came = self.steps[before]
         same = self.apart(self.values[before], self.values[after]) < _ALIKE * came
-        return within[:, None] & (came > _CAME * lesser) & same
+        return within[:, None] & (came > _CAME * lesser) & (came <= self.limits) & same
 
 
 def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:
