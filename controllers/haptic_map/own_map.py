@@ -59,19 +59,23 @@ class Asked:
     """
 
     def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array], start: Pose):
-        self.error: Exception | None = None
+        self.error: BaseException | None = None
         self._last = start
 
-        def ask(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
-            try:
-                if self.error is None:
-                    place = np.ctypeslib.as_array(x, (7,)).copy()
-                    self._last = checked_pose(pose(place), nq)
-                    if rows:
-                        np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(jacobian(place), rows)
-            except Exception as error:  # no exception may leave a C callback
-                self.error = error
+        def answer(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
+            if self.error is None:
+                place = np.ctypeslib.as_array(x, (7,)).copy()
+                self._last = checked_pose(pose(place), nq)
+                if rows:
+                    np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(jacobian(place), rows)
             np.ctypeslib.as_array(target, (nq,))[:] = self._last
+
+        def ask(*given: Any) -> None:
+            try:
+                answer(*given)
+            except BaseException as error:  # nothing may leave a C callback, Ctrl-C neither: it would be ignored
+                self.error = error
+                answer(*given)
 
         self._callback = _CALLBACK(ask)
         address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0

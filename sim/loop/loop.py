@@ -1,8 +1,11 @@
 """A run: compiled blocks of servo ticks one after the other, streamed to a recorder in constant memory."""
 
+import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,10 +154,7 @@ class Loop:
             if self._ask is not None:
                 n = min(n, self._ask_ticks - self._tick % self._ask_ticks)
                 self._asked()
-            if self._laws or self._before_tick is not None:
-                self._run_with_laws(n, ticks, frames)
-            else:
-                run_block(self.servo, self._tick, n, False, ticks, frames)
+            self._run_block(n, ticks, frames)
             self._tick += n
             self._observe(ticks, frames, n)
             progress(self.time)
@@ -166,16 +166,20 @@ class Loop:
             self._one = make_logs(self.servo, 1)
         ticks, frames = self._one
         self._asked()
-        if self._laws or self._before_tick is not None:
-            self._run_with_laws(1, ticks, frames)
-        else:
-            run_block(self.servo, self._tick, 1, False, ticks, frames)
+        self._run_block(1, ticks, frames)
         self._tick += 1
         return ticks, frames
 
     def _asked(self) -> None:
         if self._ask is not None and self._tick % self._ask_ticks == 0:
             self._ask(self.time)
+
+    def _run_block(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
+        with _raising_lost_interrupts():
+            if self._laws or self._before_tick is not None:
+                self._run_with_laws(n, ticks, frames)
+            else:
+                run_block(self.servo, self._tick, n, False, ticks, frames)
 
     def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
         servo, every = self.servo, self.servo.figure_ticks
@@ -190,3 +194,30 @@ class Loop:
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
             run_block(servo, tick, 1, False, tick_rows, frame_rows)
+
+
+@contextmanager
+def _raising_lost_interrupts() -> Generator[None]:
+    """Raise, at the end of the block, a KeyboardInterrupt that left a C callback of the tick, as a map in Python has.
+
+    One that came while compiled code ran is raised where the callback begins, before it can catch anything; ctypes
+    then ignores it, and tells `sys.unraisablehook`.
+    """
+    if threading.current_thread() is not threading.main_thread():  # others get no signals
+        yield
+        return
+    before, lost = sys.unraisablehook, list[BaseException]()
+
+    def noted(told: Any) -> None:
+        if isinstance(told.exc_value, KeyboardInterrupt):
+            lost.append(told.exc_value)
+        else:
+            before(told)
+
+    sys.unraisablehook = noted
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+    if lost:
+        raise lost[0]

@@ -138,6 +138,22 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
         wrong.check()
 
 
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
+def test_ctrl_c_within_a_map_is_kept_like_an_error_and_the_pose_is_written(kind: type[BaseException]) -> None:
+    class Interrupted(Turned):
+        def pose(self, x):
+            if x[0] > 0.05:
+                raise kind
+            return super().pose(x)
+
+    made = Interrupted()
+    before, _ = kernel_of(made, X, 0)
+    after, _ = kernel_of(made, X + np.array([0.02, 0, 0, 0, 0, 0, 0]), 0)
+    np.testing.assert_array_equal(after, before)
+    with pytest.raises(kind):
+        made.check()
+
+
 def test_a_kernel_in_plain_python_is_refused_where_its_class_is_made() -> None:
     with pytest.raises(ParameterError, match="expected a function compiled by numba's njit"):
         type("Plain", (KernelMap,), {"map_kernel": staticmethod(lambda params, x, memory, pose, jacobian: None)})

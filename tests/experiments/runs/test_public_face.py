@@ -166,6 +166,19 @@ def test_a_map_that_fails_in_a_tick_says_so_itself_and_leaves_no_folder(monkeypa
     assert not list(tmp_path.iterdir())
 
 
+def test_ctrl_c_ends_a_run_with_a_map_in_python() -> None:
+    class Interrupted(hvf.HapticMap):
+        def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+            if x[1] > 1e-3:
+                raise KeyboardInterrupt
+            return hvf.rest_pose()
+
+    field = hvf.Follow(CURVE, k_r=300, b_d=8)
+    sim = hvf.Simulation(field=field, haptic_map=Interrupted(), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(KeyboardInterrupt):
+        sim.run(0.5)
+
+
 class Unlike(hvf.HapticMap):
     """A map with a derivative of another shape."""
 

@@ -1,5 +1,8 @@
 """The compiled tick: what the sensors tell, what the motors do, and that a run is a pure function of its inputs."""
 
+import ctypes
+import sys
+
 import numpy as np
 import pytest
 
@@ -23,7 +26,7 @@ from sim.users.hand.arm import Arm
 from sim.world.encoders import PEAK_TORQUE
 from sim.world.phantom_port import actuate, phantom_port, sense, sense_in_motion, true_motion
 from sim.world.world import World, phantom_angles
-from tests.sim.bare_servos import Stepped
+from tests.sim.bare_servos import Stepped, bare_servo, device_world, simulated
 
 CLIPS = ("cheer", "angry")
 CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
@@ -168,3 +171,19 @@ def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
 def test_a_point_the_phantom_cannot_reach_is_refused_with_the_numbers(p: list[float]) -> None:
     with pytest.raises(SimError, match=rf"{p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}"):
         phantom_angles(np.array(p))
+
+
+def test_ctrl_c_that_a_callback_of_the_tick_could_not_catch_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    def block(*_: object) -> None:
+        ctypes.CFUNCTYPE(None)(interrupted)()  # which ctypes ignores
+
+    world, before = device_world(), sys.unraisablehook
+    loop = Loop(bare_servo(world, simulated(world)), world)
+    monkeypatch.setattr("sim.loop.loop.run_block", block)
+    for go_on in (lambda: loop.run(0.1), loop.step):
+        with pytest.raises(KeyboardInterrupt):
+            go_on()
+    assert sys.unraisablehook is before
