@@ -51,6 +51,14 @@ class HapticMap(ABC):
         super().__init_subclass__()
         register(cls.map_kernel)
 
+    def __getstate__(self) -> object:
+        """What is copied and pickled: all but the callback, which asks this very object."""
+        state = super().__getstate__()
+        plain, *slots = state if isinstance(state, tuple) else (state,)
+        if isinstance(plain, dict):
+            plain = {name: value for name, value in plain.items() if name != "_asked"}
+        return (plain, *slots) if slots else plain
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks on the map that are printed before a run."""
@@ -80,9 +88,10 @@ class HapticMap(ABC):
         """
         asked = self._asked
         if asked is None:
-            start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
-            asked = Asked(self.pose, self.jacobian, checked_pose(start, start.size))
+            asked = Asked(lambda x: self.pose(x), lambda x: self.jacobian(x))  # those of now, if a class is repaired
             object.__setattr__(self, "_asked", asked)  # kept alive, since the tick has only its address
+        start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
+        asked.begin(checked_pose(start, start.size))
         return CompiledMap.of(self.map_kernel, asked.params, np.zeros(1))
 
     def check(self) -> None:

@@ -48,19 +48,17 @@ def own_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
 
 
 class Asked:
-    """C callback of a map for the tick; after a first error, which is kept, the pose stays at its last value.
+    """C callback of a map for the tick; after a first error in a run, which is kept, the pose stays at its last value.
 
     Parameters
     ----------
     pose, jacobian : callable
         From a stylus pose (7,) to a configuration (nq,), and to the derivative (nv, 6).
-    start : Pose
-        The configuration before the first call.
     """
 
-    def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array], start: Pose):
+    def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array]):
         self.error: BaseException | None = None
-        self._last = start
+        self._last = np.zeros(0)
 
         def answer(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
             if self.error is None:
@@ -80,6 +78,10 @@ class Asked:
         self._callback = _CALLBACK(ask)
         address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
         self.params: Array = np.array([address], dtype=np.int64).view(np.float64)
+
+    def begin(self, start: Pose) -> None:
+        """Forget the error of the run before; the configuration is `start` before the first call."""
+        self.error, self._last = None, start
 
 
 def checked_pose(pose: Any, nq: int) -> Pose:

@@ -1,5 +1,7 @@
 """A map of one's own says a pose: its size, its derivative and its kernel follow from that."""
 
+import copy
+import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -30,6 +32,15 @@ def kernel_of(haptic_map: HapticMap, x: np.ndarray, rows: int) -> tuple[np.ndarr
     (kernel,) = kernels_of(stages)
     kernel(params, x, memory, pose, jacobian)
     return pose, jacobian
+
+
+def asked_in_a_run(haptic_map: HapticMap, *points: np.ndarray) -> list[np.ndarray]:
+    """Poses that the tick gets at points of one run."""
+    stages, params, memory, _ = haptic_map.compiled()
+    poses = [np.empty(11) for _ in points]
+    for x, pose in zip(points, poses, strict=True):
+        kernels_of(stages)[0](params, x, memory, pose, np.empty((0, 6)))
+    return poses
 
 
 def test_sizes_and_derivative_follow_from_the_pose() -> None:
@@ -126,9 +137,7 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
             return super().pose(x) if x[0] > 0.03 else super().pose(x)[: 11 if x[0] > -0.03 else 10]
 
     made = Fails()
-    before, _ = kernel_of(made, X, 0)
-    made.check()
-    after, _ = kernel_of(made, X + np.array([0.02, 0, 0, 0, 0, 0, 0]), 0)
+    before, after = asked_in_a_run(made, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
     np.testing.assert_array_equal(after, before)
     with pytest.raises(ZeroDivisionError, match="beyond"):
         made.check()
@@ -136,6 +145,46 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
     kernel_of(wrong, np.array([-0.04, 0, 0, 1.0, 0, 0, 0]), 0)
     with pytest.raises(ParameterError, match=r"gave a pose of shape \(10,\); expected 11 finite numbers"):
         wrong.check()
+
+
+class Scaled(Turned):
+    """Moved along x by a number that may be changed; a large one is an error away from the origin."""
+
+    gain = 1.0
+
+    def pose(self, x):
+        if self.gain > 1e6 and x[0] > 0.0:
+            raise ZeroDivisionError
+        return super().pose(x) + np.eye(11)[0] * self.gain
+
+
+class Slotted(Scaled):
+    __slots__ = ("note",)
+
+
+@pytest.mark.parametrize("kind", [Scaled, Slotted])
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda made: pickle.loads(pickle.dumps(made))])
+def test_a_copy_of_a_map_that_ran_is_asked_itself(copied: Callable[[HapticMap], HapticMap], kind) -> None:
+    made = kind()
+    if kind is Slotted:
+        made.note = "kept"
+    kernel_of(made, X, 0)
+    other = copied(made)
+    other.gain = 2.0
+    np.testing.assert_array_equal(kernel_of(other, X, 0)[0], other.pose(X))
+    np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
+    assert getattr(other, "note", "kept") == "kept"
+
+
+def test_a_map_that_was_repaired_after_an_error_begins_anew() -> None:
+    made = Scaled()
+    made.gain = 1e9
+    kernel_of(made, X, 0)
+    with pytest.raises(ZeroDivisionError):
+        made.check()
+    made.gain = 2.0
+    np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
+    made.check()
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
@@ -147,8 +196,7 @@ def test_ctrl_c_within_a_map_is_kept_like_an_error_and_the_pose_is_written(kind:
             return super().pose(x)
 
     made = Interrupted()
-    before, _ = kernel_of(made, X, 0)
-    after, _ = kernel_of(made, X + np.array([0.02, 0, 0, 0, 0, 0, 0]), 0)
+    before, after = asked_in_a_run(made, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
     np.testing.assert_array_equal(after, before)
     with pytest.raises(kind):
         made.check()
