@@ -88,10 +88,12 @@ class HapticMap(ABC):
         """
         asked = self._asked
         if asked is None:
-            asked = Asked(lambda x: self.pose(x), lambda x: self.jacobian(x))  # those of now, if a class is repaired
+            # By name, so that a method replaced in its class is asked, too.
+            asked = Asked(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
             object.__setattr__(self, "_asked", asked)  # kept alive, since the tick has only its address
-        start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
-        asked.begin(checked_pose(start, start.size))
+        origin = np.array(_ORIGIN)
+        start = self.pose(origin)
+        asked.begin(checked_pose(start, np.size(start), type(self).__name__, origin))
         return CompiledMap.of(self.map_kernel, asked.params, np.zeros(1))
 
     def check(self) -> None:
@@ -113,10 +115,10 @@ class HapticMap(ABC):
         """
         if type(self).jacobian is HapticMap.jacobian:
             return
-        nq, nv = self.nq, self.nv
+        nq, nv, name = self.nq, self.nv, type(self).__name__
         for x in stylus_path(np.asarray(points, dtype=np.float64)):
-            given = checked_jacobian(self.jacobian(x), nv)
-            check_derivative(given, lambda moved: checked_pose(self.pose(moved), nq), x)
+            given = checked_jacobian(self.jacobian(x), nv, name, x)
+            check_derivative(given, lambda moved: checked_pose(self.pose(moved), nq, name, moved), name, x)
 
     def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
         """Push-forward h_* ẋ, shape (nv,), of a stylus velocity at x to rates of the target.

@@ -12,12 +12,16 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from controllers.checks import numbers_of
 from controllers.errors import ParameterError
 from controllers.rotations import logarithm, multiply
 from controllers.state import Array, Pose
 
 _NUMBERS = ctypes.POINTER(ctypes.c_double)
 _CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
+FIGURE = 75
+"""Numbers of a pose of the figure: root position, root quaternion and 17 joint quaternions."""
+_UNIT = 1e-3  # by which the norm of a quaternion may be off: more than single precision, less than an arbitrary scale
 _STEP = 1e-5  # [m, rad] of central differences: cube root of the rounding error, for lengths of some centimetres
 _AGREE = 1e-3  # share of the largest entry: a slip of sign, unit, frame or column errs by more, differences by 1e-7
 
@@ -52,20 +56,24 @@ class Asked:
 
     Parameters
     ----------
+    name : str
+        The map, for messages.
     pose, jacobian : callable
         From a stylus pose (7,) to a configuration (nq,), and to the derivative (nv, 6).
     """
 
-    def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array]):
+    def __init__(self, name: str, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array]):
         self.error: BaseException | None = None
         self._last = np.zeros(0)
 
         def answer(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
             if self.error is None:
                 place = np.ctypeslib.as_array(x, (7,)).copy()
-                self._last = checked_pose(pose(place), nq)
+                self._last = checked_pose(pose(place), nq, name, place)
                 if rows:
-                    np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(jacobian(place), rows)
+                    np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(
+                        jacobian(place), rows, name, place
+                    )
             np.ctypeslib.as_array(target, (nq,))[:] = self._last
 
         def ask(*given: Any) -> None:
@@ -84,43 +92,59 @@ class Asked:
         self.error, self._last = None, start
 
 
-def checked_pose(pose: Any, nq: int) -> Pose:
-    """A configuration of `nq` finite numbers.
+def checked_pose(pose: Any, nq: int, name: str, x: Array) -> Pose:
+    """A configuration of `nq` finite numbers, with unit quaternions if it is the figure's, that a map gave at x (7,).
 
     Raises
     ------
     ParameterError
-        If the pose has another shape or a number that is not finite.
+        If the pose has another shape, a number that is not finite, or a quaternion whose norm is not 1.
     """
-    numbers = np.asarray(pose, dtype=np.float64)
+    numbers = numbers_of(f"the pose of map {name} at {_place(x)}", pose)
     if numbers.shape != (nq,) or not np.isfinite(numbers).all():
-        raise ParameterError(f"a map of one's own gave a pose of shape {numbers.shape}; expected {nq} finite numbers")
+        many = "" if numbers.shape != (nq,) else f" with {numbers[~np.isfinite(numbers)][0]} in it"
+        raise ParameterError(
+            f"map {name} gave a pose of shape {numbers.shape}{many} at {_place(x)}; expected {nq} finite numbers"
+        )
+    if nq == FIGURE:
+        norms = np.sqrt((numbers[3:].reshape(-1, 4) ** 2).sum(axis=1))
+        worst = int(np.argmax(np.abs(norms - 1.0)))
+        if abs(norms[worst] - 1.0) > _UNIT:
+            first, whose = 3 + 4 * worst, f"joint {worst}" if worst else "the root"
+            raise ParameterError(
+                f"map {name} gave a quaternion of norm {norms[worst]:.4g} for {whose}, pose[{first}:{first + 4}], at "
+                f"{_place(x)}; expected 1"
+            )
     return numbers
 
 
-def checked_jacobian(jacobian: Any, nv: int) -> Array:
-    """A derivative (nv, 6) of finite numbers.
+def checked_jacobian(jacobian: Any, nv: int, name: str, x: Array) -> Array:
+    """A derivative (nv, 6) of finite numbers that a map gave at a stylus pose (7,).
 
     Raises
     ------
     ParameterError
         If the derivative has another shape or a number that is not finite.
     """
-    numbers = np.asarray(jacobian, dtype=np.float64)
+    numbers = numbers_of(f"the jacobian of map {name} at {_place(x)}", jacobian)
     if numbers.shape != (nv, 6):
         raise ParameterError(
-            f"a map of one's own gave a jacobian of shape {numbers.shape}; expected ({nv}, 6), or none: "
+            f"map {name} gave a jacobian of shape {numbers.shape}; expected ({nv}, 6), or none: "
             "it is then computed by finite differences"
         )
     if not np.isfinite(numbers).all():
         raise ParameterError(
-            "a map of one's own gave a jacobian with a number that is not finite; expected finite ones"
+            f"map {name} gave a jacobian with a number that is not finite at {_place(x)}; expected finite ones"
         )
     return numbers
 
 
-def check_derivative(jacobian: Array, pose: Callable[[Array], Pose], x: Array) -> None:
-    """Compare a derivative (nv, 6) at a stylus pose (7,) with finite differences of the pose.
+def _place(x: Array) -> str:
+    return f"p = [{x[0]:.4g}, {x[1]:.4g}, {x[2]:.4g}]"
+
+
+def check_derivative(jacobian: Array, pose: Callable[[Array], Pose], name: str, x: Array) -> None:
+    """Compare a map's derivative (nv, 6) at a stylus pose (7,) with finite differences of the pose.
 
     Where differences of two steps do not agree, the map is not smooth, and nothing is compared.
 
@@ -136,9 +160,9 @@ def check_derivative(jacobian: Array, pose: Callable[[Array], Pose], x: Array) -
         return
     row, column = np.unravel_index(np.argmax(wrong), wrong.shape)
     raise ParameterError(
-        f"the jacobian of a map of one's own is {jacobian[row, column]:.4g} in row {row}, column {column} at p = "
-        f"{np.round(x[:3], 4).tolist()}, and its pose changes by {expected[row, column]:.4g} there; expected the same, "
-        "linear before angular velocity in the columns, or no jacobian: it is then computed by finite differences"
+        f"the jacobian of map {name} is {jacobian[row, column]:.4g} in row {row}, column {column} at {_place(x)}, "
+        f"and its pose changes by {expected[row, column]:.4g} there; expected the same, linear before angular velocity "
+        "in the columns, or no jacobian: it is then computed by finite differences"
     )
 
 

@@ -143,7 +143,7 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
         made.check()
     wrong = Fails()
     kernel_of(wrong, np.array([-0.04, 0, 0, 1.0, 0, 0, 0]), 0)
-    with pytest.raises(ParameterError, match=r"gave a pose of shape \(10,\); expected 11 finite numbers"):
+    with pytest.raises(ParameterError, match=r"gave a pose of shape \(10,\) at p = .*; expected 11 finite numbers"):
         wrong.check()
 
 
@@ -184,6 +184,52 @@ def test_a_map_that_was_repaired_after_an_error_begins_anew() -> None:
         made.check()
     made.gain = 2.0
     np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
+    made.check()
+
+
+def upright(**numbers: object) -> np.ndarray:
+    """A pose of the figure, with other numbers, by place (`at5`)."""
+    pose = np.zeros(75)
+    pose[3::4] = 1.0
+    for place, number in numbers.items():
+        pose[int(place[2:])] = number
+    return pose
+
+
+@pytest.mark.parametrize(
+    ("pose", "said"),
+    [
+        (
+            1.5 * upright(),
+            r"quaternion of norm 1\.5 for the root, pose\[3:7\], at p = \[0\.04, -0\.01, 0\.02\]; expected 1",
+        ),
+        (upright(at7=0.0), r"a quaternion of norm 0 for joint 1, pose\[7:11\], at p"),
+        (upright(at74=0.05), r"a quaternion of norm 1\.001 for joint 17, pose\[71:75\]"),
+        (upright(at9=np.nan), r"gave a pose of shape \(75,\) with nan in it at p = .*; expected 75 finite numbers"),
+        (upright() + 1j, r"the pose of map Given at p = .* is array.*; expected numbers"),
+        (["1"] * 75, r"the pose of map Given at p = .* expected numbers"),
+        (None, r"the pose of map Given at p = .* is None; expected numbers"),
+    ],
+)
+def test_a_pose_that_is_none_of_the_figure_is_refused_with_its_map_and_its_place(pose: object, said: str) -> None:
+    class Given(HapticMap):
+        def pose(self, x):
+            return pose if x[0] == X[0] else upright()
+
+    made = Given()
+    kernel_of(made, X, 0)
+    with pytest.raises(ParameterError, match=said) as told:
+        made.check()
+    assert "map Given" in str(told.value)
+
+
+def test_quaternions_of_single_precision_are_taken() -> None:
+    class Rounded(HapticMap):
+        def pose(self, x):
+            return (upright(at3=np.cos(x[0]), at4=np.sin(x[0]))).astype(np.float32)
+
+    made = Rounded()
+    kernel_of(made, X, 0)
     made.check()
 
 
