@@ -4,11 +4,14 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
+from controllers.checks import numbers_of
 from controllers.curves.stylus import stylus_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.map_stages import CompiledMap, register
 from controllers.haptic_map.own_map import (
+    FIGURE,
     Asked,
     check_derivative,
     checked_jacobian,
@@ -138,14 +141,31 @@ class HapticMap(ABC):
 class KernelMap(HapticMap):
     """A map whose pose and derivative are computed by one compiled kernel, the `map_kernel` of its class.
 
+    Its configurations are those of the figure, unless the class says another `nq`.
+
     Parameters
     ----------
-    params : Array
+    params : Array-like, shape (n,)
         Parameters of the kernel.
+
+    Raises
+    ------
+    ParameterError
+        If the class has no kernel, or the parameters are no row of numbers.
     """
 
-    def __init__(self, params: Array) -> None:
-        self._params = params
+    def __init__(self, params: npt.ArrayLike) -> None:
+        name = type(self).__name__
+        if self.map_kernel is own_map:  # which would take the first parameter for an address
+            raise ParameterError(f"{name} has no kernel; expected map_kernel = staticmethod(...) of an njit function")
+        self._params = numbers_of(f"params of {name}", params)
+        if self._params.ndim != 1:
+            raise ParameterError(f"params of {name} have the shape {self._params.shape}; expected one row of numbers")
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration: 75, those of the figure."""
+        return FIGURE
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel; by default it has no memory."""

@@ -271,3 +271,33 @@ def test_a_compiled_map_of_one_s_own_needs_no_entry_in_the_library() -> None:
     made = Slide(np.array([2.0]))
     assert_same_compiled(made, X)
     np.testing.assert_array_equal(map_poses(made, X[None]), 2.0 * RATE * X[None, :3])
+
+
+@njit
+def still(params, x, memory, pose, jacobian):
+    pose[:] = params[0]
+    jacobian[:] = params[1]
+
+
+class Still(KernelMap):
+    map_kernel = staticmethod(still)
+
+
+def test_a_compiled_map_that_says_no_sizes_has_those_of_the_figure_and_takes_a_list() -> None:
+    made = Still([0.5, 2])
+    assert (made.nq, made.nv) == (75, 57)
+    np.testing.assert_array_equal(made.pose(X), np.full(75, 0.5))
+    np.testing.assert_array_equal(made.jacobian(X), np.full((57, 6), 2.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Still([[1.0, 2.0]]), r"params of Still have the shape \(1, 2\); expected one row"),
+        (lambda: Still("soft"), "params of Still is 'soft'; expected numbers"),
+        (lambda: type("Bare", (KernelMap,), {})([1.0]), "Bare has no kernel; expected map_kernel"),
+    ],
+)
+def test_a_compiled_map_without_a_kernel_or_with_other_parameters_is_refused(make, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        make()
