@@ -1,12 +1,14 @@
 """Certificates of a simulation made in Python: of its own field, including user-defined laws."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from controllers.certificates.loop.added_laws import rivers_with
+from controllers.certificates.loop.followed_number import NotFollowed
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
@@ -91,7 +93,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
     own, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
     for law in own if curve is not None else ():
-        executed(law, curve)  # pyright: ignore[reportArgumentType]
+        with suppress(NotFollowed):  # of a certificate before: it makes this one unknown, below
+            executed(law, curve)  # pyright: ignore[reportArgumentType]
     try:
         parts = _parts_of(sim.field)
         river = _river(sim, parts.leading, delay)
@@ -123,7 +126,11 @@ def _seen(sim: Simulation, curve: Trajectory | None, delay: float, verdict: Verd
     reach = getattr(sim.haptic_map, "reach", REACH)
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
     place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), curve, phantom_device(linkage_of(sim.device)), sampling)
-    return seen(sim.field.program(), place, reach, verdict, hands)
+    try:
+        return seen(sim.field.program(), place, reach, verdict, hands)
+    except NotFollowed:
+        keeps = "a law of one's own keeps numbers of the hand between calls"
+        return Verdict("unknown", f"{verdict.reason}; {keeps}" if verdict.verdict == "unknown" else keeps)
 
 
 def _river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:

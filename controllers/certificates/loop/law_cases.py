@@ -175,20 +175,26 @@ def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol
         )
 
 
-def executed(law: FunctionLaw, curve: Trajectory) -> Array:
-    """Six numbers of a law as a run evaluates it, at the hands about a curve, shape (n, 6).
+def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Array:
+    """Six numbers of a law as a run evaluates it, at the hands about a curve, the last one first if so asked, (n, 6).
 
     Raises
     ------
+    NotFollowed
+        If the function gives a symbol with which it was followed before.
     ParameterError
         If the function raises, or does not return three or six numbers.
     """
     program, hands = law.program(), hands_about(curve)
     wrenches = np.empty((len(hands), 6))
-    for hand, wrench in zip(hands, wrenches, strict=True):
+    for hand, wrench in list(zip(hands, wrenches, strict=True))[:: -1 if backwards else 1]:
         memory = program.fresh_memory()
         try:
             program.feed(memory, hand)
+        except NotFollowed:
+            raise NotFollowed(
+                f"{law.place} keeps numbers of the hand between calls; a certificate is of a function of the hand alone"
+            ) from None
         except ParameterError:
             raise
         except Exception as error:  # whatever a user's function raises
@@ -218,7 +224,7 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
         apart = np.linalg.norm(other - force, axis=1)
         return np.isnan(apart) | (apart > size)
 
-    _refuse(law, curve, differs(executed(law, curve)[:, :3]), "another force when it is asked again")
+    _refuse(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when it is asked again")
     cases, hands = cases_of(law), hands_about(curve)
     places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
     symbolic = np.array(cases.chosen.map(len(hands))(places, velocities)[0]).T

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from controllers.errors import ParameterError
+from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.description import code_digest
 from controllers.fields.algebra.law import Law
 from controllers.state import Array, HandState, Wrench
@@ -76,6 +76,8 @@ class FunctionLaw(Law):
         given = self.function(hand, **self.parameters)
         try:
             numbers = np.asarray(given, dtype=np.float64)
+        except ControllerError:  # of a certificate's symbol, which says itself why it is no number
+            raise
         except (TypeError, ValueError):
             raise ParameterError(
                 f"{self.place} gave {given!r}; expected a force of three numbers [N], or six with the moment [N m]"

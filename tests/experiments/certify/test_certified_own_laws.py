@@ -285,3 +285,32 @@ def test_a_law_that_raises_or_gives_another_shape_is_an_error_that_names_it(func
 def test_the_reasons_hold_no_path_of_a_library():
     for function in (rail, step):
         assert ".cpp" not in stability(function).reason
+
+
+@pytest.mark.parametrize("delay", [1, 1000])  # less and more than the hands at which a law is looked at
+def test_a_law_that_keeps_numbers_of_the_hand_is_unknown_each_time(delay: int) -> None:
+    kept = [0.0] * delay
+
+    @hvf.law
+    def late(hand, k=50.0):
+        kept.append(hand.p[2])
+        return 0.0, 0.0, -k * kept.pop(0)
+
+    sim, said = simulation(late), "another force when it is asked again|keeps numbers of the hand between calls"
+    for _ in range(2):
+        found = hvf.certify(sim).stability
+        assert found.verdict == "unknown"
+        assert re.search(said, found.reason), found.reason
+
+
+def test_a_symbol_that_a_law_kept_is_told_as_its_state() -> None:
+    kept = [0.0]
+
+    @hvf.law
+    def late(hand):
+        kept.append(hand.p[2])
+        return 0.0, 0.0, kept.pop(0)
+
+    cases_of(late)
+    with pytest.raises(ControllerError, match=r"law late .* keeps numbers of the hand between calls"):
+        certified_cases(late, CURVE)
