@@ -49,7 +49,7 @@ def command_force(
     if not sound:
         code = limiter[LIMITER_FAULT]
         if code == FORCE_NOT_FINITE:
-            latch(faults, FORCE_NOT_FINITE, t, first_not_finite(wrench[:3]))
+            latch(faults, FORCE_NOT_FINITE, t, first_not_finite(wrench))
         else:
             latch(faults, LIMITER_NOT_FINITE, t, first_not_finite(limiter))
     ramp_in(faults, force)

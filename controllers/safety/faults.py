@@ -63,7 +63,7 @@ class Fault(IntEnum):
 
 _WORDS = {
     Fault.NONE: "no fault",
-    Fault.FORCE_NOT_FINITE: "the field asked for a force of {:g} N",
+    Fault.FORCE_NOT_FINITE: "the field asked for a force or moment of {:g}",
     Fault.LIMITER_NOT_FINITE: "the limiter's memory held {:g}",
     Fault.TANK_NOT_FINITE: "the energy tank's memory held {:g}",
     Fault.READING_NOT_FINITE: "the device read {:g}",

@@ -35,7 +35,8 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
         Memory [h, last force (3), fault], written. Once a fault is set the force stays zero until the memory is
         renewed.
     wrench : Array, shape (6,)
-        Wrench demanded by the field; the moment is dropped, since the device has motors for a force only.
+        Wrench demanded by the field; the moment is dropped, since the device has motors for a force only, but
+        one that is not finite is a fault too: whatever computes it is wrong.
     force : Array
         Written [N].
 
@@ -46,7 +47,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
     """
     if not np.isfinite(limiter[LIMITER_HEAT] + limiter[1] + limiter[2] + limiter[3]):
         limiter[LIMITER_FAULT] = LIMITER_NOT_FINITE
-    elif not np.isfinite(wrench[0] + wrench[1] + wrench[2]):
+    elif not np.isfinite(wrench[0] + wrench[1] + wrench[2] + wrench[3] + wrench[4] + wrench[5]):
         limiter[LIMITER_FAULT] = FORCE_NOT_FINITE
     # Written as a comparison with 0 that is also true if the fault code itself is NaN.
     if limiter[LIMITER_FAULT] != 0.0:

@@ -33,6 +33,13 @@ def test_a_cold_device_gives_at_most_its_peak_in_the_same_direction(force):
         np.testing.assert_allclose(a, b, atol=1e-9)
 
 
+def test_a_moment_that_is_not_finite_is_a_fault_like_such_a_force():
+    memory, out = FAST.fresh_memory(), np.ones(3)
+    limit_force(FAST.limits(), memory, np.array([0.3, 0.0, 0.0, 0.0, np.nan, 0.0]), out)
+    assert memory[LIMITER_FAULT] == FORCE_NOT_FINITE
+    np.testing.assert_array_equal(out, 0.0)
+
+
 def test_a_device_that_works_for_long_gives_its_continuous_force():
     memory, limiter = FAST.fresh_memory(), ForceLimiter(period=0.1, slew=1e9)
     forces = [np.linalg.norm(_limit(limiter, memory, [0.0, 20.0, 0.0])) for _ in range(2000)]
