@@ -22,11 +22,12 @@ _WORDS: dict[object, str] = {bool: "True or False", str: "text", types.NoneType:
 def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bool = False) -> float:
     """The value, a gain or length, if it is at least `least` and finite (or infinite, where allowed); else raises."""
     of_kind(name, value, float)
-    if np.isnan(value) or value < least or (np.isinf(value) and not infinite):
+    number = float(value)
+    if np.isnan(number) or number < least or (np.isinf(number) and not infinite):
         raise ParameterError(
             f"{name} must be {'' if infinite else 'finite and '}at least {least:g} {unit}, got {value}"
         )
-    return float(value)
+    return number
 
 
 def check_kinds(part: object) -> None:
@@ -108,10 +109,19 @@ def _is(value: object, kind: Any) -> bool:
         several = cast(Sequence[object], value)
         return (_open(kind) or len(several) == len(inner)) and all(_is(one, inner[0]) for one in several)
     if kind in _NUMBERS:
-        return isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool)
+        return isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool) and (kind is int or _fits(value))
     if kind is bool:
         return isinstance(value, bool | np.bool_)
     return not isinstance(kind, type) or (isinstance(value, kind) and not isinstance(value, type))
+
+
+def _fits(value: Any) -> bool:
+    """Whether a number is not too large for a float."""
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
 
 
 def _open(kind: object) -> bool:

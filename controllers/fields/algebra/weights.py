@@ -7,12 +7,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import numbers_of, of_kind
+from controllers.checks import checked, numbers_of, of_kind
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
+_POINT = 1e-9  # [m] a ball that no hand meets
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
 _KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # row of a weight: kind, flag for 1 − s, four numbers
 
@@ -86,12 +87,9 @@ class Weight:
     def ball(centre: npt.ArrayLike, radius: float) -> "Weight":
         """Window w(|p − c|/r) about a centre c in H [m]: 1 at the centre, 0 from the radius r [m] on."""
         place = numbers_of("centre", centre)
-        of_kind("radius", radius, float)
         if place.shape != (3,):
             raise ParameterError(f"the centre of a ball is {place.tolist()}; expected three numbers")
-        if not radius > 0.0:
-            raise ParameterError(f"the radius of a ball must be positive, got {radius} m")
-        return _weight(_BALL, *place.tolist(), radius**-2)
+        return _weight(_BALL, *place.tolist(), checked("radius", radius, "m", _POINT, infinite=True) ** -2)
 
     @staticmethod
     def speed(low: float, high: float) -> "Weight":
@@ -112,7 +110,7 @@ class Weight:
 
 
 def _weight(kind: int, *numbers: float) -> Weight:
-    if not np.isfinite(numbers).all():
+    if not np.isfinite([float(number) for number in numbers]).all():
         raise ParameterError(f"numbers of a weight must be finite, got {numbers}")
     padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - _NUMBERS - len(numbers))
-    return Weight((float(kind), 0.0, *numbers, *padding))
+    return Weight((float(kind), 0.0, *map(float, numbers), *padding))

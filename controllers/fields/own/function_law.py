@@ -1,7 +1,10 @@
 """Laws of force given by a user's Python function with named parameters."""
 
+import math
+import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from numbers import Real
 from typing import Any, Self
 
@@ -40,8 +43,11 @@ class FunctionLaw(Law):
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
-            if not isinstance(value, Real) or not np.isfinite(value):
-                raise ParameterError(f"{name} of {self.place} must be a finite number, got {value!r}")
+            if not isinstance(value, Real) or not _is_finite(value):
+                raise ParameterError(f"{name} of {self.place} must be a finite number, got {reprlib.repr(value)}")
+        given: Mapping[str, Any] = self.parameters
+        plain = {name: float(value) if isinstance(value, Fraction) else value for name, value in given.items()}
+        object.__setattr__(self, "parameters", plain)  # a fraction is no number to NumPy
 
     def __call__(self, **parameters: float) -> Self:
         """The same law with other parameters.
@@ -73,14 +79,23 @@ class FunctionLaw(Law):
 
     def six_numbers(self, hand: HandState) -> Array:
         """Force [N] and moment [N m] of the function at a hand state, shape (6,); a moment not returned is zero."""
-        given = self.function(hand, **self.parameters)
+        given: Any = self.function(hand, **self.parameters)
+        if given is None:
+            raise ParameterError(
+                f"{self.place} returned None; expected a return statement with three numbers, the force [N], or six, "
+                "with the moment [N m]"
+            )
         try:
-            numbers = np.asarray(given, dtype=np.float64)
+            numbers = np.asarray(given)
+            if numbers.dtype.kind not in "biufO" or np.ma.is_masked(given):  # text, complex; masked: no number
+                raise TypeError
+            numbers = numbers.astype(np.float64)
         except ControllerError:  # of a certificate's symbol, which says itself why it is no number
             raise
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ParameterError(
-                f"{self.place} gave {given!r}; expected a force of three numbers [N], or six with the moment [N m]"
+                f"{self.place} gave {reprlib.repr(given)}; expected a force of three numbers [N], or six with the "
+                "moment [N m]"
             ) from None
         if numbers.shape not in ((3,), (6,)):
             raise ParameterError(
@@ -105,6 +120,14 @@ class FunctionLaw(Law):
     def description(self) -> dict[str, object]:
         """Name, parameters by name, and a hash of the code that runs."""
         return {"law": self.name, "parameters": dict(self.parameters), "code": code_digest(self.function)}
+
+
+def _is_finite(value: Real) -> bool:
+    """Whether a number is finite as a float, as which it is passed on; one of NumPy, a fraction or a long integer."""
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
 
 
 def place_of(function: Any) -> str:

@@ -57,7 +57,14 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
 
 
 def _parameters(function: _Function) -> dict[str, float]:
-    given = list(inspect.signature(function).parameters.values())
+    try:
+        given = list(inspect.signature(function).parameters.values())
+    except ValueError:  # of some types and functions in C, which do not tell
+        raise ParameterError(f"a law is made from a function law(hand, …); got {function!r}") from None
+    if alone := [one.name for one in given if one.kind is one.POSITIONAL_ONLY]:
+        raise ParameterError(
+            f"{', '.join(alone)} of {place_of(function)} can be given by position only; leave out the / after it"
+        )
     if not given or given[0].name != "hand" or given[0].kind is not given[0].POSITIONAL_OR_KEYWORD:
         got = given[0] if given else "no argument"
         raise ParameterError(f"the first argument of {place_of(function)} must be hand, got {got}")

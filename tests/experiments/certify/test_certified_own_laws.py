@@ -272,7 +272,7 @@ def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
     [
         (_boom, r"law _boom \(.*\) raised ValueError: boom"),
         (lambda hand: (1.0, 2.0), r"numbers of shape \(2,\)"),
-        (lambda hand: None, "expected a force of three"),
+        (lambda hand: None, "returned None; expected a return statement with three numbers"),
         (lambda hand: ("a", 0, 0), r"gave \('a', 0, 0\)"),
         (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
     ],

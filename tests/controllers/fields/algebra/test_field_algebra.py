@@ -1,5 +1,7 @@
 """The algebra of fields: each operation against its formula, in Python and compiled."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -78,6 +80,11 @@ def test_nested_composition_is_evaluated_as_written():
     np.testing.assert_allclose(force_of(field, HAND), expected, rtol=1e-12)
 
 
+def test_numbers_may_be_fractions():
+    assert Weight.constant(Fraction(1, 4)) == Weight.constant(0.25)
+    np.testing.assert_array_equal((Fraction(1, 2) * A).limited(Fraction(1, 4)).params[-2:], [0.25, np.inf])
+
+
 def test_composed_fields_have_no_jump():
     rng = np.random.default_rng(0)
     field = (A.gated(~Weight.ball([0.05, 0.0, 0.0], 0.02)) + B).limited(1.5)
@@ -99,6 +106,9 @@ def test_laws_in_python_keep_their_order_through_the_algebra():
     ("make", "says"),
     [
         (lambda: Weight.ball([0, 0, 0], 0.0), "radius"),
+        (lambda: Weight.ball([0, 0, 0], 1e-200), "radius must be at least 1e-09 m, got 1e-200"),
+        (lambda: Weight.ball([0, 0, 0], 10**400), "radius is 1000.*; expected a number"),
+        (lambda: Weight.constant(10**400), "s is 1000.*; expected a number"),
         (lambda: Weight.speed(0.3, 0.2), "low < high"),
         (lambda: Weight.constant(np.nan), "finite"),
         (lambda: A.limited(-1.0), "force must be at least 0 N"),

@@ -2,6 +2,7 @@
 
 import math
 import threading
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from tests.controllers.fields.field_probes import run_over
 
 RNG = np.random.default_rng(7)
 SOFTNESS = 1e-3
+MASKED = np.ma.masked_greater([0.0, 1.0, 2.0], 1.5)
 
 
 def floor(hand, k=500.0, b=3.0):
@@ -71,6 +73,12 @@ def test_parameters_have_names_and_others_make_another_law():
         deep = HandState.at([0.0, 0.0, -0.011])
         assert soft.wrench(deep).force[2] == pytest.approx(1.0)
         assert own.wrench(deep).force[2] == pytest.approx(5.0)
+
+
+def test_a_fraction_is_a_number_like_another():
+    own = law(floor)(k=Fraction(1, 4))
+    assert repr(own) == "floor(k=0.25, b=3.0)"
+    assert own.wrench(HandState.at([0.0, 0.0, -0.011])).force[2] == pytest.approx(0.0025)
 
 
 def test_one_kernel_serves_a_law_whatever_its_parameters():
@@ -189,13 +197,21 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
         (lambda: law(lambda: (0, 0, 0)), "first argument of law <lambda> .* must be hand, got no argument"),
         (lambda: law(lambda p, k=1.0: (0, 0, 0)), "must be hand, got p"),
         (lambda: law(lambda *hand: (0, 0, 0)), r"must be hand, got \*hand"),
+        (lambda: law(lambda hand, /, k=1.0: (0, 0, 0)), r"hand of law <lambda> .* by position only; leave out the /"),
+        (lambda: law(int), r"a law is made from a function law\(hand, …\); got <class 'int'>"),
         (lambda: law(lambda hand, k: (0, 0, 0)), r"argument k of law .* a number as its default, as in k=1.0"),
         (lambda: law(lambda hand, **more: (0, 0, 0)), "with a number as its default"),
         (lambda: law(lambda hand, k="stiff": (0, 0, 0)), "k of law .* must be a finite number, got 'stiff'"),
         (lambda: law(lambda hand, k=np.nan: (0, 0, 0)), "must be a finite number, got nan"),
+        (lambda: law(lambda hand, k=10**400: (0, 0, 0)), r"must be a finite number, got 1000.*\.\.\."),
         (lambda: law(floor)(stiffness=3.0), "no parameter stiffness; there are k, b"),
         (lambda: law(floor)(k=np.inf), r"k of law floor \(.*test_own_law.py, line \d+\) must be a finite number"),
         (lambda: law(lambda hand: ("a", 0, 0)).wrench(HandState.at([0, 0, 0])), r"gave \('a', 0, 0\); expected"),
+        (lambda: law(lambda hand: None).wrench(HandState.at([0, 0, 0])), r"law .* returned None; expected a return "),
+        (lambda: law(lambda hand: ("1", "2", "3")).wrench(HandState.at([0, 0, 0])), r"gave \('1', '2', '3'\); exp"),
+        (lambda: law(lambda hand: (1j, 0, 0)).wrench(HandState.at([0, 0, 0])), r"gave \(1j, 0, 0\); expected"),
+        (lambda: law(lambda hand: (10**400, 0, 0)).wrench(HandState.at([0, 0, 0])), r"gave \(1000.*, 0, 0\); expected"),
+        (lambda: law(lambda hand: MASKED).wrench(HandState.at([0, 0, 0])), "gave masked_array.*; expected"),
         (lambda: law(lambda hand: (0, 0)).wrench(HandState.at([0, 0, 0])), r"numbers of shape \(2,\)"),
         (lambda: law(compiled=True)(lambda hand: (0, 0)), "expected a tuple of three numbers"),
         (lambda: law(compiled=True)(lambda hand: np.zeros(3)), r"returns array\(float64, 1d, C\); expected a tuple"),
