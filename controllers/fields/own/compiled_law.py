@@ -7,7 +7,6 @@ from functools import cache
 from typing import Any
 
 from numba import njit, types
-from numba.core.errors import NumbaError
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from controllers.errors import ParameterError
@@ -59,13 +58,11 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
     signature = (_HAND, *[_NUMBER] * count)
     try:
         compiled.compile(signature)
-    except NumbaError as error:
-        lines = [line.strip() for line in str(error).splitlines()]
-        said = next((line for line in lines if line and not line.startswith("Failed in")), "no reason given")
+    except Exception as error:  # NumbaError, and whatever the modules raise that the function names
         at = re.findall(r'File "[^"]*", line (\d+)', str(error))
         where = f"in line {at[-1]}: " if at else ""
         raise ParameterError(
-            f"{place_of(function)} cannot be compiled: {where}{said}. Expected a function of numbers, "
+            f"{place_of(function)} cannot be compiled: {where}{_reason(str(error))}. Expected a function of numbers, "
             "see docs/tutorials/your-own-law.md"
         ) from None
     given: Any = compiled.overloads[signature].signature.return_type
@@ -82,6 +79,18 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
         write(wrench, compiled(hand_state(hand), *numbers_of(params, at)))
 
     return own_law
+
+
+def _reason(said: str) -> str:
+    """What numba says of a function in one line."""
+    lines = [line.strip() for line in said.splitlines()]
+    first = next((line for line in lines if line and not line.startswith("Failed in")), "no reason given")
+    if field := re.match(r"Unknown attribute '(\w+)' of type HandState", first):
+        return f"a hand has no {field[1]}; it has {', '.join(HandState._fields)}"
+    calls = [line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")]
+    if first.startswith("No implementation of function") and calls:  # the call comes some lines below
+        return f"there is no {calls[0]} for arguments of these types"
+    return first.rstrip(".:")
 
 
 def _is_number(kind: Any) -> bool:

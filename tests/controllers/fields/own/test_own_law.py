@@ -27,6 +27,11 @@ def floor(hand, k=500.0, b=3.0):
     return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
 
 
+def reading(hand):
+    with open("force") as file:
+        return file.read(), 0.0, 0.0
+
+
 def twisted(hand, k=0.2, d=0.01):
     """A moment that turns the stylus upright, and a force that the switch turns on."""
     w, x, y, z = hand.q
@@ -217,6 +222,19 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
         (lambda: law(compiled=True)(lambda hand: np.zeros(3)), r"returns array\(float64, 1d, C\); expected a tuple"),
         (lambda: law(compiled=True)(lambda hand: ("a", 0, 0)), "expected a tuple of three numbers"),
         (lambda: law(compiled=True)(lambda hand: (hand.x, 0, 0)), r"law <lambda> \(.*line \d+\) cannot be compiled"),
+        (
+            lambda: law(compiled=True)(lambda hand: (hand.x, 0, 0)),
+            r": a hand has no x; it has t, p, q, v, w, switch\. Exp",
+        ),
+        (
+            lambda: law(compiled=True)(lambda hand: (hand.p * 2, 0, 0)),
+            r"no mul\(UniTuple.*\) for arguments of these types\. Exp",
+        ),
+        (
+            lambda: law(compiled=True)(lambda hand: (np.nope(hand.t), 0, 0)),
+            "cannot be compiled.* has no attribute 'nope'",
+        ),
+        (lambda: law(compiled=True)(reading), "cannot be compiled: The 'with"),
         (lambda: law(compiled=True)(lambda hand: (unknown, 0, 0)), "cannot be compiled.*unknown"),  # noqa: F821
     ],
 )
