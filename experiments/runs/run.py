@@ -161,7 +161,8 @@ def _simulate(
     loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
     rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
-    loop.run(first)
+    with session.naming_laws():
+        loop.run(first)
     session.haptic_map.check()
     first_tick = time.perf_counter() - started
     with simulating(console, seconds) as reached:
@@ -172,7 +173,8 @@ def _simulate(
             if view:
                 clock.wait_until(t)
 
-        times = loop.run(rest, progress)
+        with session.naming_laws():
+            times = loop.run(rest, progress)
     page.close()
     keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())

@@ -278,7 +278,8 @@ class Simulation:
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         left = ticks_of(session.servo.device)
         for _ in itertools.count() if left is None else range(left):
-            ticks, frames = loop.step()
+            with session.naming_laws():
+                ticks, frames = loop.step()
             session.haptic_map.check()
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
             yield Tick(

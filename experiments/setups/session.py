@@ -1,7 +1,8 @@
 """A wired run: its parts, and the constant data that its recording keeps."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law
+from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.haptic_map.base import HapticMap
-from controllers.state import Array
+from controllers.state import Array, HandState
 from experiments.setups.parts.devices import recorded_as
 from experiments.setups.parts.part_types import Parts, Settings
 from models.humanoid.skeleton import standing_com
@@ -76,6 +78,18 @@ class Session:
         """Names of the clips, or else the type of the map."""
         alone = "a robot arm" if self.world.kind == "robot" else type(self.haptic_map).__name__
         return ", ".join(clip.name for clip in self.clips) or alone
+
+    @contextmanager
+    def naming_laws(self) -> Generator[None]:
+        """For the ticks: name the compiled law of one's own that raises at the hand of an error, if one does."""
+        try:
+            yield
+        except Exception:
+            hand = HandState.of(self.servo.device.hand)
+            for law in self.parts.program.laws:
+                if isinstance(law, CompiledLaw):
+                    law.wrench(hand)
+            raise
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """Constant data that the recording keeps beside the channels."""

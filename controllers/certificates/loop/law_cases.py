@@ -191,6 +191,7 @@ def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Ar
         memory = program.fresh_memory()
         try:
             program.feed(memory, hand)
+            evaluate(*program.compiled(), memory, hand.vector(), wrench)
         except NotFollowed:
             raise NotFollowed(
                 f"{law.place} keeps numbers of the hand between calls; a certificate is of a function of the hand alone"
@@ -201,7 +202,6 @@ def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Ar
             raise ParameterError(
                 f"{law.place} raised {type(error).__name__}: {error}; for a hand at {told(hand.p, hand.v)}"
             ) from error
-        evaluate(*program.compiled(), memory, hand.vector(), wrench)
     return wrenches
 
 

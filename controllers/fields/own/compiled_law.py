@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
 from numba import njit, types
 from numba.cpython.unsafe.tuple import tuple_setitem
 
-from controllers.errors import ParameterError
+from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.instructions import Kernel
 from controllers.fields.algebra.law import Program
 from controllers.fields.own.function_law import FunctionLaw, place_of
-from controllers.state import Array, HandState, hand_state
+from controllers.state import Array, HandState, Wrench, hand_state
 
 _NUMBER = types.float64
 _HAND = types.NamedTuple(
@@ -45,6 +46,23 @@ class CompiledLaw(FunctionLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         _kernel(self.function, len(self.parameters))
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force and moment at one hand state.
+
+        Raises
+        ------
+        ParameterError
+            If they are not finite, or the function raises: compiled code does not say whose error it is.
+        """
+        try:
+            return super().wrench(hand)
+        except ControllerError:
+            raise
+        except Exception as error:
+            raise ParameterError(
+                f"{self.place} raised {type(error).__name__}: {error}; for a hand at p = {np.round(hand.p, 4).tolist()}"
+            ) from error
 
     def _composed(self) -> Program:
         numbers = [float(value) for value in self.parameters.values()]

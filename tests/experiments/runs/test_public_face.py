@@ -179,6 +179,23 @@ def test_ctrl_c_ends_a_run_with_a_map_in_python() -> None:
         sim.run(0.5)
 
 
+def reading(hand):
+    force = 0.0
+    for i in range(3 if hand.t < 5e-3 else 4):
+        force += 0.1 * hand.p[i]
+    return force, 0.0, 0.0
+
+
+def test_a_compiled_law_that_raises_in_a_tick_is_named() -> None:
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + hvf.law(compiled=True)(reading))
+    said = r"law reading \(.*test_public_face\.py, line \d+\) raised IndexError: .*; for a hand at p = \[0\.0"
+    with pytest.raises(hvf.ParameterError, match=said):
+        sim.run(0.1)
+    with pytest.raises(hvf.ParameterError, match=said):
+        for _ in zip(range(100), sim, strict=False):
+            pass
+
+
 class Unlike(hvf.HapticMap):
     """A map with a derivative of another shape."""
 

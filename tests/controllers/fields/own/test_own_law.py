@@ -137,6 +137,21 @@ def test_what_it_divides_by_zero_reaches_the_limiter_as_no_number():
         pole.wrench(hand)
 
 
+def test_what_a_compiled_law_raises_is_told_with_its_name():
+    def beyond(hand):
+        total = 0.0
+        for i in range(int(hand.t)):
+            total += hand.p[i]
+        return total, 0.0, 0.0
+
+    own = law(compiled=True)(beyond)
+    assert own.wrench(HandState.at([1.0, 2.0, 3.0], t=3.0)).force[0] == 6.0
+    with pytest.raises(
+        ParameterError, match=r"law beyond \(.*\) raised IndexError: .*; for a hand at p = \[1\.0, 2\.0, 3"
+    ):
+        own.wrench(HandState.at([1.0, 2.0, 3.0], t=4.0))
+
+
 def test_its_description_is_plain_data_and_changes_with_the_code_and_the_numbers():
     def told(function, **parameters):
         return law(function)(**parameters).description()
