@@ -10,7 +10,9 @@ tenths of its speed needs eight tenths of gravity, and one whose pace changes by
 
 import numpy as np
 
+from controllers.checks import checked, of_kind
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from controllers.state import Array
 from models.phantom.dynamics import coriolis_matrix, mass_matrix
 from models.phantom.kinematics import jacobian, vector_to_device_frame
@@ -108,9 +110,15 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
 
     Raises
     ------
+    ParameterError
+        If the drag is not positive and finite, the stiffness is negative or NaN, or the curve is no trajectory.
     SimError
         If the Phantom does not reach the curve.
     """
+    of_kind("curve", curve, Trajectory)
+    checked("stiffness", stiffness, "N/m", infinite=True)
+    if checked("drag", drag, "N s/m") == 0.0:
+        raise ParameterError(f"drag must be more than 0 N s/m, got {drag}: without it no field leads a hand at a pace")
     times = np.asarray(curve.times)
     own, middles = np.diff(times), 0.5 * (times[1:] + times[:-1])
     speed = np.linalg.norm(curve.velocity(middles), axis=1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from experiments.config.words import run_config
 from experiments.setups.parts import pace
 from experiments.setups.parts.pace import friction_along, inertia_along, paced
@@ -82,6 +83,20 @@ def test_an_open_curve_stays_open_and_begins_when_it_did():
     found = paced(way, 8.0, 300.0)
     assert not found.periodic
     assert found.start == 1.0
+
+
+@pytest.mark.parametrize(
+    ("drag", "stiffness", "said"),
+    [
+        (-1.0, 300.0, "drag must be finite and at least 0 N s/m, got -1"),
+        (0, 300.0, "drag must be more than 0 N s/m, got 0"),
+        (8.0, -1.0, "stiffness must be at least 0 N/m, got -1"),
+        ("8", 300.0, "drag is '8'; expected a number"),
+    ],
+)
+def test_a_drag_that_leads_no_hand_is_told(drag, stiffness, said):
+    with pytest.raises(ParameterError, match=said):
+        paced(CURVE, drag, stiffness)
 
 
 def test_a_curve_out_of_reach_is_told():
