@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from controllers.checks import of_kind
 from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Law
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import place_of
 from controllers.fields.own.python_law import PythonLaw
@@ -42,7 +43,8 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
     Raises
     ------
     ParameterError
-        If the first argument is not ``hand``, another one has no number as its default, or it cannot be compiled.
+        If the function is called ``limited``, its first argument is not ``hand``, another one has no number as its
+        default, or it cannot be compiled.
     """
     of_kind("compiled", compiled, bool)
     if function is not None and not callable(function):
@@ -51,6 +53,11 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
 
     def made(function: _Function) -> PythonLaw | CompiledLaw:
         plain = getattr(function, "py_func", function)
+        if getattr(plain, "__name__", "") == Law.limited.__name__:
+            raise ParameterError(
+                f"{place_of(plain)} cannot be called {Law.limited.__name__}: a sweep finds the bounds of a limited "
+                "field under this name; expected another name"
+            )
         return make(plain, _parameters(plain))
 
     return made if function is None else made(function)

@@ -27,6 +27,10 @@ def floor(hand, k=500.0, b=3.0):
     return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
 
 
+def limited(hand, force=1.0):
+    return force, 0.0, 0.0
+
+
 def reading(hand):
     with open("force") as file:
         return file.read(), 0.0, 0.0
@@ -218,6 +222,7 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
         (lambda: law(lambda p, k=1.0: (0, 0, 0)), "must be hand, got p"),
         (lambda: law(lambda *hand: (0, 0, 0)), r"must be hand, got \*hand"),
         (lambda: law(lambda hand, /, k=1.0: (0, 0, 0)), r"hand of law <lambda> .* by position only; leave out the /"),
+        (lambda: law(limited), r"law limited \(.*\) cannot be called limited: a sweep finds .*; expected another name"),
         (lambda: law(int), r"a law is made from a function law\(hand, …\); got <class 'int'>"),
         (lambda: law(lambda hand, k: (0, 0, 0)), r"argument k of law .* a number as its default, as in k=1.0"),
         (lambda: law(lambda hand, **more: (0, 0, 0)), "with a number as its default"),
