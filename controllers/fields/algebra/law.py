@@ -35,9 +35,9 @@ from controllers.walking.walking import follow_hand
 class Law(ABC):
     r"""A field of force F(hand), and the algebra of fields.
 
-    .. math:: F + F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
+    .. math:: F \pm F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
 
-    by ``+``, ``*``, `gated`, `blended` and `limited`; each result is again a law, and s is a `Weight`.
+    by ``+``, ``-``, ``*``, ``/``, `gated`, `blended` and `limited`; each result is again a law, and s is a `Weight`.
     """
 
     @abstractmethod
@@ -76,7 +76,32 @@ class Law(ABC):
     def __add__(self, other: "Law") -> "Program":
         """Sum of two fields."""
         of_kind("the other field", other, Law)
-        return self.program().joined(other.program(), Join.ADD)
+        first, second = self.program(), other.program()
+        if second.depth == STACK > first.depth:  # one wrench more would be pending below it: it goes first
+            first, second = second, first
+        return first.joined(second, Join.ADD)
+
+    def __radd__(self, other: float) -> "Program":
+        """The field itself: a sum of fields by `sum` begins with 0."""
+        if other != 0:
+            raise ParameterError(f"a field was added to {other!r}; expected another field")
+        return self.program()
+
+    def __neg__(self) -> "Program":
+        """Field in the opposite direction: −F."""
+        return -1.0 * self
+
+    def __sub__(self, other: "Law") -> "Program":
+        """Difference of two fields."""
+        of_kind("the other field", other, Law)
+        return self + -other
+
+    def __truediv__(self, divisor: float) -> "Program":
+        """Field over a number."""
+        of_kind("a divisor of a field", divisor, float)
+        if divisor == 0:
+            raise ParameterError("a field was divided by 0; expected another number")
+        return self * (1.0 / divisor)
 
     def __rmul__(self, factor: float) -> "Program":
         """Field times a number."""
@@ -191,8 +216,7 @@ class Program(Law):
     walker_feeds: tuple[WalkerFeed, ...] = ()
 
     def __post_init__(self) -> None:
-        codes: list[int] = self.ops[:, OP_CODE].tolist()
-        depth = np.cumsum([1 if code >= 0 else 1 - Join(code).takes for code in codes])
+        codes, depth = self.ops[:, OP_CODE].tolist(), self._depths
         if len(depth) == 0 or depth[-1] != 1 or depth.min() < 1 or depth.max() > STACK:
             raise ParameterError(
                 f"a field must leave one wrench and stack at most {STACK}; its instructions stack {depth.tolist()}"
@@ -203,6 +227,17 @@ class Program(Law):
                 f"a field of {len(laws)} laws with the codes {laws} needs their kernels and names; "
                 f"got {len(self.kernels)} kernels and {len(self.laws)} laws"
             )
+
+    @cached_property
+    def _depths(self) -> IntArray:
+        """Pending wrenches after each instruction."""
+        codes: list[int] = self.ops[:, OP_CODE].tolist()
+        return np.cumsum([1 if code >= 0 else 1 - Join(code).takes for code in codes], dtype=np.int64)
+
+    @property
+    def depth(self) -> int:
+        """The most wrenches that are pending at once."""
+        return int(self._depths.max())
 
     @property
     def curves(self) -> tuple[Trajectory, ...]:

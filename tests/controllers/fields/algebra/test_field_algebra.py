@@ -12,6 +12,7 @@ from controllers.fields.algebra.weights import Weight
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.python_law import PythonLaw
 from controllers.fields.river import River, window
 from controllers.state import HandState
@@ -80,6 +81,24 @@ def test_nested_composition_is_evaluated_as_written():
     np.testing.assert_allclose(force_of(field, HAND), expected, rtol=1e-12)
 
 
+def test_sums_differences_and_quotients_are_their_formulas():
+    np.testing.assert_array_equal(force_of(A - B, HAND), F - G)
+    np.testing.assert_array_equal(force_of(-A, HAND), -F)
+    np.testing.assert_array_equal(force_of(A / 4, HAND), 0.25 * F)
+    np.testing.assert_array_equal(force_of(sum([A, B, A]), HAND), F + G + F)
+    assert sum([A]) is A
+    assert (A / 4).description() == (0.25 * A).description()
+    compiled = CompiledLaw(lambda hand: (hand.p[0], 0.0, 0.0))
+    np.testing.assert_allclose((-compiled - A / 2).wrench(HAND).force, [-0.04, 0.0, 0.0] - 0.5 * F, rtol=1e-12)
+
+
+def test_a_sum_nested_to_the_right_is_as_deep_as_one_to_the_left():
+    field, expected = A, F
+    for _ in range(40):
+        field, expected = B + field, G + expected
+    np.testing.assert_array_equal(force_of(field, HAND), expected)
+
+
 def test_numbers_may_be_fractions():
     assert Weight.constant(Fraction(1, 4)) == Weight.constant(0.25)
     np.testing.assert_array_equal((Fraction(1, 2) * A).limited(Fraction(1, 4)).params[-2:], [0.25, np.inf])
@@ -111,6 +130,10 @@ def test_laws_in_python_keep_their_order_through_the_algebra():
         (lambda: Weight.constant(10**400), "s is 1000.*; expected a number"),
         (lambda: Weight.speed(0.3, 0.2), "low < high"),
         (lambda: Weight.constant(np.nan), "finite"),
+        (lambda: A / 0, "divided by 0; expected another number"),
+        (lambda: A / "2", "a divisor of a field is '2'; expected a number"),
+        (lambda: A - 1, "the other field is 1; expected Law"),
+        (lambda: 1 + A, "a field was added to 1; expected another field"),
         (lambda: A.limited(-1.0), "force must be at least 0 N"),
         (lambda: Program(A.ops[:0], A.params, A.memory, A.kernels, A.laws), "must leave one wrench"),
         (lambda: Program(A.ops, A.params, A.memory, (), A.laws), "got 0 kernels and 1 laws"),
