@@ -67,14 +67,15 @@ class Asked:
         self._last = np.zeros(0)
 
         def answer(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
+            last = self._last  # this call's own, since the runs of a sweep ask in several threads
             if self.error is None:
                 place = np.ctypeslib.as_array(x, (7,)).copy()
-                self._last = checked_pose(pose(place), nq, name, place)
+                self._last = last = checked_pose(pose(place), nq, name, place)
                 if rows:
                     np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(
                         jacobian(place), rows, name, place
                     )
-            np.ctypeslib.as_array(target, (nq,))[:] = self._last
+            np.ctypeslib.as_array(target, (nq,))[:] = last
 
         def ask(*given: Any) -> None:
             try:
