@@ -74,7 +74,7 @@ class HapticMap(ABC):
     @property
     def nq(self) -> int:
         """Numbers of a configuration."""
-        return int(np.size(self.pose(np.array(_ORIGIN))))
+        return numbers_of(f"the pose of map {type(self).__name__}", self.pose(np.array(_ORIGIN))).size
 
     @property
     def nv(self) -> int:

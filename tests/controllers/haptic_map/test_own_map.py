@@ -223,6 +223,15 @@ def test_a_pose_that_is_none_of_the_figure_is_refused_with_its_map_and_its_place
     assert "map Given" in str(told.value)
 
 
+def test_a_map_that_returns_nothing_is_told_before_its_poses_are_counted() -> None:
+    class Nothing(HapticMap):
+        def pose(self, x):
+            pass
+
+    with pytest.raises(ParameterError, match="the pose of map Nothing is None; expected numbers"):
+        _ = Nothing().nq
+
+
 def test_quaternions_of_single_precision_are_taken() -> None:
     class Rounded(HapticMap):
         def pose(self, x):
