@@ -11,6 +11,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap, KernelMap
 from controllers.haptic_map.map_stages import kernels_of
+from controllers.haptic_map.own_map import own_map
 from sim.reference.reference import map_poses
 from tests.controllers.clips_for_maps import assert_same_compiled
 
@@ -174,6 +175,22 @@ def test_a_copy_of_a_map_that_ran_is_asked_itself(copied: Callable[[HapticMap], 
     np.testing.assert_array_equal(kernel_of(other, X, 0)[0], other.pose(X))
     np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
     assert getattr(other, "note", "kept") == "kept"
+
+
+def test_a_map_that_is_asked_elsewhere_meanwhile_gives_each_its_own_pose() -> None:
+    class Shared(Turned):
+        def jacobian(self, x, memory=None):
+            asked_of(params, -X)  # as another run of a sweep does in its thread
+            return super().jacobian(x)
+
+    def asked_of(params: np.ndarray, x: np.ndarray, rows: int = 0) -> np.ndarray:
+        pose = np.empty(11)
+        own_map(params, x, np.zeros(1), pose, np.empty((rows, 6)))
+        return pose
+
+    made = Shared()
+    params = made.compiled().params
+    np.testing.assert_array_equal(asked_of(params, X, 9), made.pose(X))
 
 
 def test_a_map_that_was_repaired_after_an_error_begins_anew() -> None:
