@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
@@ -170,7 +170,7 @@ class _Track:
         gap = odd[first] & (across < _BACK * lesser[first]) & ~self._returns(first, first + length + 1, lesser[first])
         return first[gap.any(axis=1)]
 
-    def _returns(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], lesser: Array) -> Array:
+    def _returns(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], lesser: Array) -> Mask:
         """Whether the motion goes back from `last` by the way it came to `first`, as when it is played there and back.
 
         The step before is no small part of the jump then, but as usual, and what is two steps apart agrees, too.
@@ -202,14 +202,14 @@ def _limits(measures: Array, own: int) -> Array:
     return _TIMES * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
 
 
-def _cuts(steps: Array, least: float) -> npt.NDArray[np.bool_]:
+def _cuts(steps: Array, least: float) -> Mask:
     """Which steps (n − 1, …) are large beside the usual ones and beside both that are next to them."""
     still = np.zeros_like(steps[:1])
     beside = np.maximum(np.concatenate((still, steps[:-1])), np.concatenate((steps[1:], still)))
     return (steps > least) & (steps > _limits(steps, 2)) & (steps > _TIMES * beside)
 
 
-def _indices(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+def _indices(chosen: Mask) -> tuple[int, ...]:
     return tuple(int(k) for k in np.flatnonzero(chosen))
 
 
@@ -235,7 +235,7 @@ def _moved_off(p: Array) -> Array:
     return _ways(p[1:-1], (p[:-2] + p[2:]) / 2.0)
 
 
-def _interpolated(motion: SourceMotion, broken: npt.NDArray[np.bool_]) -> SourceMotion:
+def _interpolated(motion: SourceMotion, broken: Mask) -> SourceMotion:
     """The motion with its broken frames on cubic splines through the frames beside them."""
     if not broken.any():
         return motion
