@@ -102,8 +102,8 @@ def reproduce(folder: Path) -> Reproduced:
     Raises
     ------
     SimError
-        If the folder holds no recording, the file of its map or the hand that it replays has changed, a person drove
-        the run live, or it is of a device or of a `Simulation` put together in Python.
+        If the folder holds no recording or a damaged one, the file of its map or the hand that it replays has changed,
+        a person drove the run live, or it is of a device or of a `Simulation` put together in Python.
     OSError
         If a file cannot be read.
     """
@@ -118,7 +118,13 @@ def reproduce(folder: Path) -> Reproduced:
         session = wire(config, clips_of(recording))
         servo, world = session.servo, session.world
         comparison = _Comparison(recording, channels(servo, world))
-        recorded_ticks = len(recording.channel("ticks", "t"))
+        recorded_ticks, recorded_frames = (len(recording.channel(group, "t")) for group in ("ticks", "frames"))
+        frames = -(-recorded_ticks // servo.figure_ticks)
+        if recorded_frames != frames:
+            raise SimError(
+                f"{recording.path}: damaged: it has {recorded_frames} frames; expected {frames} for {recorded_ticks} "
+                "ticks"
+            )
         Loop(servo, world, comparison).run(recorded_ticks * servo.plant.period)
     return Reproduced(not comparison.differences, recorded_ticks, comparison.differences, remarks)
 

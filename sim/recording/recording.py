@@ -173,6 +173,10 @@ class Recording:
             last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
         for name, node in nodes.items():
             n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
+            for key in (key for key in _names(node) if key not in RESERVED):
+                has = dataset_of(node, key).shape[0]
+                if has < rows[name] or (summary and has > rows[name]):  # a kill leaves rows that are not counted
+                    raise ValueError(f"{name}/{key} has {has} rows, {name}/rows says {rows[name]}")
             self.groups[name] = {
                 key: Channel(dataset_of(node, key), n, self.path) for key in _names(node) if key not in RESERVED
             }

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import tyro
@@ -241,6 +242,33 @@ def test_a_recording_that_is_cut_short_is_refused_at_once(
     said = refused([*reader, str(spoiled), *target], capsys)
     assert time.perf_counter() - began < 20.0
     assert "run.h5: not a recording, cut short: 200000 bytes of " in said
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader[0])
+def test_a_recording_that_lacks_rows_is_refused_with_the_channel(
+    reader: list[str], run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoiled = tmp_path / "run"
+    shutil.copytree(run, spoiled)
+    with h5py.File(spoiled / "run.h5", "r+") as file:
+        file["ticks/force"].resize(100, axis=0)
+    target = [str(tmp_path / "x.png")] if reader == ["picture"] else []
+    said = refused([*reader, str(spoiled), *target], capsys)
+    assert "run.h5: not a recording, or damaged (ticks/force has 100 rows, ticks/rows says 1000)" in said
+
+
+def test_a_recording_that_lacks_frames_is_not_the_same(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoiled = tmp_path / "run"
+    shutil.copytree(run, spoiled)
+    with h5py.File(spoiled / "run.h5", "r+") as file:
+        for name in ("t", "qpos"):
+            file["frames"][name].resize(100, axis=0)
+        file["frames/rows"][0] = 100
+    assert "run.h5: damaged: it has 100 frames; expected 500 for 1000 ticks" in refused(
+        ["reproduce", str(spoiled)], capsys
+    )
 
 
 def test_two_runs_do_not_write_into_one_folder(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

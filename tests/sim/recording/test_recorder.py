@@ -177,6 +177,25 @@ def test_rows_that_were_not_counted_are_not_read(tmp_path):
         assert recording.groups["ticks"]["p"].shape == (500, 3)
 
 
+@pytest.mark.parametrize(
+    ("alter", "message"),
+    [
+        (lambda file: file["ticks/p"].resize(100, axis=0), r"ticks/p has 100 rows, ticks/rows says 500"),
+        (lambda file: file["ticks/p"].resize(900, axis=0), r"ticks/p has 900 rows, ticks/rows says 500"),
+        (lambda file: file["ticks/rows"].__setitem__(0, 501), r"ticks/\w+ has 500 rows, ticks/rows says 501"),
+    ],
+)
+def test_a_whole_recording_whose_channels_have_other_lengths_than_it_says_is_damaged(tmp_path, alter, message):
+    path = tmp_path / "run.h5"
+    with Recorder(path, {}, 1, GROUPS, {}) as recorder:
+        recorder.append("ticks", block(0, 500))
+        recorder.close({"rms": 0.1})
+    with h5py.File(path, "r+") as file:
+        alter(file)
+    with pytest.raises(RecordingError, match=rf"run\.h5: not a recording, or damaged \({message}\); expected"):
+        Recording(path)
+
+
 def test_a_running_recording_can_be_read(tmp_path):
     with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
         recorder.append("ticks", block(0, 600))
