@@ -19,7 +19,7 @@ POINTS = 3000  # drawn points of a path, at most
 def crossing_rivers(runs: Path) -> Figure:
     """Figure 8: three rivers, the path of a hand in the colour of the river that has it, and the times of changes."""
     with Recording(recording_in(runs / RIVERS)) as recording:
-        drawn, changes = courses(recording.arrays | recording.texts), river_changes(recording)
+        drawn, changes = courses(recording.static), river_changes(recording)
         t, p, user, river = ticks(recording, 0.0, np.inf, "p", "user", "river")
     step = max(1, len(t) // POINTS)
     t, hand, river = t[::step], MILLIMETRES * p[::step], river[::step].astype(int)

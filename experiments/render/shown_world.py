@@ -99,7 +99,7 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
     """
     if of_device(recording):
         raise SimError(f"{recording.path}: is of a device, without the figure; expected the recording of a simulation")
-    kind = recording.texts.get("figure", "robot")
+    kind = recording.text("figure")
     scene = SceneConfig() if kind == "robot" else scene_of(recording)
     spec = {"robot": robot_spec, "none": device_spec}.get(kind, world_spec)(scene)
     if kind in ("physical", "kinematic"):
@@ -127,7 +127,7 @@ def mixed_with_white(color: str, white: float, opacity: float = 1.0) -> Rgba:
 def _draw_courses(spec: mujoco.MjSpec, recording: Recording) -> None:
     """Every curve as a thin rod, in its tube."""
     radius = drawn_tube(recording)
-    for k, course in enumerate(courses(recording.arrays | recording.texts)):
+    for k, course in enumerate(courses(recording.static)):
         looks = [("curve", CURVE_RADIUS, mixed_with_white(course.line, 0.0))]
         looks += [("tube", radius, mixed_with_white(course.tube, 0.0, TUBE_OPACITY))] * (radius > 0.0)
         for name, thickness, color in looks:

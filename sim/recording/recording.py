@@ -11,7 +11,7 @@ Other programs can open the file of a killed run with ``h5py.File(path, "r", swm
 
 import json
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 import h5py
 import numpy as np
@@ -20,6 +20,7 @@ from controllers.state import Array
 from sim.errors import SimError
 from sim.recording.unclosed import AsClosed, has_writer, superblock
 
+_T = TypeVar("_T")
 RESERVED = frozenset({"rows", "rate"})
 """Names in a group that are not channels."""
 
@@ -100,6 +101,17 @@ class Channel:
             raise RecordingError(f"{where}: {self._dataset.name} is damaged ({said})") from None
 
 
+class _Contents(dict[str, _T]):
+    """Contents of a recording by name; one that is missing is an error that names the file."""
+
+    def __init__(self, path: Path, kind: str):
+        super().__init__()
+        self._path, self._kind = path, kind
+
+    def __missing__(self, name: str) -> _T:
+        raise RecordingError(f"{self._path}: no {self._kind}{name}; there are {sorted(self)}")
+
+
 class Recording:
     """A recording, finished or not, opened for reading; also while it is still being written.
 
@@ -122,8 +134,10 @@ class Recording:
         The summary given to `Recorder.close`; None if the run did not end normally.
     arrays, texts : dict
         Data that is constant during the run (`static` of the `Recorder`), numeric and text.
+    static : dict
+        Both.
     groups : dict
-        For each group its channels by name.
+        For each group its channels by name. What is missing of these is a `RecordingError`.
     rates : dict
         For each group its rate [Hz].
 
@@ -154,8 +168,9 @@ class Recording:
         self.seed = int(dataset_of(file, "seed")[()])
         summary = bytes(dataset_of(file, "summary")[: dataset_of(file, "summary_bytes")[0]])
         self.summary: dict[str, object] | None = json.loads(summary) if summary else None
-        self.arrays: dict[str, Array] = {}
-        self.texts: dict[str, str] = {}
+        self.arrays: dict[str, Array] = _Contents(self.path, "array ")
+        self.texts: dict[str, str] = _Contents(self.path, "text ")
+        self.static: dict[str, Array | str] = _Contents(self.path, "array or text ")
         static = group_of(file, "static")
         for name in _names(static):
             value = dataset_of(static, name)[()]
@@ -163,7 +178,8 @@ class Recording:
                 self.texts[name] = value.decode()
             else:
                 self.arrays[name] = np.asarray(value, dtype=np.float64)
-        self.groups: dict[str, dict[str, Channel]] = {}
+        self.static.update({**self.arrays, **self.texts})
+        self.groups: dict[str, dict[str, Channel]] = _Contents(self.path, "group ")
         nodes = {name: node for name in _names(file) if isinstance(node := file[name], h5py.Group) and "rate" in node}
         self.rates = {name: float(dataset_of(node, "rate")[()]) for name, node in nodes.items()}
         rows = {name: int(dataset_of(node, "rows")[0]) for name, node in nodes.items()}
@@ -173,13 +189,13 @@ class Recording:
             last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
         for name, node in nodes.items():
             n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
+            self.groups[name] = _Contents(self.path, f"channel {name}/")
             for key in (key for key in _names(node) if key not in RESERVED):
-                has = dataset_of(node, key).shape[0]
+                channel = dataset_of(node, key)
+                has = channel.shape[0]
                 if has < rows[name] or (summary and has > rows[name]):  # a kill leaves rows that are not counted
                     raise ValueError(f"{name}/{key} has {has} rows, {name}/rows says {rows[name]}")
-            self.groups[name] = {
-                key: Channel(dataset_of(node, key), n, self.path) for key in _names(node) if key not in RESERVED
-            }
+                self.groups[name][key] = Channel(channel, n, self.path)
 
     def channel(self, group: str, name: str) -> Channel:
         """A channel that must have rows.
@@ -189,12 +205,10 @@ class Recording:
         RecordingError
             If there is no such channel, or it has no rows.
         """
-        channels = self.groups.get(group, {})
-        if name not in channels:
-            raise RecordingError(f"{self.path}: no channel {group}/{name}; {group} has {sorted(channels)}")
-        if len(channels[name]) == 0:
+        channel = self.groups[group][name]
+        if len(channel) == 0:
             raise RecordingError(f"{self.path}: {group}/{name} has no rows; the run ended before the first was written")
-        return channels[name]
+        return channel
 
     def array(self, name: str) -> Array:
         """An array of `static`, constant during the run.
@@ -204,8 +218,6 @@ class Recording:
         RecordingError
             If there is no array of that name.
         """
-        if name not in self.arrays:
-            raise RecordingError(f"{self.path}: no array {name}; there are {sorted(self.arrays)}")
         return self.arrays[name]
 
     def text(self, name: str) -> str:
@@ -216,8 +228,6 @@ class Recording:
         RecordingError
             If there is no text of that name.
         """
-        if name not in self.texts:
-            raise RecordingError(f"{self.path}: no text {name}; there are {sorted(self.texts)}")
         return self.texts[name]
 
     @property

@@ -126,7 +126,7 @@ class _Stage:
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
-        for k, course in enumerate(courses(recording.arrays | recording.texts)):
+        for k, course in enumerate(courses(recording.static)):
             self._draw_course(f"/curve/{k}", course, drawn_tube(recording))
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])

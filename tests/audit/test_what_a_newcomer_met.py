@@ -257,6 +257,20 @@ def test_a_recording_that_lacks_rows_is_refused_with_the_channel(
     assert "run.h5: not a recording, or damaged (ticks/force has 100 rows, ticks/rows says 1000)" in said
 
 
+@pytest.mark.parametrize(
+    ("lacks", "told"),
+    [("static/curve", "no array or text curve; there are"), ("ticks/p", "no channel ticks/p; there are")],
+)
+def test_what_a_recording_lacks_is_named(
+    lacks: str, told: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoiled = tmp_path / "run"
+    shutil.copytree(run, spoiled)
+    with h5py.File(spoiled / "run.h5", "r+") as file:
+        del file[lacks]
+    assert f"run.h5: {told}" in refused(["report", str(spoiled)], capsys)
+
+
 def test_a_recording_that_lacks_frames_is_not_the_same(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

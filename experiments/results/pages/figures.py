@@ -80,7 +80,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
-    drawn, path = courses(recording.arrays | recording.texts), 1e3 * _rows(recording, "ticks", "p")
+    drawn, path = courses(recording.static), 1e3 * _rows(recording, "ticks", "p")
     radius = 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)

@@ -86,7 +86,7 @@ def write_report(
 
 def _curves(recording: Recording, tube: str) -> str:
     """Legend of the replay: colours of the curve and its tube, or of each river, and a remark if the curve was bent."""
-    name, drawn = recording.texts.get("tube_name", "tube"), courses(recording.arrays | recording.texts)
+    name, drawn = recording.texts.get("tube_name", "tube"), courses(recording.static)
     if drawn[0].name:
         rivers = ", ".join(f'<b style="color:{course.line}">{html.escape(course.name)}</b>' for course in drawn)
         return f"The rivers, each in its {name}{tube}: {rivers}."

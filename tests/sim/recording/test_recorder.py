@@ -283,9 +283,9 @@ def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
     with Recording(tmp_path / "run.h5") as recording:
         assert len(recording.channel("ticks", "p")) == 5
         assert recording.array("curve") == [1.0]
-        with pytest.raises(RecordingError, match=r"no channel ticks/q; ticks has \['applied', 'p', 't'\]"):
+        with pytest.raises(RecordingError, match=r"no channel ticks/q; there are \['applied', 'p', 't'\]"):
             recording.channel("ticks", "q")
-        with pytest.raises(RecordingError, match=r"no channel pings/q; pings has \[\]"):
+        with pytest.raises(RecordingError, match=r"no group pings; there are \['frames', 'ticks'\]"):
             recording.channel("pings", "q")
         with pytest.raises(RecordingError, match=r"frames/t has no rows"):
             recording.channel("frames", "t")
@@ -293,6 +293,10 @@ def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
             recording.array("tube")
         with pytest.raises(RecordingError, match=r"no text title; there are \[\]"):
             recording.text("title")
+        with pytest.raises(RecordingError, match=r"run\.h5: no array or text river; there are \['curve'\]"):
+            recording.static["river"]
+        with pytest.raises(RecordingError, match=r"run\.h5: no channel ticks/q; there are"):
+            recording.groups["ticks"]["q"]
 
 
 def recorded(path, closed=True):
