@@ -1,7 +1,8 @@
 """``hvf certify``: what is certain of a field, a run, a map or a clip."""
 
 import sys
-from dataclasses import field, replace
+from collections.abc import Sequence
+from dataclasses import field, fields, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from controllers.certificates.report import Certificate, ChangedInputs
 from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
-from experiments.config.words import Options, RunOptions, config_of_options
+from experiments.config.words import Options, RunOptions, config_of_options, given_words
 from experiments.console.output import Json, say
 from experiments.console.progress import working
 from models.mocap.motion.clip import Clip
@@ -24,6 +25,12 @@ ASKED = "asked.json"
 """What a certificate was asked for with, beside it."""
 
 
+def _refuse(names: Sequence[str], beside: str, owner: str) -> None:
+    if names:
+        option = "--" + names[0].replace("_", "-")
+        raise ParameterError(f"{option} has no meaning with {beside}; it belongs to {owner}")
+
+
 @part
 class Command:
     """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
@@ -31,7 +38,7 @@ class Command:
     options: Options = field(default_factory=RunOptions)  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """The field."""
     run: Positional[Path | None] = None
-    """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
+    """Folder of a run, whose field and clips are certified, as they were recorded."""
     clip: str | None = None
     """Judge this motion instead of a field: a file, or the name of an embedded clip."""
     out: Path | None = None
@@ -58,6 +65,7 @@ class Command:
 
     def __call__(self) -> int:
         """Certify, or verify."""
+        self._refuse_idle()
         if self.verify is None:
             certificate = self._made()
         else:
@@ -71,6 +79,26 @@ class Command:
             lines.insert(0, f"{self.verify}: all that it is of is as it was")
         say(certificate.to_json(), self.json, lines)
         return 0
+
+    def _refuse_idle(self) -> None:
+        """Refuse what changes nothing beside a clip, a run, nobody's hand, or a field without clips."""
+        from experiments.setups.certified_law import of_clips
+
+        words = [*given_words(self.options)]
+        own = [name for name in ("delay", "hand_push", "no_hand") if getattr(self, name) != getattr(Command, name)]
+        hand = [f"hand.{f.name}" for f in fields(self.hand) if getattr(self.hand, f.name) != f.default]
+        if self.clip is not None:
+            if self.run is not None:
+                raise ParameterError(f"{self.run} has no meaning with --clip {self.clip}; certify one, then the other")
+            _refuse([*words, *own, *hand], f"--clip {self.clip}", "a field")
+        if self.run is not None:
+            _refuse(words, f"a run, whose field is as recorded in {self.run}", "a field without a run")
+        if self.no_hand:
+            _refuse(hand, "--no-hand", "a hand on the stylus")
+        if self.clip is None and self.run is None and not of_clips(config_of_options(self.options)):
+            judging = fields(self.tolerance)
+            judged = [f"tolerance.{f.name}" for f in judging if getattr(self.tolerance, f.name) != f.default]
+            _refuse([*judged, *["friction"] * (self.friction != Judging.friction)], "a field alone", "clips")
 
     def _hands(self) -> HandRange:
         return NO_HANDS if self.no_hand else self.hand

@@ -300,6 +300,13 @@ Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="r
 """The same for a command that has them among its own."""
 
 
+def given_words(options: object) -> dict[str, Any]:
+    """Options that are given, by name."""
+    given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
+    # A zero is given, although it equals False.
+    return {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
+
+
 def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingProxyType({})) -> RunConfig:
     """The configuration that options ask for; those that are given change the one of ``--config``, or else `otherwise`.
 
@@ -308,9 +315,7 @@ def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingPro
     ParameterError, SimError
         As `run_config`, or if the file holds no configuration.
     """
-    given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
-    # A zero is given, although it equals False.
-    given = {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
+    given = given_words(options)
     file = given.pop("config", None)
     return run_config(**(dict(otherwise) | given)) if file is None else changed(load_config(cast(Path, file)), given)
 

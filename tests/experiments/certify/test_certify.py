@@ -127,6 +127,31 @@ def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
     assert "at least 0" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            "runs/demo --stiffness 500",
+            "--stiffness has no meaning with a run, whose field is as recorded in runs/demo; ",
+        ),
+        ("runs/demo --config my.json", "--config has no meaning with a run, whose field is as recorded in runs/demo; "),
+        ("runs/demo --clip walk", "runs/demo has no meaning with --clip walk; certify one, then the other"),
+        ("--clip walk --map m.npz", "--map has no meaning with --clip walk; it belongs to a field"),
+        ("--clip walk --mode lead", "--mode has no meaning with --clip walk; it belongs to a field"),
+        ("--clip walk --no-hand", "--no-hand has no meaning with --clip walk; it belongs to a field"),
+        ("--clip walk --hand.mass 0 1", "--hand.mass has no meaning with --clip walk; it belongs to a field"),
+        ("--clip walk --delay 0.001", "--delay has no meaning with --clip walk; it belongs to a field"),
+        ("--no-hand --hand.mass 0 1", "--hand.mass has no meaning with --no-hand; it belongs to a hand on the stylus"),
+        ("--stiffness 500 --friction 0.5", "--friction has no meaning with a field alone; it belongs to clips"),
+        ("--tolerance.yaw 1", "--tolerance.yaw has no meaning with a field alone; it belongs to clips"),
+    ],
+)
+def test_what_a_certificate_does_not_depend_on_is_refused_by_name(asked, said, tmp_path, capsys):
+    assert main(["certify", *asked.split(), "--out", str(tmp_path / "out")]) == 2
+    assert f"hvf: {said}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_is_said():
     point = certified_rivers(run_config(mode="bunny"))[""]
     along = certified_rivers(run_config(mode="bunny", bunny_attraction="along"))[""]
