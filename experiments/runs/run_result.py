@@ -14,7 +14,7 @@ from rich.console import Console
 
 from controllers.checks import of_kind
 from controllers.state import Array
-from experiments.config.keywords import keywords
+from experiments.config.keywords import in_keywords, keywords
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.given_path import given_path
@@ -34,7 +34,7 @@ from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations
 from experiments.setups.session import Session
-from models.errors import ModelError
+from models.mocap.library import check_target
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -142,13 +142,14 @@ class Run:
         """Channels at the rate of the figure's control."""
         return Channels(self, "frames")
 
+    @in_keywords(overwrite="overwrite=True")
     def to_bvh(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write the animation as the hand made it.
 
         Raises
         ------
         ModelError
-            If the file exists and is not to be overwritten.
+            If the name does not end in .bvh, or the file exists and is not to be overwritten.
         SimError
             If the run has no figure.
         """
@@ -156,8 +157,7 @@ class Run:
         of_kind("overwrite", overwrite, bool)
         if not self._session.world.has_figure:
             raise SimError("the run has no figure, and so no animation; expected a run of a figure")
-        if target.exists() and not overwrite:
-            raise ModelError(f"{target} exists and is left as it is; expected a new name, or overwrite=True")
+        check_target(target, overwrite)
         if not (self.folder / EDITED).exists():
             write_animations(self.folder, self._session)
         target.parent.mkdir(parents=True, exist_ok=True)

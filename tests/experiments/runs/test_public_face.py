@@ -353,6 +353,17 @@ def test_a_run_without_a_figure_has_no_animation_to_write(tmp_path: Path) -> Non
     assert not list(tmp_path.iterdir())
 
 
+def test_an_animation_is_written_into_a_bvh_alone(tmp_path: Path) -> None:
+    session = simulation(level, figure=hvf.Figure(kind="kinematic")).session()
+    run = hvf.Run(tmp_path, None, session)  # pyright: ignore[reportArgumentType] - has not run: nothing is measured
+    with pytest.raises(hvf.ModelError, match=r"y\.glb: only .*BVH can be written; expected a name that ends in \.bvh"):
+        run.to_bvh(tmp_path / "y.glb")
+    (tmp_path / "mine.bvh").write_text("mine")
+    with pytest.raises(hvf.ModelError, match="is left as it is; expected a new name, or overwrite=True"):
+        run.to_bvh(tmp_path / "mine.bvh")
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.bvh"]
+
+
 def test_what_is_printed_of_a_field_and_of_a_certificate_is_read_at_a_glance() -> None:
     field = (0.5 * hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)
     said = repr(field)
