@@ -1,6 +1,6 @@
 """The ``hvf`` command: haptic vector fields from the command line."""
 
-from experiments.console import startup  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
+from experiments.console import startup  # before NumPy is imported
 
 # isort: split
 
@@ -10,6 +10,7 @@ import io
 import itertools
 import os
 import re
+import signal
 import sys
 from collections.abc import Sequence
 from functools import reduce
@@ -52,6 +53,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     command: Any = None
     try:
         command = parsed(words)
+        if signal.getsignal(signal.SIGINT) is startup.stop_early:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return command()
     except BrokenPipeError:
         raise

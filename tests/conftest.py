@@ -5,6 +5,7 @@ processor time. A run compiles its kernels as parts of a few units; a test that 
 anew in each process: such kernels are kept on disk between processes, as units are.
 """
 
+import signal
 import warnings
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from sim.compilation import kept_call
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache
 from sim.compilation.unit_key import UnknownIngredient, UnknownName
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # pytest's own, in place of the start-up's
 
 # The same examples in every run.
 settings.register_profile("the same", derandomize=True)

@@ -1,9 +1,10 @@
 """Start time of the program and settings of the environment that must be made before NumPy and MuJoCo are imported."""
 
 import os
+import signal
 import sys
 import time
-from types import TracebackType
+from contextlib import suppress
 
 for _number in range(3):  # a file that is opened later would take the place of a closed stream, and get what is printed
     try:
@@ -13,15 +14,15 @@ for _number in range(3):  # a file that is opened later would take the place of 
 sys.stdout, sys.stderr = sys.stdout or open(os.devnull, "w"), sys.stderr or open(os.devnull, "w")  # noqa: SIM115
 
 
-def _stopped_early(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Say in a line that the program was interrupted while it was still importing; the exit code is the signal's."""
-    if issubclass(kind, KeyboardInterrupt):
-        print("hvf: stopped; nothing is left half done", file=sys.stderr)
-    else:
-        sys.__excepthook__(kind, error, trace)
+def stop_early(*_: object) -> None:
+    """Handler of an interrupt while the program is still importing: an exception would end as any other in there."""
+    os.write(2, b"hvf: stopped; nothing is left half done\n")
+    os._exit(130)
 
 
-sys.excepthook = _stopped_early
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where the shell has it ignored
+    with suppress(ValueError):  # of another thread than the main one
+        signal.signal(signal.SIGINT, stop_early)
 STARTED = time.perf_counter()
 """Start of the program on `time.perf_counter` [s], from which the time to the first tick is measured."""
 # The matrices are small, so that BLAS threads only slow each other down. NumPy reads this when it is imported.
