@@ -5,6 +5,7 @@ import signal
 import sys
 import time
 from contextlib import suppress
+from ctypes.util import find_library
 
 for _number in range(3):  # a file that is opened later would take the place of a closed stream, and get what is printed
     try:
@@ -28,6 +29,16 @@ STARTED = time.perf_counter()
 # The matrices are small, so that BLAS threads only slow each other down. NumPy reads this when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 _GRAPHICS = {"", "0", "1", "cgl", "disable", "egl", "enable", "false", "glfw", "off", "on", "osmesa", "true", "wgl"}
-# MuJoCo fails to import with any other value; rendering chooses its own backend (`experiments.render.graphics`).
-if os.environ.get("MUJOCO_GL", "").lower().strip() not in _GRAPHICS:
+_LIBRARIES = {"egl": ("EGL", "libegl1 libgl1-mesa-dri"), "osmesa": ("OSMesa", "libosmesa6")}
+# MuJoCo fails to import with other values or without the library; rendering chooses its own backend
+# (`experiments.render.graphics`).
+_asked = os.environ.get("MUJOCO_GL", "").lower().strip()
+_library, _package = _LIBRARIES.get(_asked, ("", ""))
+if _asked not in _GRAPHICS:
     print(f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, which MuJoCo does not know: left out", file=sys.stderr)
+elif _library and find_library(_library) is None:
+    print(
+        f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, and lib{_library} is not on this machine: left out; "
+        f"unset it, or apt-get install {_package}",
+        file=sys.stderr,
+    )

@@ -205,6 +205,19 @@ def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
     assert ended.returncode == 130
 
 
+def test_a_library_that_mujoco_gl_asks_for_in_vain_is_named_and_done_without() -> None:
+    code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
+    code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"MUJOCO_GL": "osmesa"}, capture_output=True, text=True,
+        check=True, timeout=60,
+    )  # fmt: skip
+    assert ended.stderr.splitlines()[0] == (
+        "MUJOCO_GL is 'osmesa', and libOSMesa is not on this machine: left out; unset it, or apt-get install libosmesa6"
+    )
+    assert ended.stdout.endswith("None\n")
+
+
 @pytest.mark.parametrize(
     ("command", "implementation"),
     [(["arm"], "runs.run.run"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
