@@ -23,6 +23,7 @@ from experiments.config.run_config import (
     PERSONAL,
     Clock,
     Figure,
+    FigureKind,
     Phantom,
     Replay,
     RunConfig,
@@ -147,6 +148,8 @@ def run_config(
         map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
     if mode != "lead" and user and user not in _USERS:
         raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
+    if figure not in get_args(FigureKind):
+        raise ParameterError(f"--figure is {figure!r}; expected {', '.join(get_args(FigureKind))}")
     _refuse_idle(given, mode, "robot" if map_cls is RobotArm else figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
     taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))

@@ -56,6 +56,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--servo-period", "nan"], "--servo-period is nan; expected more than 0 s, and finite"),
         (["--stature", "9"], "stature"),
         (["--mass", "1"], "mass"),
+        (["--figure", "ghost"], "hvf: --figure is 'ghost'; expected physical, kinematic, none\n"),
         (["--clips", "moonwalk"], "squat_dance"),
         (["--clips", "no/such/file.bvh"], "no/such/file.bvh"),
         (["--clips", *["cheer"] * 5], "1 to 4"),
