@@ -138,6 +138,9 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
             raise ParameterError(f"nothing is given behind {option}; expected a value")
+    for word, behind in itertools.pairwise([*words, "--"]):
+        if word == "--clips" and behind.startswith("--"):  # tyro takes it for the default ones
+            raise ParameterError("nothing is given behind --clips; expected one or more names")
 
 
 def _with_axes(words: Sequence[str]) -> list[str]:

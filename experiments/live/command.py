@@ -5,10 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from controllers.errors import ParameterError
+from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig, phantom_of
+from experiments.files.map_files import load_figure_map
 from experiments.live.gate import HERE, Gate
 from experiments.live.page import Page
 from experiments.live.panels.run_panel import FOR_EVER
+from experiments.setups.parts.clips import load_clips
 from sim.errors import SimError
 
 LEAST_TOKEN = 16  # [characters] of a given token, so that it cannot be guessed
@@ -33,6 +36,8 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     ParameterError
         If the token is too easily guessed, the run has no figure to show, or a simulated user or a replayed hand of its
         own.
+    ModelError
+        If there is no such clip, or a file cannot be read.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
@@ -44,6 +49,11 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     token = token_for(host, given)
     if out.exists() and not out.is_dir():
         raise SimError(f"{out}: is a file; expected a folder for takes and clips")
+    # The page reads them again in its process, where an error would be seen in a browser alone.
+    if isinstance(config.map, MapFile):
+        load_figure_map(Path(config.map.file))
+    else:
+        load_clips(config.map.clips, raw=True)
     page = Page(replace(config, seconds=FOR_EVER), out, port=0)
     try:
         gate = Gate(host, port, page.port, token)
