@@ -180,6 +180,13 @@ def turning_remark(user: User, oriented: bool) -> tuple[str, ...]:
     return ()
 
 
+def late_remark(user: User, seconds: float) -> tuple[str, ...]:
+    """Remark, if all pushes lie after the end of a run of this duration [s]."""
+    first = min((push.at for push in user.pushes), default=0.0)
+    late = f"the first push is at {first:g} s, after the run's end; give --seconds more than that"
+    return (late,) if first >= seconds else ()
+
+
 def edited_until(grabs: tuple[Grab, ...]) -> float:
     """End of all grabs and the pause after them [s]."""
     return max((grab.end for grab in grabs), default=0.0) + PAUSE
