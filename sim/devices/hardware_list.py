@@ -205,8 +205,8 @@ def check_there(name: str) -> None:
     """
     kind, _, rest = name.partition(":")
     looks: dict[str, Callable[[], object]] = {
-        "hid": lambda: _the_one(rest, "phantom"), "hidraw": lambda: _the_one(rest, "phantom"),
-        "spacemouse": lambda: _the_one(rest, "spacemouse"), "hdapi": HDAPI.path, "dhd": DHD.path,
+        "hid": lambda: _the_one(rest, "phantom", name), "hidraw": lambda: _the_one(rest, "phantom", name),
+        "spacemouse": lambda: _the_one(rest, "spacemouse", name), "hdapi": HDAPI.path, "dhd": DHD.path,
     }  # fmt: skip
     if kind not in looks or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
         raise SimError(f"no device is called {name!r}; {_what_there_is()}")
@@ -215,28 +215,27 @@ def check_there(name: str) -> None:
 
 def _what_there_is() -> str:
     names = [device.name for device in found_devices() if device.name]
-    kinds = "expected hid:SERIAL, hidraw:PATH, spacemouse, hdapi[:NAME] or dhd"
+    kinds = "expected hid[:SERIAL], hidraw:PATH, spacemouse[:PATH], hdapi[:NAME] or dhd"
     return f"{kinds}; found here: {', '.join(names) if names else 'none'}"
 
 
-def _the_one(which: str, kind: str) -> FoundDevice:
-    """The device of a kind with a given serial number or path; if `which` is empty, the only one of that kind."""
+def _the_one(which: str, kind: str, name: str) -> FoundDevice:
+    """The device of a kind with a given serial number or path; if `which` is empty, the only one; `name`: as asked."""
     there = found_devices()
     for device in there:
         if which and which in (device.serial, device.path) and device.kind != kind:
             raise SimError(f"{which} is {device.product or 'a device'}, no {kind}: {device.note}")
     fitting = [device for device in there if device.kind == kind and which in ("", device.serial, device.path)]
     if len(fitting) != 1:
-        asked = f"{kind} {which}" if which else kind
-        raise SimError(f"there are {len(fitting)} devices for {asked!r}; {_what_there_is()}")
+        raise SimError(f"{len(fitting) or 'no'} devices are connected for {name!r}; {_what_there_is()}")
     return fitting[0]
 
 
 def _open_phantom(which: str) -> Driver:
-    device = _the_one(which, "phantom")
+    device = _the_one(which, "phantom", f"hid:{which}")
     return HidPhantom(open_node(device.path), device.path)
 
 
 def _open_spacemouse(which: str) -> Driver:
-    device = _the_one(which, "spacemouse")
+    device = _the_one(which, "spacemouse", f"spacemouse:{which}")
     return SpaceMouse(open_hid(device.path), device.product, device.path)
