@@ -1,6 +1,7 @@
 """Writes a film as H.264 or GIF by ffmpeg; the file gets its name only when it is complete."""
 
 from collections.abc import Generator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -68,11 +69,13 @@ class FilmFile:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        self._pen.close()
         if kind is None:
+            self._pen.close()
             self._part.replace(self._target)
-        else:
-            self._part.unlink(missing_ok=True)
+            return
+        with suppress(KeyboardInterrupt):  # at which ffmpeg is killed, before it tells of a film without frames
+            self._pen.throw(KeyboardInterrupt)
+        self._part.unlink(missing_ok=True)
 
 
 def _pen(file: Path, width: int, height: int, fps: float) -> Generator[None, Any, None]:

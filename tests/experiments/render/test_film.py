@@ -189,20 +189,25 @@ def test_sizes_and_rates_that_make_no_film_are_refused(wrong: dict[str, float]) 
         Film(**wrong)  # pyright: ignore[reportArgumentType]
 
 
-def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("frames", [0, 1])
+def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(
+    frames: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("imageio_ffmpeg")
     film = tmp_path / "film.mp4"
     film.write_bytes(b"the old one")
 
     def stopped() -> None:
         with FilmFile(film, 160, 120, 10.0) as file:
-            file.add(np.zeros((120, 160, 3), dtype=np.uint8))
+            for _ in range(frames):
+                file.add(np.zeros((120, 160, 3), dtype=np.uint8))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         stopped()
     assert film.read_bytes() == b"the old one"
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
+    assert capfd.readouterr() == ("", "")  # not a word of ffmpeg's
 
 
 def _hear() -> None:
