@@ -1,5 +1,6 @@
 """Storage of a search, from which it can be continued: a journal file, or a database by SQLAlchemy."""
 
+import json
 from pathlib import Path
 
 import optuna
@@ -19,13 +20,22 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
     Raises
     ------
     StudyError
-        If the file cannot be written, or the database cannot be reached.
+        If the file cannot be written or is something else, or the database cannot be reached.
     """
     if "://" not in str(where):
         try:
+            with open(where, "a+b") as file:
+                file.seek(0)
+                first = file.readline()
+            if first and "op_code" not in json.loads(first):  # a line alone, whatever it says, Optuna takes for torn
+                raise ValueError
             return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
         except OSError as error:
             raise StudyError(f"{where}: {error.strerror}; expected a file that can be written") from None
+        except (ValueError, TypeError, KeyError):
+            raise StudyError(
+                f"{where}: is no journal of a search, and is left as it is; expected a new file, or that of a search"
+            ) from None
     try:
         return optuna.storages.RDBStorage(str(where))
     except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer

@@ -109,6 +109,16 @@ def test_a_search_in_a_database_is_that_of_a_journal_and_goes_on(tmp_path: Path)
     assert searched(tuning(candidates=5, storage=kept), tmp_path / "database") == whole
 
 
+@pytest.mark.parametrize("text", ["root:x:0:0\nme:x:1:1\n", "a line", "[1, 2]\n", "5\n", '{"a": 1}\n'])
+def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine"
+    file.write_text(text)
+    with pytest.raises(StudyError, match="mine: is no journal of a search, and is left as it is; expected a new file"):
+        storage_of(file)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert file.read_text() == text
+
+
 def test_a_database_that_does_not_answer_is_a_line() -> None:
     for url in ("nosuch://host/base", "sqlite:////no/such/folder/tune.db"):
         with pytest.raises(StudyError, match="no storage for a search") as raised:
