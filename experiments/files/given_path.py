@@ -12,9 +12,11 @@ def given_path(name: str, value: str | Path) -> Path:
     Raises
     ------
     ParameterError
-        If it is neither text nor a path, or is empty.
+        If it is neither text nor a path, is empty, or has a null character.
     """
     of_kind(name, value, str | Path)
     if not str(value):
         raise ParameterError(f"{name} is empty; expected a path")
+    if "\0" in str(value):
+        raise ParameterError(f"{name} is {str(value)!r}; expected a path without a null character")
     return Path(value)

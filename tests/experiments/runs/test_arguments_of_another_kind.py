@@ -74,6 +74,7 @@ def test_a_value_of_another_kind_is_refused_by_name(make: Any, name: str) -> Non
         (lambda: SIM.run("3"), "seconds is '3'; expected a number"),  # pyright: ignore
         (lambda: SIM.run(nan), "a run of nan s; expected 0.004 s or more, and finite"),
         (lambda: SIM.run(3.0, record=3), "record is 3; expected text or Path"),  # pyright: ignore
+        (lambda: SIM.run(3.0, record="a\0b"), "record is 'a\\x00b'; expected a path without a null character"),
         (lambda: SIM.session(-1.0), "seconds is -1; expected more than 0 s, and finite"),
         (lambda: SIM.session(inf), "seconds is inf; expected more than 0 s, and finite"),
         (lambda: hvf.sweep(SIM, {"field.k_r": 300}), "field.k_r is 300; expected a sequence"),  # pyright: ignore
