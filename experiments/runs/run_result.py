@@ -181,6 +181,12 @@ class Run:
             columns |= {name + suffix: rows[:, i] for i, suffix in enumerate(suffixes)}
         return pandas.DataFrame(columns).set_index("t")
 
+    def __reduce__(self) -> str:
+        raise SimError(
+            "a run holds what is compiled in this process, and is not pickled; expected its summary, "
+            "arrays of its channels, or the folder that record says"
+        )
+
     def __str__(self) -> str:
         return "\n".join([*self.remarks, *self.summary.lines()])
 

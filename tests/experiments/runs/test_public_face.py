@@ -1,5 +1,6 @@
 """The public face: parts that are put together from Python, numbers that are swept, fields that are certified."""
 
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -351,6 +352,13 @@ def test_a_run_without_a_figure_has_no_animation_to_write(tmp_path: Path) -> Non
     with pytest.raises(hvf.SimError, match="the run has no figure, and so no animation; expected a run of a f"):
         run.to_bvh(tmp_path / "mine.bvh")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_is_not_pickled_and_says_what_is() -> None:
+    session = simulation(level, figure=hvf.Figure(kind="kinematic")).session()
+    run = hvf.Run(Path("runs"), None, session)  # pyright: ignore[reportArgumentType] - has not run
+    with pytest.raises(hvf.SimError, match="is not pickled; expected its summary, arrays of its channels, or"):
+        pickle.dumps(run)
 
 
 def test_an_animation_is_written_into_a_bvh_alone(tmp_path: Path) -> None:
