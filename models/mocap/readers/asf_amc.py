@@ -66,7 +66,7 @@ def read_amc(path: Path) -> SourceMotion:
         If either file is malformed, or no skeleton is found.
     """
     skeleton = _read_asf(_skeleton_path(path))
-    degrees, frames = _read_frames(path, skeleton)
+    degrees, frames, remarks = _read_frames(path, skeleton)
     joints = ["root", *skeleton.parents]
     parents = tuple(joints.index(skeleton.parents[joint]) if joint in skeleton.parents else -1 for joint in joints)
     tips = np.array([np.multiply(skeleton.bones[joint].direction, skeleton.bones[joint].length) for joint in joints])
@@ -85,7 +85,9 @@ def read_amc(path: Path) -> SourceMotion:
             if freedom in values:
                 translations[:, index, axis] += values[freedom]
     unit = _INCH / skeleton.length_unit
-    return SourceMotion(path, tuple(joints), parents, offsets, tips, rotations, translations, FPS, unit, timed=False)
+    return SourceMotion(
+        path, tuple(joints), parents, offsets, tips, rotations, translations, FPS, unit, timed=False, remarks=remarks
+    )
 
 
 def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array:
@@ -108,7 +110,8 @@ def _skeleton_path(path: Path) -> Path:
     others = sorted(path.parent.glob("*.asf"))
     if len(others) == 1:
         return others[0]
-    raise MotionFileError(path, 0, "its skeleton is not beside it", f"{names[0].name} or {names[1].name}")
+    expected = " or ".join(dict.fromkeys(name.name for name in names))
+    raise MotionFileError(path, 0, "its skeleton is not beside it", expected)
 
 
 def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -226,8 +229,8 @@ def _read_children(skeleton: _Skeleton, fields: list[str], path: Path, line: int
         skeleton.parents[child] = parent
 
 
-def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
-    """Whether angles are in degrees, and the frames: one row each, the freedoms of all bones in the joints' order."""
+def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array, tuple[str, ...]]:
+    """Whether angles are in degrees, the frames, and remarks; a frame is a row of all freedoms in the joints' order."""
     moving = {name: skeleton.bones[name] for name in ("root", *skeleton.parents) if skeleton.bones[name].freedoms}
     degrees, values = True, array("d")
     shown: list[int] = []  # the numbers of the frames
@@ -255,7 +258,16 @@ def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
     if not shown:
         raise MotionFileError(path, line, "no frames", "frame numbers, each followed by its bones")
     _append(values, row, first, moving, path, begin)
-    return degrees, np.array(values).reshape(len(shown), -1)
+    remarks = tuple(_absent([name for name in moving if name not in first]))
+    return degrees, np.array(values).reshape(len(shown), -1), remarks
+
+
+def _absent(names: list[str]) -> Iterator[str]:
+    """Remark on bones that no frame mentions."""
+    if names:
+        told = ", ".join(map(quoted, names[:8])) + (", …" if len(names) > 8 else "")
+        has, are = ("has", "it is") if len(names) == 1 else ("have", "they are")
+        yield f"{told} {has} no values in any frame: {are} taken as not turned"
 
 
 def _frame_number(word: str, shown: list[int], path: Path, line: int) -> int:

@@ -177,6 +177,7 @@ def test_a_wrong_amc_is_told_in_one_line(tmp_path, kind):
 
 def test_an_amc_without_skeleton_says_which_file_it_wants(tmp_path):
     assert "1_1.asf or 1.asf" in refusal(tmp_path, {"1_1.amc": AMC})
+    assert refusal(tmp_path, {"amc.amc": AMC}).endswith("; expected amc.asf")
 
 
 def changed_row(index, value):

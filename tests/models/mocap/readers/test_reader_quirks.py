@@ -243,7 +243,9 @@ def test_amc_frames_may_be_numbered_from_anywhere_at_any_constant_step(tmp_path)
 def test_a_bone_that_no_amc_frame_mentions_is_not_turned(tmp_path):
     asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
     amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25").replace("thigh 15 -25\n", "")
-    np.testing.assert_allclose(read_acclaim(tmp_path, asf, amc).rotations[:, 1], [[1, 0, 0, 0]] * 2, atol=1e-12)
+    motion = read_acclaim(tmp_path, asf, amc)
+    np.testing.assert_allclose(motion.rotations[:, 1], [[1, 0, 0, 0]] * 2, atol=1e-12)
+    assert motion.remarks == ("'thigh' has no values in any frame: it is taken as not turned",)
 
 
 def deepmimic_row(duration, x, turn):
