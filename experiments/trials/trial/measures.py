@@ -1,7 +1,7 @@
 """Measures of a trial: accuracy, smoothness and effort of the hand, and their effect on the figure.
 
-Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that; that of the figure
-begins with the trial.
+Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that;
+that of the figure begins with the trial.
 """
 
 import math
