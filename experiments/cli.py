@@ -55,6 +55,10 @@ def _run(arguments: Sequence[str] | None) -> int:
         command = parsed(words)
         if signal.getsignal(signal.SIGINT) is startup.stop_early:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+        import mujoco  # the words of the commands are told without it
+
+        # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a summary has their counts.
+        mujoco.set_mju_user_warning(lambda warning: None)
         return command()
     except BrokenPipeError:
         raise

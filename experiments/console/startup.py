@@ -21,7 +21,8 @@ def stop_early(*_: object) -> None:
     os._exit(130)
 
 
-if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where the shell has it ignored
+# Not where the shell has it ignored, nor in a process of this program's own, in which this is imported late.
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler and "multiprocessing" not in sys.modules:
     with suppress(ValueError):  # of another thread than the main one
         signal.signal(signal.SIGINT, stop_early)
 STARTED = time.perf_counter()

@@ -38,14 +38,6 @@ BodyKind: TypeAlias = Literal[FigureKind, "robot"]
 _FIRST_JOINTS: dict[BodyKind, str] = {"physical": FIGURE + "root", "robot": ROBOT + ARM_JOINTS[0]}
 
 
-def _only_counted(warning: str) -> None:
-    """Do nothing: MuJoCo would print a warning and write it to MUJOCO_LOG.TXT; `World.warnings` has its count."""
-
-
-if mujoco.get_mju_user_warning() is None:
-    mujoco.set_mju_user_warning(_only_counted)
-
-
 @dataclass(frozen=True)
 class World:
     """One MuJoCo model with Phantom and figure or robot arm, and its state.

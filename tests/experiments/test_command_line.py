@@ -206,6 +206,22 @@ def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
     assert ended.returncode == 130
 
 
+def test_a_warning_of_mujocos_is_counted_by_a_command_and_left_to_the_user_of_the_library(tmp_path: Path) -> None:
+    """A command neither prints it nor writes MuJoCo's log into the user's folder."""
+    code = (
+        "import hvf, mujoco; print(mujoco.get_mju_user_warning())\nfrom experiments.cli import main; main(['clips'])\n"
+    )
+    code += "from sim.world.world import World; world = World(kind='none'); world.data.qvel[:] = 1e30\n"
+    code += "mujoco.mj_checkVel(world.model, world.data); print(world.warnings())"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(Path.cwd())},
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert (ended.stdout.splitlines()[0], ended.stdout.splitlines()[-1]) == ("None", "{'badqvel': 1}")
+    assert ended.stderr == ""
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_library_that_mujoco_gl_asks_for_in_vain_is_named_and_done_without() -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
     code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
