@@ -45,6 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
 
 
+def _counted_only(warning: str) -> None:
+    """Do nothing at a warning of MuJoCo's, which counts it."""
+
+
 def _run(arguments: Sequence[str] | None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words in ([], ["--version"]):
@@ -58,7 +62,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         import mujoco  # the words of the commands are told without it
 
         # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a summary has their counts.
-        mujoco.set_mju_user_warning(lambda warning: None)
+        mujoco.set_mju_user_warning(_counted_only)
         return command()
     except BrokenPipeError:
         raise
