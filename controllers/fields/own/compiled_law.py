@@ -90,6 +90,11 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
             f"{place_of(function)} returns {given}; expected a tuple of three numbers, the force [N], or of six, "
             "with the moment [N m]"
         )
+    if len(given) == 6 and _count_in_python(function) == 3:  # pyright: ignore[reportUnknownArgumentType]
+        raise ParameterError(
+            f"{place_of(function)} gives six numbers compiled and three in Python: vectors of a hand are tuples in a "
+            "compiled law, which + joins; expected sums of their components"
+        )
     write, numbers_of = _write_force if len(given) == 3 else _write_wrench, _reader(count)
 
     @njit
@@ -97,6 +102,14 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
         write(wrench, compiled(hand_state(hand), *numbers_of(params, at)))
 
     return own_law
+
+
+def _count_in_python(function: Callable[..., Any]) -> int | None:
+    """How many numbers a function gives of a hand whose vectors are arrays; None if it raises."""
+    try:
+        return int(np.size(function(HandState.at(np.full(3, 0.01), np.full(3, 0.01), 0.0))))
+    except Exception:  # whatever it does not do outside compiled code
+        return None
 
 
 def _reason(said: str) -> str:

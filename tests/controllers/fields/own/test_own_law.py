@@ -241,6 +241,7 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
         (lambda: law(compiled=True)(lambda hand: (0, 0)), "expected a tuple of three numbers"),
         (lambda: law(compiled=True)(lambda hand: np.zeros(3)), r"returns array\(float64, 1d, C\); expected a tuple"),
         (lambda: law(compiled=True)(lambda hand: ("a", 0, 0)), "expected a tuple of three numbers"),
+        (lambda: law(compiled=True)(lambda hand: hand.p + hand.v), "gives six numbers compiled and three in Python"),
         (lambda: law(compiled=True)(lambda hand: (hand.x, 0, 0)), r"law <lambda> \(.*line \d+\) cannot be compiled"),
         (
             lambda: law(compiled=True)(lambda hand: (hand.x, 0, 0)),
