@@ -26,8 +26,8 @@ from sim.body.stance import N_LEG, cross_add
 _CLOSENESS = 300.0  # κ [1/m²]: within 1 % of the displacement, and δ stays bounded where a leg is straight
 _ASIDE, _UNDER = 0.5, 0.9
 """Cosines of the angle between the line from root to foot and the plumb line at which placement begins and is full.
-Without this fading the residual of snu/backflip, as it was read then, is 8.7 % of weight, with it 8.1 (no placement:
-8.2), that of jumping 5.4 and 7.0 (12.6)."""
+As captures were read then, the residual of snu/backflip is 8.7 % of weight without this fading, with it 8.1 (no
+placement: 8.2), that of jumping 5.4 and 7.0 (12.6)."""
 
 
 @njit
