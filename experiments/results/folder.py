@@ -43,7 +43,7 @@ def check_holds(out: Path, overwrite: bool) -> None:
     if (out / RECORDING).exists():
         raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
     if taken := [name for name in (*_FILES, FIGURES) if (out / name).exists()]:
-        raise SimError(f"{out}: holds {', '.join(taken)}, not of a run; choose another --out, or --overwrite them")
+        raise SimError(f"{out}: holds {', '.join(taken)} without a run; choose another --out, or --overwrite them")
 
 
 @contextmanager

@@ -91,6 +91,8 @@ def calibrate(
     if lines.has_arms:
         clavicled = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
         _set_lines(body.segments, unit(lines.trunk), _across(lines)[1], clavicled)
+        if "head" not in roles.segments:  # it goes with the chest, as that is now
+            body.put("head", body.of("chest"))
     counts: list[int] = []
     for k in range(len(SIDES)):
         _put_limbs(body, lines, k)

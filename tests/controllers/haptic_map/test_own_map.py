@@ -255,8 +255,9 @@ def test_quaternions_of_single_precision_are_taken() -> None:
             return (upright(at3=np.cos(x[0]), at4=np.sin(x[0]))).astype(np.float32)
 
     made = Rounded()
-    kernel_of(made, X, 0)
+    pose, *_ = kernel_of(made, X, 0)
     made.check()
+    np.testing.assert_array_equal(pose, made.pose(X))
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])

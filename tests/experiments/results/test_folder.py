@@ -13,7 +13,7 @@ from sim.errors import SimError
 def test_files_of_somebody_else_are_not_replaced_unasked(name: str, tmp_path: Path) -> None:
     (tmp_path / name).parent.mkdir(exist_ok=True)
     (tmp_path / name).write_text("mine")
-    with pytest.raises(SimError, match=rf"holds {name.split('/')[0]}, not of a run; choose another --out"):
+    with pytest.raises(SimError, match=rf"holds {name.split('/')[0]} without a run; choose another --out"):
         check_folder(tmp_path, overwrite=False)
     check_folder(tmp_path, overwrite=True)
 

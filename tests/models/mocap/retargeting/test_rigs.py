@@ -319,6 +319,24 @@ def test_an_animal_under_the_names_of_a_human_is_refused(motions, tmp_path):
     assert load(tmp_path / "r.bvh").report.up == "+Y"
 
 
+def test_the_head_does_not_turn_with_the_line_of_the_trunk(motions):
+    """Where a spine of other joints bends, that is 20° off the figure's own."""
+    given = global_rotations(motions.whole("cheer").poses)
+    turned, trunk = given.copy(), np.tile([np.sin(0.35), 0.0, np.cos(0.35)], (len(given), 1))
+    calibration._set_lines(turned, trunk, np.full_like(trunk, np.nan), clavicled=False)
+    head, chest = BODIES.index("head"), BODIES.index("chest")
+    np.testing.assert_array_equal(turned[:, head], given[:, head])
+    assert np.abs(turned[:, chest] - given[:, chest]).max() > 0.1
+
+
+def test_a_head_without_a_joint_goes_with_the_chest(motions, tmp_path):
+    write_rig(
+        Rig(without=("head", "neck"), proportions={"trunk": 1.3}), motions.whole("squat_dance"), tmp_path / "r.bvh"
+    )
+    found = global_rotations(load(tmp_path / "r.bvh").clip.poses)
+    np.testing.assert_allclose(found[:, BODIES.index("head")], found[:, BODIES.index("chest")], atol=1e-9)
+
+
 def posed(turns, clip):
     """The clip with joints turned about an axis [deg] from the figure's rest pose, throughout."""
     poses = clip.poses.copy()
