@@ -109,13 +109,15 @@ def _is(value: object, kind: Any) -> bool:
         several = cast(Sequence[object], value)
         return (_open(kind) or len(several) == len(inner)) and all(_is(one, inner[0]) for one in several)
     if kind in _NUMBERS:
-        return isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool) and (kind is int or _fits(value))
+        return (
+            isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool) and (kind is int or fits_float(value))
+        )
     if kind is bool:
         return isinstance(value, bool | np.bool_)
     return not isinstance(kind, type) or (isinstance(value, kind) and not isinstance(value, type))
 
 
-def _fits(value: Any) -> bool:
+def fits_float(value: Any) -> bool:
     """Whether a number is not too large for a float."""
     try:
         float(value)

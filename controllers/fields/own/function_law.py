@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from controllers.checks import fits_float
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.description import code_digest
 from controllers.fields.algebra.law import Law
@@ -43,7 +44,7 @@ class FunctionLaw(Law):
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
-            if not isinstance(value, Real) or not _is_finite(value):
+            if not isinstance(value, Real) or not fits_float(value) or not math.isfinite(value):
                 raise ParameterError(f"{name} of {self.place} must be a finite number, got {reprlib.repr(value)}")
         given: Mapping[str, Any] = self.parameters
         plain = {name: float(value) if isinstance(value, Fraction) else value for name, value in given.items()}
@@ -120,14 +121,6 @@ class FunctionLaw(Law):
     def description(self) -> dict[str, object]:
         """Name, parameters by name, and a hash of the code that runs."""
         return {"law": self.name, "parameters": dict(self.parameters), "code": code_digest(self.function)}
-
-
-def _is_finite(value: Real) -> bool:
-    """Whether a number is finite as a float, as which it is passed on; one of NumPy, a fraction or a long integer."""
-    try:
-        return math.isfinite(float(value))
-    except OverflowError:
-        return False
 
 
 def place_of(function: Any) -> str:
