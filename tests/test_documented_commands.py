@@ -19,6 +19,7 @@ FALLS = ["hvf run --clips backflip --governor"]  # pages say so beside them
 EARLIER = {  # what a page takes for granted: another page's result
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
+    "docs/how-to/devices.md": ["hvf run --out runs/mine"],
 }
 # Not here; served until stopped (tests/live); a rig of the reader's with names of its own (test_role_file).
 ELSEWHERE = ["--cluster tcp://head", "--device NAME", "hvf live ", "--roles roles.toml"]
