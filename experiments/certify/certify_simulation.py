@@ -21,6 +21,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Law
+from controllers.fields.algebra.weights import Weight
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
@@ -54,11 +55,18 @@ class SimulationCertificate:
     inputs_hash: str
 
 
+class _Scaled(NamedTuple):
+    """A law of a sum, or the force [N] and moment [N m] to which a part of it is cut, and the factor before it."""
+
+    what: Law | tuple[float, ...]
+    factor: float
+
+
 class _Parts(NamedTuple):
-    """The law that leads along a curve, user-defined laws added to it, and the drag of a governor [N s/m]."""
+    """The law that leads along a curve, user-defined laws and their factors, and the drag of a governor [N s/m]."""
 
     leading: Follow | Bunny
-    added: tuple[FunctionLaw, ...]
+    added: tuple[tuple[FunctionLaw, float], ...]
     drag: float
 
 
@@ -66,9 +74,10 @@ class _Parts(NamedTuple):
 def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0) -> SimulationCertificate:
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
-    The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, and with
-    a force limit. Any other law makes the verdicts unknown and is named. With user-defined laws and with such others
-    the executed program is linearised at states about the curve, and stability is refuted if one of them is unstable.
+    The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, each
+    times a number, and with a force limit. Any other law makes the verdicts unknown and is named. With user-defined
+    laws and with such others the executed program is linearised at states about the curve, and stability is refuted if
+    one of them is unstable.
 
     Parameters
     ----------
@@ -98,7 +107,7 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     try:
         parts = _parts_of(sim.field)
         river = _river(sim, parts.leading, delay)
-        cases = [certified_cases(law, river.curve) for law in parts.added]
+        cases = [certified_cases(law, river.curve).scaled(factor) for law, factor in parts.added]
         rivers, assumed = rivers_with(river, cases), _assumed(sim.field, cases)
         stability = switched_stability(rivers, parts.drag, hands.hands())
         passive = passivity(rivers[0] if len(rivers) == 1 else river)
@@ -147,32 +156,60 @@ def _river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
     return River(base, k_r, b_d, width, law.curve, phantom_device(linkage_of(sim.device)), sampling)
 
 
+def _scaled(field: Law) -> list[_Scaled]:
+    """A field as a sum: its laws and limits in their order, each times a number."""
+    stack: list[list[_Scaled]] = []
+    for what, numbers in field.program().composition():
+        if isinstance(what, Law):
+            stack.append([_Scaled(what, 1.0)])
+        elif what is Join.ADD:
+            last = stack.pop()
+            stack[-1] += last
+        elif what is Join.LIMIT:
+            stack[-1].append(_Scaled(tuple(numbers.tolist()), 1.0))
+        elif what is Join.GATE and (factor := Weight(tuple(numbers.tolist())).factor) is not None:
+            stack[-1] = [part._replace(factor=factor * part.factor) for part in stack[-1]]
+        else:
+            raise ControllerError("no certificate is known of a field that is gated or blended by a weight")
+    return stack[0]
+
+
 def _parts_of(field: Law) -> _Parts:
-    program = field.program()
-    if any(what in (Join.GATE, Join.BLEND) for what, _ in program.composition()):
-        raise ControllerError("no certificate is known of a field that is gated or blended by a weight")
-    leading = [law for law in program.laws if isinstance(law, Follow | Bunny)]
-    added = tuple(law for law in program.laws if isinstance(law, FunctionLaw))
-    governors = [law for law in program.laws if isinstance(law, Governor)]
+    scaled = _scaled(field)
+    laws = [part.what for part in scaled if isinstance(part.what, Law)]
+    leading = [law for law in laws if isinstance(law, Follow | Bunny)]
+    governors = [law for law in laws if isinstance(law, Governor)]
     known = (Follow, Bunny, FunctionLaw, Governor, Orientation)
-    others = [type(law).__name__ for law in program.laws if not isinstance(law, known)]
+    others = [type(law).__name__ for law in laws if not isinstance(law, known)]
     if len(leading) != 1 or others or len(governors) > 1:
         names = ", ".join(others) or ", ".join(type(law).__name__ for law in leading) or "no law along a curve"
         raise ControllerError(f"a certificate is of one FOLLOW or bunny, and laws of one's own; the field has {names}")
     if governors and not np.array_equal(governors[0].curve.packed(), leading[0].curve.packed()):
         raise ControllerError("a governor is certified on the curve of the law beside it; it has another one")
-    return _Parts(leading[0], added, sum(law.drag for law in governors))
+    for law, factor in scaled:
+        if isinstance(law, Follow | Bunny | Governor) and factor < 0.0:
+            raise ControllerError(
+                f"no certificate is known of {type(law).__name__} times {factor:g}, which leads the hand away"
+            )
+    factors = {id(law): factor for law, factor in scaled}
+    times = factors[id(leading[0])]
+    led = replace(leading[0], k_r=times * leading[0].k_r, b_d=times * leading[0].b_d)
+    added = tuple((law, factor) for law, factor in scaled if isinstance(law, FunctionLaw))
+    return _Parts(led, added, sum(factors[id(law)] * law.drag for law in governors))
 
 
 def _assumed(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
     """What a certificate of a field assumes because of its limits, its moments and its user-defined laws."""
-    program = field.program()
+    scaled = _scaled(field)
     assumed = [
-        f"the field stays below the {numbers[0]:g} N and {numbers[1]:g} N m to which it is cut"
-        for what, numbers in program.composition()
-        if what is Join.LIMIT
+        f"the field stays below the {' and '.join(bounds)} to which it is cut"
+        for what, factor in scaled
+        if isinstance(what, tuple)
+        and (
+            bounds := [f"{abs(factor) * x:g} {unit}" for x, unit in zip(what, ("N", "N m"), strict=True) if x < np.inf]
+        )
     ]
-    if any(isinstance(law, Orientation) for law in program.laws) or any(cases.exerts_moment for cases in added):
+    if any(isinstance(what, Orientation) for what, _ in scaled) or any(cases.exerts_moment for cases in added):
         assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
     if added:
         assumed.append("the critical gain is one by which the whole field is scaled, laws of one's own included")

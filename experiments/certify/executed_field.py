@@ -55,7 +55,7 @@ def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: H
     cut = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
     abrupt = [at for it in looked for at in it.abrupt]
     judged = sum(it.states for it in looked) - len(abrupt)
-    told = f"stable at {judged} states of the program that were looked at{cut}" if judged else "no state can be judged"
+    told = f"no oscillation grows at {judged} states of the program{cut}" if judged else "no state can be judged"
     if abrupt:
         told += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
     far = looked_at(program, main, reach, hands.hands(), FAST)

@@ -1,6 +1,6 @@
 """Cases of a law of one's own: its function followed on symbols, with the conditions under which each case holds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -81,6 +81,11 @@ class Cases:
                 holds = casadi.logic_and(holds, condition.symbol())
             force, which = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, which)
         return casadi.Function("chosen", [self.p, self.v], [force, which])
+
+    def scaled(self, factor: float) -> "Cases":
+        """The law times a number, under the same conditions."""
+        cases = [case._replace(force=factor * case.force, moment=factor * case.moment) for case in self.cases]
+        return replace(self, cases=tuple(cases))
 
     def check_slopes(self, hands: Array) -> None:
         """Check that the force can be differentiated at hands (p, v), shape (n, 6), if it is `smooth`.

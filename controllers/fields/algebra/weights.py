@@ -105,6 +105,12 @@ class Weight:
         """1 while the stylus switch is pressed, else 0."""
         return _weight(_SWITCH)
 
+    @property
+    def factor(self) -> float | None:
+        """The number of a constant weight; None of one that depends on the hand."""
+        s = self.row[_NUMBERS]
+        return (1.0 - s if self.row[_COMPLEMENT] else s) if self.row[_KIND] == _CONSTANT else None
+
     def __invert__(self) -> "Weight":
         return Weight((self.row[_KIND], 1.0 - self.row[_COMPLEMENT], *self.row[_NUMBERS:]))
 

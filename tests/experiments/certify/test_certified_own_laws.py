@@ -156,7 +156,7 @@ def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
         for field in (sim.field.limited(8.0), hvf.Follow(CURVE, k_r=300.0, b_d=8.0).limited(0.5) + plane)
     )
     free, less, part = (hvf.certify(of, NO_HANDS).stability for of in (sim, cut, in_part))
-    whole, judged = (int(re.findall(r"stable at (\d+) states", told.reason)[0]) for told in (free, less))
+    whole, judged = (int(re.findall(r"grows at (\d+) states", told.reason)[0]) for told in (free, less))
     assert less.verdict == "certified"
     assert judged < whole
     # Where a part of the field alone is cut, the plane acts without the damping of the river.
@@ -314,3 +314,42 @@ def test_a_symbol_that_a_law_kept_is_told_as_its_state() -> None:
     cases_of(late)
     with pytest.raises(ControllerError, match=r"law late .* keeps numbers of the hand between calls"):
         certified_cases(late, CURVE)
+
+
+def verdicts(field):
+    certificate = hvf.certify(dataclasses.replace(simulation(damped_law), field=field), NO_HANDS)
+    return certificate.stability, certificate.passivity
+
+
+FOLLOW = hvf.Follow(CURVE, k_r=300.0, b_d=8.0)
+damped_law = hvf.law(damped)
+floor_law = hvf.law(floor)
+
+
+@pytest.mark.parametrize(
+    ("scaled", "plain"),
+    [
+        (2 * FOLLOW, hvf.Follow(CURVE, k_r=600.0, b_d=16.0)),
+        (FOLLOW / 2, hvf.Follow(CURVE, k_r=150.0, b_d=4.0)),
+        (FOLLOW.gated(~hvf.Weight.constant(0.25)), hvf.Follow(CURVE, k_r=225.0, b_d=6.0)),
+        (FOLLOW - -0.5 * damped_law(b=2.0), FOLLOW + damped_law(b=1.0)),
+        (0.5 * (FOLLOW + floor_law(k=300.0, b=4.0)), hvf.Follow(CURVE, k_r=150.0, b_d=4.0) + floor_law(k=150.0, b=2.0)),
+        (2 * FOLLOW.limited(4.0), hvf.Follow(CURVE, k_r=600.0, b_d=16.0).limited(8.0)),
+    ],
+)
+def test_a_field_times_a_number_is_certified_as_the_field_of_these_gains(scaled, plain):
+    for of_scaled, of_plain in zip(verdicts(scaled), verdicts(plain), strict=True):
+        assert of_scaled.verdict == of_plain.verdict != "unknown"
+        assert of_scaled.margin == pytest.approx(of_plain.margin, rel=1e-9)
+        assert of_scaled.assumptions == of_plain.assumptions
+
+
+def test_a_field_that_leads_the_hand_away_is_refuted_in_the_executed_program():
+    certificate = hvf.certify(dataclasses.replace(simulation(damped_law), field=-FOLLOW))
+    assert certificate.stability.verdict == "refuted"
+    assert certificate.passivity.verdict == "unknown"
+    assert "Follow times -1, which leads the hand away" in certificate.passivity.reason
+
+
+def test_a_weight_that_depends_on_the_hand_is_unknown():
+    assert "gated or blended" in verdicts(FOLLOW.gated(hvf.Weight.speed(0.1, 0.2)))[1].reason
