@@ -150,7 +150,8 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0 if rate < ANY_RATE else None, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
-    reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.2g} mm"
+    within = np.format_float_positional(1e3 * counterexample["distance"], 2, unique=False, fractional=False, trim="-")
+    reason = f"{reason}, which no body on that floor follows within {within} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
 
 

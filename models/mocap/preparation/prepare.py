@@ -23,7 +23,7 @@ from models.mocap.preparation.poses import contact_points, resampled, smoothed
 from models.mocap.preparation.root_path import on_resting_support
 from models.mocap.preparation.stances import Stances, rested, stances
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.retarget_report import COARSE, RetargetReport
+from models.mocap.retargeting.retarget_report import COARSE, RetargetReport, two_digits
 from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
@@ -125,7 +125,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     if captured.n_frames < 2:
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_LONGEST:.0f} s")
     if captured.fps < COARSE and captured.duration > _LONGEST:
-        what = f"lasts {captured.duration:.0f} s, since a frame lasts {1.0 / captured.fps:.2g} s"
+        what = f"lasts {captured.duration:.0f} s, since a frame lasts {two_digits(1.0 / captured.fps)} s"
         raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
     timed = paced(resampled(captured, FPS))
     even = resampled(timed.clip, FPS)

@@ -33,6 +33,7 @@ from models.mocap.retargeting.retarget_report import (
     calibration_remarks,
     endless_limb_remarks,
     frame_remarks,
+    haste_remarks,
     joint_jump_remarks,
     unit_name,
 )
@@ -105,6 +106,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
+        *haste_remarks(legs, motion.fps),
         *joint_jump_remarks([jump for jump in odd if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *([_SITS.format(round(100.0 * sits))] if sits else ()),

@@ -300,6 +300,14 @@ def test_frames_longer_than_a_cameras_are_said(walked, tmp_path):
         prepared(tmp_path / "r.bvh")
 
 
+def test_legs_that_swing_as_no_human_s_are_said(walked, tmp_path):
+    text = (tmp_path / "r.bvh").read_text()
+    for seconds, said in (("0.0333333", 0), ("0.0083333", 0), ("0.0033333", 1), ("0.0001", 1)):
+        (tmp_path / "r.bvh").write_text(re.sub(r"Frame Time: \S+", f"Frame Time: {seconds}", text))
+        remarks = load(tmp_path / "r.bvh").report.remarks
+        assert sum("faster than any human's" in line for line in remarks) == said
+
+
 def test_a_frame_rate_that_the_file_does_not_state_is_said(tmp_path):
     """As of AMC files."""
     write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
