@@ -74,7 +74,7 @@ steps = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(steps, st.booleans(), st.booleans())
 def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
     firmware_library, sequence, permitted, dead_man

@@ -88,7 +88,7 @@ def test_all_three_extrema_of_one_piece_are_considered():
         assert np.abs(found[:, 1] - truth).max() < 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(*[st.floats(-0.1, 0.1)] * 3), min_size=2, max_size=8),
     st.tuples(*[st.floats(-0.2, 0.2)] * 3),

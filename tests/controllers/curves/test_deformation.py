@@ -86,7 +86,7 @@ def test_refining_changes_nothing(curve: Trajectory) -> None:
         np.testing.assert_allclose(getattr(fine, name)(PHASES), getattr(curve, name)(PHASES), atol=1e-12)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.0, 4.0), st.tuples(*[st.floats(-0.1, 0.1)] * 3))
 def test_the_grabbed_point_is_where_it_is_carried_and_the_rest_stays(phase: float, delta: tuple) -> None:
     for curve in (CURVES["circle"], CURVES["uneven closed"]):

@@ -115,7 +115,7 @@ def test_what_is_no_curve_is_refused_with_the_numbers(times, positions, options,
         Trajectory(times, positions, **options)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(*[st.floats(-0.1, 0.1)] * 3), min_size=2, max_size=10), st.floats(1e-6, 10.0))
 def test_any_samples_with_a_length_give_finite_values(samples, spacing):
     positions = np.array(samples)

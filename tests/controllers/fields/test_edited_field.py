@@ -127,7 +127,7 @@ PERFORMED = performance(TIMES, _pushed(np.random.default_rng(8), 2.0)[0])
 FIELDS = [Edited(RIVER, (PERFORMED,), (1.0,), pace=pace) for pace in ("clock", "wait")]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3), st.floats(0, 1e6))
 def test_it_is_finite_everywhere(p, v, t):
     for field in FIELDS:

@@ -101,7 +101,7 @@ def test_force_has_no_jump_along_lines_through_the_tube():
         assert np.abs(np.diff(forces, axis=0)).max() < 1.0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3), st.floats(0, 1e6))
 def test_every_law_is_finite_everywhere(p, v, t):
     for law in LAWS:

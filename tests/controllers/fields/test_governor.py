@@ -34,7 +34,7 @@ def test_in_flight_a_slow_hand_is_urged_on_and_a_fast_one_held_back(speed, force
     assert not felt.torque.any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.0, 4.0), st.floats(-0.3, 0.5), st.floats(0.0, 0.03))
 def test_it_is_its_formula_with_the_interval_by_linear_interpolation(phase, speed, off):
     outward = CIRCLE.point(phase) / 0.05

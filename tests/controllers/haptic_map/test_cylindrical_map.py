@@ -195,7 +195,7 @@ def test_the_kernels_means_are_those_of_the_eigenvectors():
             assert abs(q @ np.linalg.eigh(moment).eigenvectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*[st.floats(-10.0, 10.0)] * 3))
 def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
     x = np.array([*p, 1.0, 0.0, 0.0, 0.0])

@@ -122,7 +122,7 @@ def test_the_flexion_is_the_arc_cosine_and_levels_off_smoothly():
     assert np.abs(np.diff(second)).max() < 0.03 * np.abs(second).max()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.tuples(*[st.floats(-2.0, 2.0)] * 9))
 def test_the_end_is_where_it_should_be_or_as_near_as_the_limb_is_long(target, angles):
     rotations = np.ones((4, 4)) * [1.0, 0.0, 0.0, 0.0]

@@ -65,7 +65,7 @@ commands = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(commands, st.booleans(), st.booleans())
 def test_nothing_can_send_a_force_above_the_limits(sequence, permitted: bool, dead_man: bool) -> None:
     gated = Gated(permitted=permitted, dead_man=dead_man, ramp=0.05, quiet=0.01)

@@ -22,7 +22,7 @@ def test_a_small_force_passes_unchanged():
     np.testing.assert_array_equal(_limit(FAST, FAST.fresh_memory(), [0.3, -0.4, 0.5]), [0.3, -0.4, 0.5])
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.tuples(*[st.floats(-1e200, 1e200)] * 3))
 def test_a_cold_device_gives_at_most_its_peak_in_the_same_direction(force):
     out = _limit(FAST, FAST.fresh_memory(), force)

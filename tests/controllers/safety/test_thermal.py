@@ -11,7 +11,7 @@ C, P, TAU, T = (0.38, 0.32, 0.32), (1.7, 1.4, 1.4), 10.0, 5e-2
 SHARE = 1.0 - np.exp(-T / TAU)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(*[st.floats(-5, 5)] * 3, st.integers(1, 100)), max_size=10))
 def test_no_sequence_of_torques_heats_a_motor_beyond_its_continuous_torque(sequence) -> None:
     heat = np.zeros(3)

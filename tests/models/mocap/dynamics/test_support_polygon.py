@@ -11,7 +11,7 @@ FLOOR = np.array([(-0.05, 0.1), (0.16, 0.1), (-0.05, -0.1), (0.16, -0.1)])
 ALL = np.ones(4, dtype=bool)
 
 
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(max_examples=50)
 @given(
     corners=st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=8),
     point=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),

@@ -57,7 +57,7 @@ def test_gimbal_lock_loses_nothing(tmp_path):
     joint=st.integers(0, 17),
     fps=st.floats(0.5, 1000.0),
 )
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_joint_and_rate_come_back(tmp_path, rotation, joint, fps):
     poses = np.tile(rest_pose(), (2, 1))
     poses[:, 3 + 4 * joint : 7 + 4 * joint] = Rotation.from_rotvec(rotation).as_quat(scalar_first=True)

@@ -30,7 +30,7 @@ def mutations(draw, text):
     return content[: draw(st.integers(0, len(content)))] if draw(st.booleans()) else content
 
 
-FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def assert_loads_or_is_refused(path):
