@@ -349,7 +349,3 @@ def test_a_field_that_leads_the_hand_away_is_refuted_in_the_executed_program():
     assert certificate.stability.verdict == "refuted"
     assert certificate.passivity.verdict == "unknown"
     assert "Follow times -1, which leads the hand away" in certificate.passivity.reason
-
-
-def test_a_weight_that_depends_on_the_hand_is_unknown():
-    assert "gated or blended" in verdicts(FOLLOW.gated(hvf.Weight.speed(0.1, 0.2)))[1].reason
