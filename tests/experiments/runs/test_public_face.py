@@ -254,7 +254,7 @@ def soft_floor(hand, k=500.0):
 
 def test_what_cannot_be_certified_is_unknown_and_named() -> None:
     curved = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + soft_floor)).stability
-    gated = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8).gated(hvf.Weight.speed(0.1, 0.2)))).stability
+    gated = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8).gated(hvf.Weight.ball((0, 0, 0), 1.0)))).stability
     assert (curved.verdict, gated.verdict) == ("unknown", "unknown")
     assert "law soft_floor" in curved.reason
     assert "has cases whose force is not linear" in curved.reason
