@@ -23,7 +23,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.own.own_law import law
 from controllers.fields.river import River
 from controllers.fields.stretchy_tubes import StretchyTubes
-from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.base import HapticMap, KernelMap
 from controllers.haptic_map.lifting.room import Room
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import HandState, Wrench
@@ -62,6 +62,7 @@ __all__ = [
     "HandState",
     "HapticMap",
     "HigherOrder",
+    "KernelMap",
     "Law",
     "Lifted",
     "ModelError",
