@@ -18,6 +18,7 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, Mask
 
+_LEAST_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
 GRID = 40  # gains on the grid before bisection: half or twice as many find the same critical gains along a bent curve
 # Phases of the curve at which the loop is examined: with eight times as many critical gains are 0.1 % lower.
 PHASES = 48
@@ -169,13 +170,26 @@ def _with_hands(river: River, hands: Sequence[HandImpedance]) -> _WithHands:
     critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
-        critical.append(critical_stiffness(loop, river.b_d, max(river.k_r, 1e-3)))
+        critical.append(_critical_about(loop, river))
         cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
         here, following = neighbours(loop.radius(river.k_r, river.b_d), river.curve.periodic)
         bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
         if river.curve.periodic and river.law.carries:
             multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
     return _WithHands(np.array(critical), max(bounds), cut, max(multipliers, default=None))
+
+
+def _critical_about(loop: SampledLoop, river: River) -> Array:
+    """Critical k_r [N/m] at every phase: the next one above the river's own; where that is unstable, the first below.
+
+    Infinite where there is none.
+    """
+    own = max(river.k_r, _LEAST_STIFFNESS)
+    above = critical_stiffness(loop, river.b_d, own)
+    if (above > own).all():
+        return above
+    below = _smallest_unstable(lambda k_r: loop.radius(k_r, river.b_d), _LEAST_STIFFNESS, own)
+    return np.where(above > own, above, np.minimum(below, own))
 
 
 def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
@@ -189,7 +203,8 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     """
     found = _with_hands(river, hands)
     least, hand, at = found.worst(hands)
-    margin = min(least, MOST_STIFFNESS) / max(river.k_r, 1e-3) - 1.0
+    own = max(river.k_r, _LEAST_STIFFNESS)
+    margin = min(least, MOST_STIFFNESS) / own - 1.0
     figures = _figures(river, found)
     assumptions = (
         "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
@@ -197,13 +212,11 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
-    gains = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m"
-    if least <= max(river.k_r, 1e-3):
-        below = critical_stiffness(SampledLoop(river.still(hand), river.sampling), river.b_d, 1e-3)[at]
-        margin = min(float(below) / max(river.k_r, 1e-3), 1.0) - 1.0
-        reason = f"unstable: {gains}; critical k_r = {below:.4g} N/m with {hand}"
-        return Verdict("refuted", reason, margin, assumptions, unstable_start(river, hand, at), figures)
-    said, doubt = f"{gains}; critical k_r = {least:.4g} N/m with {hand}", _doubt(river, found, least)
+    critical = f"critical k_r = {least:.4g} N/m" if least > _LEAST_STIFFNESS else "no k_r is low enough"
+    said = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; {critical} with {hand}"
+    if least <= own:
+        return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
+    doubt = _doubt(river, found, least)
     if doubt is not None:
         return Verdict("unknown", f"{doubt}; {said}", margin, assumptions, {}, figures)
     return Verdict("certified", f"stable: {said}", margin, assumptions, {}, figures)

@@ -137,6 +137,20 @@ def test_rubber_that_is_held_is_certified_and_one_too_stiff_for_its_delay_refute
     assert seek.figures["critical_stiffness"].min() >= good.figures["critical_stiffness"].min() * (1.0 - 1e-6)
 
 
+def test_the_critical_gain_does_not_depend_on_the_gain_that_is_asked_for():
+    hands = HandRange().hands()
+    below = stability(RIVER, hands)
+    least = (below.margin + 1.0) * RIVER.k_r
+    for k_r in (1.001 * least, 20.0 * least):
+        above = stability(RIVER._replace(k_r=k_r), hands)
+        assert above.verdict == "refuted"
+        assert (above.margin + 1.0) * k_r == pytest.approx(least, rel=1e-4)
+        assert above.reason.split("critical")[1] == below.reason.split("critical")[1]
+        assert above.figures["critical_stiffness"].min() == pytest.approx(least, rel=1e-4)
+    assert stability(RIVER._replace(k_r=0.999 * least), hands).verdict != "refuted"
+    assert "no k_r is low enough" in stability(RIVER._replace(b_d=300.0), hands).reason
+
+
 @pytest.mark.parametrize("hand", [NO_HAND, HandImpedance(0.2, 5.0, 400.0)])
 def test_the_plant_is_the_derivative_of_its_equations_of_motion(hand):
     curve = Trajectory.circle(0.0477, 4e6)
