@@ -182,8 +182,8 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     )
     if pushed.holds(push):
         reason = (
-            f"|U| ≤ {push:g} N moves the hand by at most {1e3 * distance:.3g} mm, the river answers with at most "
-            f"{felt:.3g} N; this holds up to {allowed:.3g} N"
+            f"|U| ≤ {push:g} N on a stylus without a hand's inertia moves it by at most {1e3 * distance:.3g} mm, "
+            f"the river answers with at most {felt:.3g} N; this holds up to {allowed:.3g} N"
         )
         return Verdict("certified", reason, allowed - push, assumptions, {}, figures)
     reason = (
