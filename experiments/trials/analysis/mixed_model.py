@@ -2,16 +2,18 @@
 
 For the trials of a level and of the reference,
 
-    y_ij = β₀ + β x_ij + γ[c_ij] + δ[c_ij] x_ij + u_i + v_i x_ij + e_ij,   (u_i, v_i) ~ N(0, Σ),   e_ij ~ N(0, σ²),
+    y_ij = β₀ + β x_ij + γ[c_ij] + δ[c_ij] x_ij + u_i + v_i x_ij + e_ij,
+    u_i ~ N(0, τ²),   v_i ~ N(0, ω²),   e_ij ~ N(0, σ²),
 
-with x = 1 at the level and 0 at the reference; c is the condition of the other factors, with Σ_c γ = Σ_c δ = 0, so
+with x = ½ at the level and −½ at the reference; c is the condition of the other factors, with Σ_c γ = Σ_c δ = 0, so
 that β is the mean over these conditions also if factors interact. The random slope v_i is used for within-subject
 factors only; without it the repetitions of a user would count as independent users (D. J. Barr et al., "Random effects
-structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by
-REML (statsmodels). β over its standard error is compared with Student's t, whose degrees of freedom are the number of
-users less one, or less the number of groups (between-within: M. D. Schluchter & J. T. Elashoff, 1990). In a balanced
-design this is the paired t test of the users' means, or a more conservative one if the users' variance is estimated as
-zero.
+structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Intercepts
+and slopes are independent: correlated, they are mostly estimated as ±1 of a few users, which changes p by a third and more.
+Fitted by REML (statsmodels). β over its standard error is compared with Student's t, whose degrees of freedom are the
+number of users less one, or less the number of groups (between-within: M. D. Schluchter & J. T. Elashoff, 1990). In a
+balanced design this is the paired t test of the users' means, or a more conservative one where users differ in the
+effect by less than their repetitions would let expect: the variance of slopes is estimated as zero then.
 """
 
 import warnings
@@ -77,14 +79,13 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
         return NO_FIT
     centre = float(data[measure].mean())
     # Without the factors' own columns: in the formula a factor named "C" would hide patsy's function of that name.
-    data = data[["user", "_c"]].assign(
-        _y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]).astype(float)
-    )
+    data = data[["user", "_c"]].assign(_y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]) - 0.5)
     fixed = "_y ~ _x * C(_c, Sum)" if data["_c"].nunique() > 1 else "_y ~ _x"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # warned: variance at the boundary zero, as expected for identical people
-            made = smf.mixedlm(fixed, data, groups="user", re_formula="~_x" if within else "~1")
+            slopes = {"slopes": "0 + _x"} if within else None
+            made = smf.mixedlm(fixed, data, groups="user", re_formula="~1", vc_formula=slopes)
             model = made.fit(reml=True, method=_METHODS)
             estimate, error = scale * float(model.params["_x"]), scale * float(model.bse["_x"])
     except (np.linalg.LinAlgError, ValueError):

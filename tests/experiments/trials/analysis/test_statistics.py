@@ -142,6 +142,17 @@ def test_repetitions_of_a_user_do_not_count_as_users() -> None:
     assert (river.low, river.high) == pytest.approx((low, high), abs=0.15)  # the bootstrap's, over the same users
 
 
+@pytest.mark.parametrize("seed", [2, 4, 10])
+def test_the_model_is_the_paired_t_test_where_users_who_are_worse_are_helped_more(seed: int) -> None:
+    from scipy.stats import ttest_rel
+
+    made, own = frame(-0.2, users=6, seed=seed), np.random.default_rng(seed).normal(size=6)
+    made["tracking_error"] += (1.0 - 0.25 * (made["guidance"] == "river")) * own[made["user"]]
+    (river,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+    means = made.groupby(["user", "guidance"])["tracking_error"].mean().unstack()
+    assert river.p == pytest.approx(ttest_rel(means["river"], means["none"]).pvalue, rel=0.005)
+
+
 @pytest.mark.slow
 def test_an_interaction_is_found_where_it_is_and_not_where_it_is_not() -> None:
     made = frame(-1.0)
