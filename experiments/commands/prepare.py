@@ -19,7 +19,7 @@ class Command:
     target: Annotated[Path, tyro.conf.Positional]
     """BVH file to write."""
     loop: str = "auto"
-    """How it goes on: auto, open, or START:END of the cycle in seconds."""
+    """How it goes on: auto, open, or START:END of the cycle, in seconds from the first frame that is kept."""
     mirror: bool = False
     """Go on with the mirror image of half a stride, or of START:END, as walks and runs do."""
     up: str | None = None

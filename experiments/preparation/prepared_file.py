@@ -98,9 +98,11 @@ def doubts(found: ClipBallistics) -> tuple[str, ...]:
 def changes(made: Prepared) -> tuple[str, ...]:
     """Changes made to the capture, a line each."""
     part, pace, change = made.looped, made.paced, made.feasible
+    after = " after the frames that are left out" if made.report and made.report.dropped else ""
+    when = f"{part.start:.2f} to {part.end:.2f} s{after}"
     words = {
-        "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s, whose ends were {np.rad2deg(part.gap):.1f}° apart",
-        "half stride": f"half a stride, {part.start:.2f} to {part.end:.2f} s, and its mirror image",
+        "cycle": f"cycle {when}, whose ends were {np.rad2deg(part.gap):.1f}° apart",
+        "half stride": f"half a stride, {when}, and its mirror image",
         "way back": "the whole, and a way back",
         "open": "the whole, at rest at both ends",
     }

@@ -9,7 +9,7 @@ with x = ½ at the level and −½ at the reference; c is the condition of the o
 that β is the mean over these conditions also if factors interact. The random slope v_i is used for within-subject
 factors only; without it the repetitions of a user would count as independent users (D. J. Barr et al., "Random effects
 structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Intercepts
-and slopes are independent: correlated, they are mostly estimated as ±1 of a few users, which changes p by a third and more.
+and slopes are independent: a correlation of a few users is mostly estimated as ±1, which changes p by a third.
 Fitted by REML (statsmodels). β over its standard error is compared with Student's t, whose degrees of freedom are the
 number of users less one, or less the number of groups (between-within: M. D. Schluchter & J. T. Elashoff, 1990). In a
 balanced design this is the paired t test of the users' means, or a more conservative one where users differ in the

@@ -139,7 +139,8 @@ def _wished(clip: Clip, wish: str) -> tuple[int, int]:
         raise ModelError(f"--loop {wish!r}; expected auto, open, or START:END in seconds") from None
     if not 0.0 <= start < end - 0.2 <= clip.duration:
         raise ModelError(
-            f"--loop {wish}; expected 0 ≤ START, END 0.2 s later or more, and at {clip.duration:.2f} s at most"
+            f"--loop {wish}; expected 0 ≤ START, END 0.2 s later or more, and at {clip.duration:.2f} s at most, "
+            "both from the first frame that is kept"
         )
     return round(start * clip.fps), min(round(end * clip.fps), clip.n_frames - 1)
 

@@ -105,7 +105,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     path : Path
         BVH, AMC or DeepMimic.
     loop : str
-        ``auto``, ``open``, or ``START:END`` of the cycle in seconds.
+        ``auto``, ``open``, or ``START:END`` of the cycle, in seconds from the first frame that is kept.
     mirror : bool
         Go on with the mirror image of half a stride, or of START:END.
     hints : Hints or None

@@ -7,7 +7,7 @@ file formats*, 1998). The files state no frame rate: CMU recorded at 120 frames 
 
 from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -157,7 +157,21 @@ def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - a section of the file a 
     if len(skeleton.parents) != len(skeleton.bones) - 1 or not skeleton.parents:
         lost = next((name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone")
         raise MotionFileError(path, 0, f"{quoted(lost)} is not in the hierarchy", "a parent for every bone")
-    return skeleton
+    return _from_root(skeleton, path)
+
+
+def _from_root(skeleton: _Skeleton, path: Path) -> _Skeleton:
+    """The skeleton with every bone after its parent, whatever the order of its hierarchy's lines."""
+    ordered, left = dict[str, str](), skeleton.parents
+    while left:
+        waiting = dict[str, str]()
+        for bone, parent in left.items():
+            (ordered if parent == "root" or parent in ordered else waiting)[bone] = parent
+        if len(waiting) == len(left):
+            what = f"{quoted(next(iter(left)))} is below itself in the hierarchy"
+            raise MotionFileError(path, 0, what, "a hierarchy that begins at the root")
+        left = waiting
+    return replace(skeleton, parents=ordered)
 
 
 def _new_bone(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> _Bone:
@@ -219,10 +233,9 @@ def _freedoms(fields: list[str], known: tuple[str, ...], path: Path, line: int) 
 
 
 def _read_children(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> None:
-    """Parents come first in every ASF; a child whose parent is not placed yet, or that is placed twice, is an error."""
     parent = fields[0]
-    if parent != "root" and parent not in skeleton.parents:
-        raise MotionFileError(path, line, f"{quoted(parent)} has no parent yet", "the hierarchy from the root outwards")
+    if parent not in skeleton.bones:
+        raise MotionFileError(path, line, f"parent {quoted(parent)}", "root, or a bone of :bonedata")
     for child in fields[1:]:
         if child == "root" or child not in skeleton.bones or child in skeleton.parents:
             raise MotionFileError(path, line, f"child {quoted(child)}", "bones of :bonedata, each with one parent")

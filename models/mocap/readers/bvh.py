@@ -40,7 +40,7 @@ class _Joint:
     parent: int
     line: int
     offset: list[float] | None = None
-    tip: list[float] | None = None
+    tips: list[list[float]] = field(default_factory=list[list[float]])
     positions: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     rotations: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
 
@@ -60,7 +60,8 @@ def read_bvh(path: Path) -> SourceMotion:
     joints, n_columns = _read_hierarchy(lines, path)
     frames, fps, remarks = _read_frames(lines, len(joints), n_columns, path)
     offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
-    tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
+    tips = np.array([joint.tips[0] if joint.tips else (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
+    further = {k: np.array(joint.tips[1:]) for k, joint in enumerate(joints) if len(joint.tips) > 1}
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
     rotations = np.zeros((len(frames), len(joints), 4))
     rotations[..., 0] = 1.0
@@ -74,13 +75,19 @@ def read_bvh(path: Path) -> SourceMotion:
             rotations[:, index] = quaternions.product(rotations[:, index], turn)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
     placed = [k for k, joint in enumerate(joints) if k and len(joint.positions) == 3 and offsets[k].any()]
+    # A frame of zeros is a lost one: its joints are where they are in a file without such channels.
+    lost = np.flatnonzero(~translations[:, placed].any(axis=(1, 2)))
+    for k in placed:
+        translations[lost, k] = offsets[k]
     if placed and not displaced and _lengths_off(translations, offsets, placed) > _FAR:
         local = _in_world(translations, rotations, parents, placed)
         if _lengths_off(local, offsets, placed) < _NEAR:
             translations = local
             told = ", ".join(names[k] for k in placed)
             remarks = (*remarks, f"the places of {told} are given in the world, not from their parents: read so")
-    return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None, remarks=remarks)
+    return SourceMotion(
+        path, names, parents, offsets, tips, rotations, translations, fps, None, remarks=remarks, further_tips=further
+    )
 
 
 def _displaced(joints: list[_Joint], frames: Array) -> bool:
@@ -186,8 +193,7 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
             open_joints.append(len(joints))
             joints.append(tokens.joint(open_joints[-2]))
         elif keyword == "END":
-            tip = _read_end_site(tokens)
-            joint.tip = joint.tip or tip
+            joint.tips.append(_read_end_site(tokens))
         elif word == "}":
             open_joints.pop()
             if joint.offset is None:

@@ -1,7 +1,7 @@
 """A motion on its source skeleton: what the readers return, before any retargeting."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +48,8 @@ class SourceMotion:
         Whether the file states its frame rate.
     remarks : tuple of str
         What the reader found amiss in the file and read nevertheless.
+    further_tips : mapping from joint to array of shape (m, 3)
+        Further ends of a segment, as of a foot with heel and toes.
     """
 
     path: Path
@@ -63,6 +65,7 @@ class SourceMotion:
     loops: bool | None = None
     timed: bool = True
     remarks: tuple[str, ...] = ()
+    further_tips: Mapping[int, Array] = field(default_factory=dict[int, Array])
 
     @property
     def n_frames(self) -> int:
@@ -84,6 +87,7 @@ class SourceMotion:
             parents=tuple(new[self.parents[joint]] for joint in kept),
             offsets=self.offsets[chosen],
             tips=self.tips[chosen],
+            further_tips={new[joint]: tips for joint, tips in self.further_tips.items() if joint in new},
             rotations=self.rotations[:, chosen],
             translations=self.translations[:, chosen],
         )

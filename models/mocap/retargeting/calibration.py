@@ -86,6 +86,9 @@ def calibrate(
         A frame in which the body stands upright with level feet; without one, frames are weighted as above.
     """
     body, (least, straight) = _Body(roles, parents, rotations), _straightness(lines, rest_frame)
+    # A pose that is held, as programs fill a motion up, counts once.
+    counted = np.where(lines.filled(fps), 0.0, 1.0)
+    straight = straight if rest_frame is not None else straight * counted
     _put_trunk(body, lines, straight)
     _put_head(body, up, straight)
     if lines.has_arms:
@@ -95,7 +98,7 @@ def calibrate(
             body.put("head", body.of("chest"))
     counts: list[int] = []
     for k in range(len(SIDES)):
-        _put_limbs(body, lines, k)
+        _put_limbs(body, lines, k, counted)
         foot = body.joint(f"{SIDES[k]}_foot")
         if foot is None:
             body.put(f"{SIDES[k]}_foot", body.of(f"{SIDES[k]}_shank"))
@@ -195,7 +198,7 @@ def _put_head(body: _Body, up: Array, straight: Array) -> None:
     body.put("head", carried(source, frames(left, np.broadcast_to(up, left.shape)), upright))
 
 
-def _put_limbs(body: _Body, lines: BodyLines, k: int) -> None:
+def _put_limbs(body: _Body, lines: BodyLines, k: int, counted: Array) -> None:
     """Arm, hand and leg of a side, whose bones and hinges the lines show."""
     side, sign = SIDES[k], 1.0 - 2.0 * k
     elbow, knee = -sign * lines.elbow_normals()[:, k], lines.knee_normals()[:, k]
@@ -206,9 +209,9 @@ def _put_limbs(body: _Body, lines: BodyLines, k: int) -> None:
         (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles, knee, (2, -1.0), 1),
     )
     for parent, name, start, end, hinge, along, across in bones:
-        body.put(name, _limb(body.joint(name), (end - start)[:, k], hinge, body.of(parent), along, across))
+        body.put(name, _limb(body.joint(name), (end - start)[:, k], hinge, body.of(parent), along, across, counted))
     hand, forearm = body.joint(f"{side}_hand"), body.of(f"{side}_forearm")
-    body.put(f"{side}_hand", forearm if hand is None else carried(hand, forearm, np.ones(len(forearm))))
+    body.put(f"{side}_hand", forearm if hand is None else carried(hand, forearm, counted))
 
 
 def _own_trunk(has_arms: bool) -> Array:
@@ -247,21 +250,25 @@ def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool)
 
 
 def _limb(
-    source: Array | None, bone: Array, hinge: Array, parent: Array, along: tuple[int, float], across: int
-) -> Array:
-    """R of a limb's segment: axis `along` is on its bone in every frame, axis `across` on its hinge on average."""
+    source: Array | None, bone: Array, hinge: Array, parent: Array, along: tuple[int, float], across: int,
+    counted: Array,
+) -> Array:  # fmt: skip
+    """R of a limb's segment: axis `along` is on its bone in every frame, axis `across` on its hinge on average.
+
+    The average is weighted by `counted` (n,).
+    """
     axis, sign = along
     if np.isnan(bone).any():
-        return parent if source is None else carried(source, parent, np.ones(len(parent)))
+        return parent if source is None else carried(source, parent, counted)
     bone = unit(bone)
     straight = quaternions.product(quaternions.arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
     unbent = quaternions.rotated(straight, np.eye(3)[across])
     sine = np.linalg.norm(hinge, axis=1, keepdims=True)
-    evidence = np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent
+    evidence = counted[:, None] * (np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent)
     if source is None:
         return straight
     back = quaternions.conjugate(source)
-    long = unit(quaternions.rotated(back, bone).mean(axis=0))
+    long = unit(counted @ quaternions.rotated(back, bone))
     lateral = quaternions.rotated(back, evidence).sum(axis=0)
     lateral = unit(lateral - long * (lateral @ long))
     columns = np.empty((3, 3))

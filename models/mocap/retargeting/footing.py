@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array, IntArray
+from models.arrays import Array, IntArray, Mask
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
 from models.mocap.motion import quaternions
 
@@ -39,10 +39,11 @@ _AGREE = 0.5
 # Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
 # than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
+_ALL = slice(None)
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 
 
-def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array]:
+def on_the_floor(root: Array, segments: Array, fps: float, counted: Mask | slice = _ALL) -> tuple[Array, Array]:
     """The motion shifted vertically by a constant onto the floor, with feet pitched up where toes would penetrate it.
 
     Parameters
@@ -53,6 +54,8 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
         Rotations of the segments in the world.
     fps : float
         Frame rate [1/s].
+    counted : array of bool, shape (frames,)
+        Frames that tell where the floor is.
 
     Returns
     -------
@@ -63,7 +66,7 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     feet = segments[:, _FEET]
     points = soles().reshape(2, 4, 3)
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
-    floor = _floor(heights)
+    floor = _floor(heights[counted])
     bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
     # The correction of a foot that points straight down ends abruptly when it leaves the floor, so it is smoothed.
     bend = gaussian_filter1d(bend, _SMOOTHING * fps, axis=0, mode="nearest")

@@ -9,6 +9,7 @@ Between the pose and the motion is one step, v₀, that the motion does not go o
   whose step is no part of the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
   interpolation has spread the one step;
+- steps that fade within 0.1 s after such a jump, and are followed by calm: a filter has spread it, too;
 - a first step by which a broken frame is told at the end, too (`broken_frames.begins_off`).
 
 The jump is sought in the first quarter of a motion. Where a pose is held without any change, as no living body stands,
@@ -37,6 +38,7 @@ _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns 
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it goes on.
 _BLENDED, _FASTER = 0.1, 1.5
+_CALM = 0.4  # largest share of the first step of a jump that fades which the steps after it have
 _HELD = 0.1  # farthest that a pose which is held is from that before the jump, as a share of the jump
 # Of a calibration pose: bend of its limbs, difference of its sides, least angle of its arms to the trunk's line and
 # largest to the trunk's plane.
@@ -53,7 +55,7 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     turns = _turns(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    jumped = _jumped(rotations, turns, at_rest, lines)
+    jumped = _faded(_size(turns), _jumped(rotations, turns, at_rest, lines), round(_BLENDED * motion.fps))
     begun, ended = _spread(rotations, _size(turns), round(_BLENDED * motion.fps))
     soon = ended <= _SHARE * motion.n_frames or _stands(_size(turns)) == begun
     told = soon and (at_rest[: begun + 1].all() or _calibrating(lines))
@@ -82,6 +84,17 @@ def _jumped(rotations: Array, turns: Array, at_rest: Mask, lines: BodyLines) -> 
     as_zero = at_rest[: jump + 1].all() and not at_rest[jump + 1] and leaves > steps[jump + 1]
     as_posed = _calibrating(lines) and leaves > 2.0 * steps[jump + 1 : jump + 4].max()
     return jump + 1 if as_zero or as_posed else 0
+
+
+def _faded(steps: Array, jumped: int, longest: int) -> int:
+    """Number of frames before a motion whose jump from a pose a filter has spread: its steps fade, then all is calm."""
+    if not jumped:
+        return 0
+    steps = steps[jumped:]
+    lasts = int(np.argmax(np.append(steps < _CALM * steps[0], True)))
+    calm = steps[lasts : lasts + longest].max(initial=0.0) < _CALM * steps[0]
+    fades = (np.diff(steps[:lasts]) < 0.0).all() and 1 < lasts <= longest and steps[:lasts].sum() > 3.0 * _TURN
+    return jumped + lasts if fades and calm else jumped
 
 
 def _stands(steps: Array) -> int:

@@ -34,6 +34,7 @@ from models.mocap.retargeting.retarget_report import (
     endless_limb_remarks,
     frame_remarks,
     haste_remarks,
+    held_remarks,
     joint_jump_remarks,
     unit_name,
 )
@@ -102,10 +103,14 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     propped = propped_seconds(lines, frames.positions[:, body], up.axis, motion.fps)
-    clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
+    filled = lines.filled(motion.fps)[skipped:]
+    lasts = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
+    counted = ~filled & np.repeat(2 * lasts >= lasts.max(), lasts)  # not what is lost in between
+    clip = Clip(_poses(*on_the_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
+        *held_remarks(filled, motion.fps, frames.dropped),
         *haste_remarks(legs, motion.fps),
         *joint_jump_remarks([jump for jump in odd if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
@@ -171,11 +176,14 @@ def _calibrated(motion: SourceMotion, roles: Roles, frames: _Frames, up: Array, 
 
 
 def _world_axes(body: Array, up: Array) -> Array:
-    """Rotation from the file's axes to the world's: `up` to z, the body's heading (its head's, if it lies) to +x."""
+    """Rotation from the file's axes to the world's: `up` to z, the body's heading (its head's, if it lies) to +x.
+
+    Of a body whose belly points downwards it is the longer of both: a crawl's belly leans to the side with a limb.
+    """
     forward, head = quaternions.rotated(body, _X), quaternions.rotated(body, _Z)
-    x = forward - up * (forward @ up)
-    if np.linalg.norm(x) < 0.3:
-        x = head - up * (head @ up)
+    x, ahead = forward - up * (forward @ up), head - up * (head @ up)
+    if np.linalg.norm(x) < max(0.3, float(np.linalg.norm(ahead)) * (forward @ up < 0.0)):  # it lies, or crawls
+        x = ahead
     x /= np.linalg.norm(x)
     turned = Rotation.from_matrix(np.column_stack((x, np.cross(up, x), up)))
     return quaternions.conjugate(np.asarray(turned.as_quat(scalar_first=True)))

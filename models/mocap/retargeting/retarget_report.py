@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array
+from models.arrays import Array, Mask
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.motion.spans import spans
@@ -123,12 +123,12 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
 def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
     """Soles whose orientation only a few of n frames tell, and a spine that is never straight."""
     few = [
-        f"the {side} one in {count or 'no'} frame{'s' * (count != 1)}"
+        f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
         if count < min(_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     if few:
-        told = "how the soles lie is a guess, since they hardly stand level"
+        told = "how the soles lie is a guess, since few frames tell"
         yield f"{told} ({', '.join(few)}); --rest-frame would say it"
     if calibrated.bend > _BENT:
         yield "the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it"
@@ -162,6 +162,13 @@ def frame_remarks(
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
+
+
+def held_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
+    """Frames (n,) that fill a motion up at its ends; `fps` and `dropped` as in `floor_remarks`."""
+    if filled.any():
+        told = f"nothing moves at all for {_lasting(spans(filled), fps, dropped)}"
+        yield f"{told}: frames that fill the motion up, which tell nothing of the body"
 
 
 def haste_remarks(legs: Array, fps: float) -> Iterator[str]:
@@ -200,7 +207,7 @@ def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
         yield f'{told}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
 
 
-def floor_remarks(clearance: Array, fps: float) -> Iterator[str]:
+def floor_remarks(clearance: Array, fps: float, dropped: int) -> Iterator[str]:
     """Where the body is above the floor for longer than a flight lasts, and where beneath it.
 
     Parameters
@@ -209,22 +216,25 @@ def floor_remarks(clearance: Array, fps: float) -> Iterator[str]:
         Height of the lowest point of the body [m].
     fps : float
         Frame rate [1/s].
+    dropped : int
+        Frames that were left out in front: times count from the file's first frame.
     """
     aloft = [span for span in spans(clearance > _ALOFT) if span[1] - span[0] > _FLIGHT * fps]
     if aloft:
         high = max(float(clearance[start:end].max()) for start, end in aloft)
-        how = f"up to {high:.2f} m above the floor, for {_lasting(aloft, fps)}, which no flight lasts"
+        how = f"up to {high:.2f} m above the floor, for {_lasting(aloft, fps, dropped)}, which no flight lasts"
         why = "it stands on something that is not in the file, or its place is in another unit than its bones"
         yield f"the body is {how}: {why}"
     beneath = spans(clearance < -_BENEATH)
     if beneath:
-        how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_lasting(beneath, fps)}"
+        how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_lasting(beneath, fps, dropped)}"
         yield f"parts of the body are {how}; see whether the file has it so"
 
 
-def _lasting(found: Sequence[tuple[int, int]], fps: float) -> str:
-    """How long spans of frames last together, and when the first one begins."""
-    return f"{two_digits(sum(end - start for start, end in found) / fps)} s (the first at {found[0][0] / fps:.2f} s)"
+def _lasting(found: Sequence[tuple[int, int]], fps: float, dropped: int) -> str:
+    """How long spans of frames last together, and when the first one begins in the file."""
+    lasts, first = sum(end - start for start, end in found) / fps, (found[0][0] + dropped) / fps
+    return f"{two_digits(lasts)} s (the first at {first:.2f} s)"
 
 
 def two_digits(number: float) -> str:

@@ -129,7 +129,12 @@ WRONG_ASF = {
     "cycle": (ASF.replace("    lfemur ltibia\n", "    lfemur root\n"), "1.asf:56: child 'root'"),
     "two parents": (ASF.replace("rfemur rtibia", "rfemur rtibia ltibia"), "1.asf:57: child 'ltibia'"),
     "orphan": (ASF.replace("    rfemur rtibia\n", ""), "1.asf: 'rtibia' is not in the hierarchy"),
-    "parent later": (ASF.replace("    rhipjoint rfemur\n", ""), "1.asf:56: 'rfemur' has no parent yet"),
+    "without a parent": (ASF.replace("    rhipjoint rfemur\n", ""), "1.asf: 'rfemur' is not in the hierarchy"),
+    "unknown parent": (ASF.replace("    rfemur rtibia\n", "    rfemr rtibia\n"), "1.asf:57: parent 'rfemr'"),
+    "ring": (
+        ASF.replace("root lhipjoint rhipjoint", "root rhipjoint\n    ltibia lhipjoint"),
+        "1.asf: 'lhipjoint' is below itself",
+    ),
     "1e5 bones": (":bonedata\n" + "".join(f"begin\nname b{k}\nend\n" for k in range(100_000)), "1.asf:3000: too many"),
     "empty": ("", "1.asf:1: file is empty"),
 }

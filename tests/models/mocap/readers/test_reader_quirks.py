@@ -111,6 +111,15 @@ def test_the_same_motion_written_differently(tmp_path, change):
     np.testing.assert_array_equal(places(read_text(tmp_path, change(CHAIN))), places(read_text(tmp_path, CHAIN)))
 
 
+def test_a_joint_may_have_several_ends(tmp_path):
+    end = "\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 0 0\n\t\t}\n"
+    motion = read_text(tmp_path, CHAIN.replace(end, end.replace("0 0 0", "0 -1 -2") + end.replace("0 0 0", "0 -1 5")))
+    np.testing.assert_array_equal(motion.tips[1], [0, -1, -2])
+    np.testing.assert_array_equal(motion.further_tips[1], [[0, -1, 5]])
+    assert motion.of_joints([0, 1]).further_tips.keys() == {1}
+    np.testing.assert_array_equal(places(motion), places(read_text(tmp_path, CHAIN)))
+
+
 def test_one_frame_and_positions_without_rotations(tmp_path):
     text = """HIERARCHY
 ROOT a
@@ -230,6 +239,14 @@ def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path)
     )
     np.testing.assert_allclose(degrees.tips[2], [0, -3, 0])
     assert (degrees.fps, degrees.timed) == (120.0, False)
+
+
+def test_the_lines_of_an_asf_s_hierarchy_may_stand_in_any_order(tmp_path):
+    asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
+    amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25")
+    turned = asf.replace("    root thigh\n    thigh shank\n", "    thigh shank\n    root thigh\n")
+    assert turned != asf
+    np.testing.assert_array_equal(places(read_acclaim(tmp_path, turned, amc)), places(read_acclaim(tmp_path, asf, amc)))
 
 
 def test_amc_frames_may_be_numbered_from_anywhere_at_any_constant_step(tmp_path):

@@ -9,7 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
+from models.mocap.library import embedded
 from models.mocap.motion import quaternions
+from models.mocap.motion.clip import Clip, global_rotations
 from tests.models.mocap.retargeting.rig_families import FAMILIES, NECKS, SPINES
 
 ZERO_POSES = ("T", "A", "upright T", "upright A", "random", "along X", "legs up", "along bones Y")
@@ -361,3 +363,16 @@ def _write(rig, clip, rows, turns, frames, places, rng, path):
     lines += ["MOTION", f"Frames: {len(table)}", f"Frame Time: {1.0 / clip.fps:.{rig.time}f}"]
     lines += [" ".join(f"{value:.{rig.digits}f}" for value in row) for row in table]
     path.write_text("\n".join(lines) + "\n")
+
+
+def at_rate(name, fps):
+    clip = embedded(name)
+    every = round(clip.fps / fps)
+    return Clip(clip.poses[::every], clip.fps / every, name)
+
+
+def largest_angle(ours, theirs):
+    ours, theirs = global_rotations(ours.poses), global_rotations(theirs.poses)
+    assert ours.shape == theirs.shape
+    return np.rad2deg(np.linalg.norm(quaternions.logarithm(quaternions.product(quaternions.conjugate(ours), theirs)),
+                                     axis=2).max())  # fmt: skip

@@ -11,7 +11,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import BODIES
 from models.mocap.library import embedded, embedded_names, load, read_motion
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.body_lines import body_lines
@@ -20,17 +20,11 @@ from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leading_pose import leading_frames
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
-from tests.models.mocap.retargeting.rigs import Rig, write_rig
+from tests.models.mocap.retargeting.rigs import Rig, at_rate, largest_angle, write_rig
 
 LIVELY = ("spin", "jump", "run", "backflip", "squat_dance")
 RATES = (20.0, 25.0, 30.0)
 UP = Hints(up="+Y")  # a body that somersaults does not tell it
-
-
-def at_rate(name, fps):
-    clip = embedded(name)
-    every = round(clip.fps / fps)
-    return Clip(clip.poses[::every], clip.fps / every, name)
 
 
 def reduced(motion, kept):
@@ -42,13 +36,6 @@ def reduced(motion, kept):
 def leading(motion, roles):
     rotations = motion.global_rotations()
     return leading_frames(motion, roles, body_lines(motion, roles, motion.global_positions(rotations), rotations))
-
-
-def largest_angle(ours, theirs):
-    ours, theirs = global_rotations(ours.poses), global_rotations(theirs.poses)
-    assert ours.shape == theirs.shape
-    return np.rad2deg(np.linalg.norm(quaternions.logarithm(quaternions.product(quaternions.conjugate(ours), theirs)),
-                                     axis=2).max())  # fmt: skip
 
 
 @pytest.mark.parametrize("fps", RATES)
@@ -180,23 +167,6 @@ def test_only_the_rest_poses_of_captures_are_left_out(mocap):
             assert repaired(part, roles).frames == () or "16_09" in path.name
     assert {name for name, _ in dropped} == {"01_01.bvh", "dme_example.bvh"}
     assert set(dropped.values()) == {1}
-
-
-@pytest.fixture
-def walked(tmp_path):
-    """Rows of a walk's file at 30 frames per second, and a function that loads changed ones."""
-    write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
-    head, rows = (tmp_path / "r.bvh").read_text().split("Frame Time: ")
-    seconds, *rows = rows.strip().splitlines()
-    table = np.array([row.split() for row in rows], dtype=float)
-
-    def loaded(rows):
-        text = "\n".join(" ".join(map(str, row)) for row in rows)
-        counted = re.sub(r"Frames: \d+", f"Frames: {len(rows)}", head)
-        (tmp_path / "b.bvh").write_text(f"{counted}Frame Time: {seconds}\n{text}\n")
-        return load(tmp_path / "b.bvh")
-
-    return table, loaded
 
 
 @pytest.mark.parametrize(("first", "n"), [(20, 1), (20, 3)])

@@ -79,15 +79,15 @@ def test_flights_and_steps_are_no_raised_floor(name, tmp_path):
 def test_what_is_beneath_the_floor_is_said_with_its_depth_and_time():
     clearance = np.zeros(200)
     clearance[50:60] = -0.28
-    assert list(floor_remarks(clearance, 100.0)) == [
+    assert list(floor_remarks(clearance, 100.0, 0)) == [
         "parts of the body are up to 0.28 m beneath the floor, for 0.1 s (the first at 0.50 s); "
         "see whether the file has it so"
     ]
     clearance[50:60] = -0.09
-    assert not list(floor_remarks(clearance, 100.0))
+    assert not list(floor_remarks(clearance, 100.0, 0))
 
 
 def test_hops_that_follow_each_other_are_no_raised_floor():
     """Each of them lasts less than a second, however many there are."""
     clearance = np.tile(np.concatenate((np.full(90, 0.3), np.zeros(10))), 5)
-    assert not list(floor_remarks(clearance, 100.0))
+    assert not list(floor_remarks(clearance, 100.0, 0))
