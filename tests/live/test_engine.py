@@ -1,5 +1,7 @@
 """A servo in somebody's hand: dragged, bent, tuned, put back, recorded."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from experiments.live.session.engine import STRONGEST, Drag, Engine
 from experiments.live.session.engine_process import slice_points
 from experiments.live.session.gains import gains_of, with_gain
 from experiments.live.session.takes import Take
-from experiments.results.folder import EDITED, RECORDING
+from experiments.results.folder import EDITED, RECORDING, SUMMARY
 from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from models.mocap.library import load
@@ -194,6 +196,40 @@ def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
         reproduce(tmp_path / "take")
     with pytest.raises(SimError, match="holds a run"):
         Take(tmp_path / "take", it)
+
+
+@pytest.mark.parametrize(
+    ("mode", "pressed", "performs", "pushes"),
+    [
+        ("follow", False, False, 1),
+        ("follow", True, False, 1),  # the switch does nothing there
+        ("stretch", False, False, 1),
+        ("stretch", True, False, 0),
+        ("stretch-then-follow", True, True, 1),
+        ("lead", False, False, 0),
+    ],
+)
+def test_a_drag_that_neither_bends_nor_leads_is_told_as_one_push(tmp_path, mode, pressed, performs, pushes):
+    it = engine(mode)
+    run(it, 0.8)
+    it.perform(performs)
+    take = Take(tmp_path / "take", it)
+    for block in range(160):
+        if block == 40:
+            it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]), pressed)
+        elif block == 110:
+            it.drag = None
+        take.add(it.advance(), it)
+    lines = take.end(it)
+    told = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
+    assert len(told) == pushes
+    for push in told:
+        assert push["start"] == pytest.approx(0.32, abs=1e-9)
+        assert push["seconds"] == pytest.approx(0.56, abs=0.002)
+        assert push["peak_force"] > 1.0
+        assert push["deviation_mm"] > 1.0
+        assert f"{push['peak_force']:.1f} N at 0.3 s" in " ".join(lines)
+        assert "The hand did not push." not in lines
 
 
 def test_a_slip_of_the_mouse_is_no_take(tmp_path):

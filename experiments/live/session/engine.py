@@ -170,6 +170,13 @@ class Engine:
         """Whether a bent curve is being performed."""
         return bool(np.isfinite(self._performs_from))
 
+    @property
+    def grabs_or_leads(self) -> bool:
+        """Whether the drag leads a figure or has hold of a curve that it can bend; any other drag is a push."""
+        if self.drag is None:
+            return False
+        return self.config.leads or (self.tubes is not None and not self.performs and self.drag.pressed)
+
     def undo(self) -> bool:
         """Undo the last bend; False if there is none."""
         return self._may_edit() and undo_bend(self.memory, self._record)

@@ -68,10 +68,9 @@ class Take:
         ticks.hand[:, 0] -= self._began
         frames.t[:] -= self._began
         self._record(ticks, frames, len(ticks.hand))
-        if engine.drag is not None:
-            end = self.seconds(engine)
-            begin = end - engine.seconds
-            if self._handled and begin - self._handled[-1][1] < 1e-6:
+        if engine.grabs_or_leads:
+            begin, end = float(ticks.hand[0, 0]), float(ticks.hand[-1, 0])  # as recorded, so that no tick is left out
+            if self._handled and begin - self._handled[-1][1] < 1.5 * engine.period:
                 begin = self._handled.pop()[0]
             self._handled.append((begin, end))
 
