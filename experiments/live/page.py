@@ -36,7 +36,7 @@ from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
-from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with
+from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] least time between two pictures
@@ -85,14 +85,21 @@ class Page:
         return self.server.get_port()
 
     def say(self, line: str) -> None:
-        """Show a line to all browsers."""
-        self._said = [*self._said, line][-LINES:]
+        """Show a line to all browsers; one that is shown already comes last."""
+        self._show([*(one for one in self._said if one != line), line][-LINES:])
+
+    def _show(self, said: list[str]) -> None:
+        self._said = said
         if hasattr(self, "_lines"):
             lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._said)
             self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Wrap an event handler: it runs for the driving browser only, between two pictures, and shows errors."""
+        """Wrap an event handler: it runs for the driving browser only, between two pictures, and shows errors.
+
+        What it said goes when it runs again.
+        """
+        mine: list[str] = []
 
         def done(event: Any) -> None:
             if event.client_id is None:
@@ -104,11 +111,14 @@ class Page:
                         auto_close_seconds=4.0,
                     )  # fmt: skip
                 return
-            try:
-                with self._turn:
+            with self._turn:
+                before = [one for one in self._said if one not in mine]
+                self._show(before)
+                try:
                     does(event)
-            except (ControllerError, ModelError, SimError, OSError) as error:
-                self.say(str(error))
+                except (ControllerError, ModelError, SimError, OSError) as error:
+                    self.say(str(error))
+                mine[:] = [one for one in self._said if one not in before]
 
         return done
 
@@ -258,6 +268,7 @@ class Page:
     def _write(self) -> None:
         desk = self.desk
         now, going = desk.now, desk.progress
+        desk.watched(len(self.server.get_clients()))
         self._progress.visible = going is not None
         if going is not None:
             self._progress.value = 100.0 * going.share
@@ -272,4 +283,4 @@ class Page:
 
 def _first_view(client: viser.ClientHandle) -> View:
     """Workspace and stage; on a phone the workspace, above the panel."""
-    return VIEWS["workspace" if is_phone(client) else "both"]
+    return VIEWS["workspace" if is_phone(*window_of(client.camera)) else "both"]

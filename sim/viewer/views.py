@@ -1,6 +1,7 @@
 """Camera views of a live page, placed such that a view fills the part of the window that the panel leaves free."""
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,8 @@ from controllers.state import Array
 FIELD_OF_VIEW = np.deg2rad(34.0)  # vertical [rad]: a ball at the upper edge is drawn 1/cos 17°, 5 % longer than wide
 PANEL = 335.0  # [px] width of viser's panel
 PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel covers the lower part
+DESKTOP = 576.0, 720.0  # [px] a tall window between these widths is no phone's: up to the first viser covers the lower
+# part, and phones, whose pixels are finer, report more than the second
 LEAST_FREE = 0.3  # least share of the width beside the panel: reached by windows below 479 px that are no phone's
 SHEET = 0.6  # share of the height that the panel covers on a phone
 DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not reported its own
@@ -54,8 +57,9 @@ def camera_of(view: View, width: float, height: float) -> Camera:
     With m metres per pixel in the plane of the view's centre, window height h and field of view α, its distance is
     m h/(2 tan(α/2)). It is shifted by half of what the panel covers, so that the view is centred in the rest.
     """
-    phone = width < PHONE * height
-    free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, LEAST_FREE * width), height)
+    free = (
+        (width, (1.0 - SHEET) * height) if is_phone(width, height) else (max(width - PANEL, LEAST_FREE * width), height)
+    )
     metres = max(2.0 * half / pixels for half, pixels in zip(view.half, free, strict=True))
     side = np.array(view.side) / np.linalg.norm(view.side)
     right, up = screen_axes(-side)
@@ -87,17 +91,23 @@ def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, siz
 
 
 def look_from(client: viser.ClientHandle, view: View) -> None:
-    """Show a view in a client's browser.
+    """Show a view in a client's browser."""
+    look(client.camera, view, window_of(client.camera))
 
-    The browser reports physical pixels, of which a high-resolution screen has two or three per CSS pixel, so the width
-    is limited to the default one.
+
+def window_of(camera: viser.CameraHandle) -> tuple[float, float]:
+    """Width and height of a browser's window [px], the width at most the default one.
+
+    The browser reports physical pixels, of which a high-resolution screen has two or three per CSS pixel.
     """
-    width = min(float(client.camera.image_width), DEFAULT_SIZE[0])
-    look(client.camera, view, (width, width / client.camera.aspect))
+    width = min(float(camera.image_width), DEFAULT_SIZE[0])
+    return width, width / camera.aspect
 
 
 def open_with(server: viser.ViserServer, view_of: Callable[[viser.ClientHandle], View]) -> None:
-    """Show a view of its own to each new browser, and again where its view is reset.
+    """Show a view of its own to each new browser, and again where its view is reset or its window changes its shape.
+
+    A view that somebody has turned or moved stays when the window changes.
 
     A browser may apply the server's initial camera after the one it is sent when it connects (viser 1.1 does the one
     in an effect of its page, the other as a message comes), so the view is sent again to one that reports the initial
@@ -108,15 +118,34 @@ def open_with(server: viser.ViserServer, view_of: Callable[[viser.ClientHandle],
 
     def connected(client: viser.ClientHandle) -> None:
         look_from(client, view_of(client))
+        sizes = deque([window_of(client.camera)], maxlen=32)
 
         @client.camera.on_update
-        def _(camera: viser.CameraHandle) -> None:
+        async def _(camera: viser.CameraHandle) -> None:  # asynchronous, so that updates are handled in order
+            size, before = window_of(camera), sizes[-1]
+            if size != before:
+                sizes.append(size)
             if np.allclose(camera.position, initial, atol=1e-4):
                 look_from(client, view_of(client))
+            elif _resized(before, size):
+                view = next((view for view in VIEWS.values() if _shows(camera, view, sizes)), None)
+                if view is not None:
+                    look(camera, view, size)
 
     server.on_client_connect(connected)
 
 
-def is_phone(client: viser.ClientHandle) -> bool:
-    """Whether a browser's window is as narrow as a phone's."""
-    return client.camera.aspect < PHONE
+def _resized(before: tuple[float, float], size: tuple[float, float]) -> bool:
+    """Whether a window was resized, and not drawn with other pixels: viser takes down to 3/4 of them if it is slow."""
+    share = size[0] / before[0]
+    return abs(share - size[1] / before[1]) > 0.01 * share or not 0.74 < share < 1.36
+
+
+def _shows(camera: viser.CameraHandle, view: View, sizes: Iterable[tuple[float, float]]) -> bool:
+    """Whether a camera is where it was placed for a view, in a window of one of the given sizes."""
+    return any(np.allclose(camera.position, camera_of(view, *size).position, atol=1e-3) for size in sizes)
+
+
+def is_phone(width: float, height: float) -> bool:
+    """Whether a window of a given size [px] is as narrow as a phone's."""
+    return width < PHONE * height and not DESKTOP[0] < width < DESKTOP[1]

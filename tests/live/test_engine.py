@@ -240,6 +240,14 @@ def test_a_slip_of_the_mouse_is_no_take(tmp_path):
         take.end(it)
 
 
+def test_a_take_while_time_stood_still_leaves_no_folder(tmp_path):
+    it = engine()
+    take = Take(tmp_path / "take", it)
+    with pytest.raises(SimError, match="time stood still"):
+        take.end(it)
+    assert not (tmp_path / "take").exists()
+
+
 def test_sliders_hold_what_gains_are():
     for mode in ("follow", "bunny", "stretch", "stretch-then-follow", "lead"):
         config = run_config(mode=mode)

@@ -11,7 +11,7 @@ FIRST_STEPS = """
 - The **figure** moves as the stylus does; the translucent one shows the animation that nobody touches.
 - To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag
   the curve, and *Perform the bent curve*.
-- **Keys**: I J K L and U O move the hand (H lets go), space pauses, N steps, Z and Y undo and redo, R resets.
+- **Keys**: I J K L and U O move the hand (H lets go), space pauses and goes on, N steps, Z and Y undo and redo, R resets.
 - *Gains* shows whether the loop is stable; *Takes* records what you do, and downloads it; *Clips* takes your motion.
 - Turn the view by dragging beside the ball, zoom with the wheel, move it with the right button.
 """
@@ -22,6 +22,8 @@ def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Des
     middle, most = 1e3 * now["cost"]
     doing = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
     said = [f"<b>{now['t'][0]:.2f} s</b> · {doing}"]
+    if desk.paused and desk.holds:
+        said.append("<b>Press space</b>: you hold the stylus, but time stands still")
     if going:
         said.append(html.escape(going))
     elif driver is None:

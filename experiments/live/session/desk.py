@@ -35,6 +35,7 @@ from sim.errors import SimError
 
 REMEMBERED = 60.0  # [s] of history that can be looked at again
 PICTURES = 30.0  # states stored per second of history
+UNWATCHED = 60.0  # [s] without a browser after which a take is ended: longer than a page takes to be loaded again
 MOST_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
 _MOTIONS = (".bvh", ".amc", ".asf", ".txt", ".json")
 
@@ -72,7 +73,7 @@ class Desk:
         self.now: dict[str, Array] = self.engine.shown.read()
         self._done: list[Doing] = []
         self._undone: list[Doing] = []
-        self._bends, self._expected = 0, 0
+        self._bends, self._expected, self._watched = 0, 0, 0.0
         self._verdicts = Worker(verdicts)
         self._preparation: Worker | None = None
 
@@ -291,6 +292,16 @@ class Desk:
         if self.take(name).exists():
             raise SimError(f"there is a take {name!r} already; expected another name")
         self.engine.ask(Record(self.take(name)))
+
+    def watched(self, browsers: int) -> None:
+        """Told again and again how many browsers there are; without one for `UNWATCHED`, a take is ended."""
+        now = time.monotonic()
+        if browsers or not self.records:
+            self._watched = now
+        elif now - self._watched > UNWATCHED:
+            self._watched = now
+            self._say(f"The take was ended: for {UNWATCHED:g} s no browser had the page.")
+            self.stop()
 
     def stop(self) -> None:
         """End the take; it is measured and saved."""

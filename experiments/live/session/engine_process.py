@@ -218,7 +218,8 @@ class _Runner:
         trace, hand = engine.memory, servo.device.hand
         shown: dict[str, Any] = {
             "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
-            "recording": 0.0 if self._take is None else self._take.seconds(engine), "qpos": shown_configuration(servo),
+            "recording": 0.0 if self._take is None else self._take.seconds(engine) + engine.period,
+            "qpos": shown_configuration(servo),
             "reference": servo.reference.pose, "p": hand[POSITION], "switch": hand[HAND_SWITCH],
             "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
             "residual": float(np.linalg.norm(servo.figure.applied[:3])),

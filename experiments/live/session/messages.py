@@ -15,7 +15,8 @@ SHOWN = {
     "residual": 1, "course": 3 * COURSE_POINTS,
     "slice": 6 * SLICE_SIDE**2,
 }  # fmt: skip
-"""Rows of the engine's board, with their sizes: the displayed values; ``curve`` counts changes of ``course``."""
+"""Rows of the engine's board, with their sizes: the displayed values; ``curve`` counts changes of ``course``;
+``recording`` is 0 without a take, and a tick longer than the take, so that one of a paused run is seen."""
 
 HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1, "slice": 1}
 """Rows of the page's board, with their sizes: grip, target and clock; ``steps`` counts the requested single steps."""

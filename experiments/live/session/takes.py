@@ -1,6 +1,7 @@
 """Takes: recorded spans of a live session, each in a folder like those of ``hvf run``, for ``hvf report``."""
 
 import time
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -57,6 +58,7 @@ class Take:
         self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo), static)
         self._record = record_into(self._recorder, servo, engine.world)
         self._handled: list[tuple[float, float]] = []
+        self._ticks = 0
 
     def seconds(self, engine: Engine) -> float:
         """Duration so far [s]."""
@@ -68,6 +70,7 @@ class Take:
         ticks.hand[:, 0] -= self._began
         frames.t[:] -= self._began
         self._record(ticks, frames, len(ticks.hand))
+        self._ticks += len(ticks.hand)
         if engine.grabs_or_leads:
             begin, end = float(ticks.hand[0, 0]), float(ticks.hand[-1, 0])  # as recorded, so that no tick is left out
             if self._handled and begin - self._handled[-1][1] < 1.5 * engine.period:
@@ -80,9 +83,16 @@ class Take:
         Raises
         ------
         SimError
-            If it is too short to be measured; the recording is then kept as an interrupted one.
+            If it is too short to be measured; the recording is then kept as an interrupted one. Without a tick, nothing
+            is left of it.
         """
         seconds = self.seconds(engine)
+        if not self._ticks:
+            self._recorder.close()
+            (self.folder / RECORDING).unlink()
+            with suppress(OSError):  # it may hold somebody's files
+                self.folder.rmdir()
+            raise SimError(f"{self.folder}: time stood still, and nothing was recorded; expected {LEAST:g} s or more")
         self._recorder.flush()
         if seconds < LEAST:
             self._recorder.close()

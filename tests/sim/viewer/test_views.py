@@ -1,5 +1,6 @@
 """A view of the live page is in the middle of what the panel leaves free, and all of it is there."""
 
+import asyncio
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.viewer.views import FIELD_OF_VIEW, PANEL, PHONE, SHEET, VIEWS, View, camera_of, open_with, screen_axes
+from sim.viewer.views import FIELD_OF_VIEW, PANEL, SHEET, VIEWS, View, camera_of, is_phone, look, open_with, screen_axes
 
 
 def seen(view: View, width: float, height: float) -> np.ndarray:
@@ -25,11 +26,13 @@ def seen(view: View, width: float, height: float) -> np.ndarray:
     return np.stack([0.5 * width + scale * (ways @ right), 0.5 * height - scale * (ways @ up)], axis=1)
 
 
-@pytest.mark.parametrize("size", [(1400, 850), (900, 520), (1920, 1080), (390, 780), (700, 900)])
+@pytest.mark.parametrize(
+    "size", [(1400, 850), (900, 520), (1920, 1080), (390, 780), (1170, 2340), (700, 900), (600, 1200)]
+)
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int]) -> None:
     width, height = size
-    free = (width, (1.0 - SHEET) * height) if width < PHONE * height else (width - PANEL, height)
+    free = (width, (1.0 - SHEET) * height) if is_phone(width, height) else (width - PANEL, height)
     pixels = seen(VIEWS[name], *size)
     np.testing.assert_allclose(pixels[0], [0.5 * free[0], 0.5 * free[1]], atol=1e-6)
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)
@@ -38,20 +41,52 @@ def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int
     assert spread.max() == pytest.approx(1.0)  # no smaller than it has to be
 
 
-def test_a_browser_that_applies_the_initial_camera_late_is_shown_its_view_again() -> None:
-    calls: dict[str, Callable[..., None]] = {}
+def opened() -> tuple[Any, Any, Callable[[], None]]:
+    """A server, the camera of its browser of 900×520, and what tells it that the camera has changed."""
+    calls: dict[str, Callable[..., Any]] = {}
     server: Any = SimpleNamespace(
         initial_camera=SimpleNamespace(), on_client_connect=lambda call: calls.update(connect=call)
     )
-    camera = SimpleNamespace(image_width=900, aspect=900 / 520, on_update=lambda call: calls.update(update=call))
+    camera: Any = SimpleNamespace(on_update=lambda call: calls.update(update=call))
+    resize(camera, 900, 520)
     open_with(server, lambda client: VIEWS["both"])
     calls["connect"](SimpleNamespace(camera=camera))
+    return server, camera, lambda: asyncio.run(calls["update"](camera))
+
+
+def resize(camera: Any, width: int, height: int) -> None:
+    camera.image_width, camera.aspect = width, width / height
+
+
+def test_a_view_is_fitted_to_a_window_that_is_resized_until_somebody_turns_it() -> None:
+    _, camera, update = opened()
+    for size in ((1300, 850), (800, 600), (600, 1200), (390, 780)):
+        resize(camera, *size)
+        update()
+        np.testing.assert_allclose(camera.position, camera_of(VIEWS["both"], *size).position)
+    look(camera, VIEWS["stage"], (390, 780))  # by its button
+    update()
+    resize(camera, 800, 600)
+    update()
+    fitted = camera.position.copy()
+    np.testing.assert_allclose(fitted, camera_of(VIEWS["stage"], 800, 600).position)
+    resize(camera, 600, 450)  # viser draws fewer pixels in the same window
+    update()
+    np.testing.assert_array_equal(camera.position, fitted)
+    camera.position = turned = fitted + np.array([0.1, 0.0, 0.0])
+    resize(camera, 1300, 850)
+    update()
+    np.testing.assert_array_equal(camera.position, turned)
+
+
+def test_a_browser_that_applies_the_initial_camera_late_is_shown_its_view_again() -> None:
+    server, camera, update = opened()
     fitted = camera_of(VIEWS["both"], 900, 520)
     np.testing.assert_allclose(camera.position, fitted.position)
     camera.position = server.initial_camera.position.astype(np.float32)
-    calls["update"](camera)
+    update()
     np.testing.assert_allclose(camera.position, fitted.position)
     np.testing.assert_allclose(camera.look_at, fitted.look_at)
     camera.position = turned = fitted.position + np.array([0.1, 0.0, 0.0])
-    calls["update"](camera)
+    update()
     np.testing.assert_array_equal(camera.position, turned)

@@ -1,0 +1,90 @@
+"""What a slider shows is its gain, and a number that is none of its is refused with its bounds."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from controllers.errors import ParameterError
+from experiments.config.words import run_config
+from experiments.live.panels import gains_panel
+from experiments.live.panels.gains_panel import GainsPanel
+from experiments.live.session.gains import with_gain
+
+
+class Gui:
+    """A GUI without a browser."""
+
+    def __init__(self) -> None:
+        self.sliders: dict[str, Any] = {}
+
+    def add_html(self, content: str) -> Any:
+        return SimpleNamespace(content=content)
+
+    def add_folder(self, label: str) -> Any:
+        return Folder()
+
+    def add_slider(self, label: str, least: float, most: float, step: float, value: float, hint: str) -> Any:
+        made = SimpleNamespace(min=least, max=most, value=value, on_update=lambda call: setattr(made, "moved", call))
+        self.sliders[label] = made
+        return made
+
+
+class Folder:
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+class Desk:
+    """A desk without processes."""
+
+    def __init__(self, **words: object) -> None:
+        self.config, self.verdict, self.checking = run_config(**words), (), False
+
+    def set_gain(self, name: str, value: float) -> None:
+        self.config = with_gain(self.config, name, value)
+
+
+def made(**words: object) -> tuple[GainsPanel, Any, Any]:
+    gui, desk = Gui(), Desk(mode="follow", **words)
+    panel = GainsPanel(gui, desk, lambda does: does)  # pyright: ignore[reportArgumentType]
+    panel.rebuild()
+    return panel, desk, gui.sliders["k_r [N/m]"]
+
+
+def typed(slider: Any, value: float) -> None:
+    slider.value = value
+    slider.moved(None)
+
+
+def test_a_number_beyond_a_slider_is_refused_with_its_bounds_and_the_gain_shown_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    panel, desk, slider = made()
+    typed(slider, 400.0)
+    with pytest.raises(ParameterError, match="k_r is 20000; expected 10 to 12000 N/m"):
+        typed(slider, 20000.0)
+    assert desk.config.mode.stiffness == 400.0
+    panel.write()
+    assert slider.value == 20000.0  # a number may be half typed
+    monkeypatch.setattr(gains_panel, "TYPING", -1.0)
+    panel.write()
+    assert slider.value == 400.0
+
+
+def test_a_slider_that_moved_before_its_handler_ran_stays_and_one_whose_gain_was_undone_moves() -> None:
+    panel, desk, slider = made()
+    slider.value = 500.0
+    panel.write()
+    assert slider.value == 500.0
+    slider.moved(None)
+    panel.write()
+    desk.set_gain("stiffness", 300.0)  # by undo
+    panel.write()
+    assert slider.value == 300.0
+
+
+def test_a_slider_reaches_a_gain_of_the_command_line() -> None:
+    _, desk, slider = made(stiffness=20000.0)
+    assert slider.value == slider.max == desk.config.mode.stiffness == 20000.0
