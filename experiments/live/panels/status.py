@@ -11,7 +11,8 @@ FIRST_STEPS = """
 - The **figure** moves as the stylus does; the translucent one shows the animation that nobody touches.
 - To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag
   the curve, and *Perform the bent curve*.
-- **Keys**: I J K L and U O move the hand (H lets go), space pauses and goes on, N steps, Z and Y undo and redo, R resets.
+- **Keys**: I J K L and U O move the hand (H lets go), space pauses and goes on, N steps, Z and Y undo and redo,
+  R resets.
 - *Gains* shows whether the loop is stable; *Takes* records what you do, and downloads it; *Clips* takes your motion.
 - Turn the view by dragging beside the ball, zoom with the wheel, move it with the right button.
 """
