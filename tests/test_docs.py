@@ -5,6 +5,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,8 @@ import pytest
 from experiments.cli import parsed
 from experiments.commands import NAMES
 from experiments.config.words import config_of_options
+from experiments.trials.study import Study
+from experiments.tuning.tune_config import read_tuning
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -98,6 +101,24 @@ def _parses(arguments: list[str], line: str) -> None:
     options = getattr(command, "options", None)
     if options is not None and options.config is None:  # the file would be a run's that there has not been
         assert config_of_options(options), line
+
+
+TOML = {  # how the files that pages show are read
+    "docs/how-to/rigs.md": lambda path: tomllib.loads(path.read_text(encoding="utf-8")),  # an excerpt, as it says
+    "docs/how-to/tuning.md": read_tuning,
+    "docs/how-to/user-studies.md": Study.load,
+    "docs/tutorials/your-own-study.md": Study.load,
+}
+
+
+@pytest.mark.parametrize("page", pages_with("toml"), ids=name)
+def test_the_toml_of_a_page_is_read_as_it_stands(page: Path, tmp_path: Path) -> None:
+    for block in blocks(page, "toml"):
+        file = tmp_path / "shown.toml"
+        file.write_text(block, encoding="utf-8")
+        read = TOML[name(page)](file)
+        if isinstance(read, Study):
+            assert read.trials
 
 
 def test_the_reference_lists_every_command() -> None:
