@@ -141,7 +141,8 @@ class Study:
         Raises
         ------
         ModelError, ControllerError, SimError, OSError
-            If the study contradicts itself, or cannot go on; completed trials are kept.
+            If the study contradicts itself, cannot go on, or has fewer users or repetitions than the folder; completed
+            trials are kept.
         """
         folder, where = given_path("out", out), Where(threads=threads, workers=workers, cluster=cluster)
         of_kind("console", console, Console | None)
@@ -151,6 +152,7 @@ class Study:
             check_place(self.config.recordings)
         _check_folder(folder)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
+            self._refuse_fewer(folder, database)
             warm((trial.config for trial in trials), SHELF, console)
             with executor(where) as runs:
                 ran = run_missing(trials, database, runs, self.config.recordings, console, _descriptions(trials))
@@ -169,6 +171,17 @@ class Study:
         result = StudyResult(folder, frame, found, sentences, ran, failed)
         (folder / SUMMARY).write_text(result.to_json() + "\n", encoding="utf-8")
         return result
+
+    def _refuse_fewer(self, folder: Path, database: Database) -> None:
+        """Refuse fewer users or repetitions than the folder has: their tables and report would replace those of all."""
+        asked = {"user": self.config.users.number, "repetition": self.config.repetitions}
+        for name, number in asked.items():
+            held = database.most(name) + 1
+            if held > number:
+                raise StudyError(
+                    f"{folder}: holds this study with {held} {name}s, whose tables and report those of {number} would "
+                    f"replace; expected {held} {name}s or more, or another --out"
+                )
 
     def _text(self) -> str:
         return self.text or to_json(self.config)

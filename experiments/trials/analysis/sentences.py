@@ -61,7 +61,9 @@ def _compared(c: Contrast) -> str:
         return f"{held} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
     interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
     if not c.shown:
-        return f"no difference shown between {c.level} and {c.reference} ({held}; {interval})"
+        # An interval may exclude zero by itself, but not among all comparisons.
+        corrected = f"; p = {_number(c.p_holm)} after Holm's correction" if math.isfinite(c.p_holm) else ""
+        return f"no difference shown between {c.level} and {c.reference} ({held}; {interval}{corrected})"
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
     agree = f", {c.agree} of {c.users} users" if c.agree else ""

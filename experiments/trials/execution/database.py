@@ -115,6 +115,12 @@ class Database:
         with self._errors_named():
             return {key for (key,) in self._db.execute("SELECT key FROM trials")}
 
+    def most(self, name: str) -> int:
+        """Largest value of a number in the descriptions of the trials; −1 if no trial has it."""
+        with self._errors_named():
+            found = self._db.execute("SELECT max(json_extract(what, '$.' || ?)) FROM trials", (name,)).fetchone()[0]
+            return -1 if found is None else int(found)
+
     def close(self) -> None:
         """Close the file and release its lock for other drivers."""
         self._db.close()

@@ -53,6 +53,22 @@ def test_another_study_in_the_folder_is_refused(tmp_path: Path) -> None:
     assert small(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
 
 
+@pytest.mark.parametrize(
+    ("fewer", "says"),
+    [({"users": {"number": 2}}, "with 3 users.*those of 2 would"), ({"repetitions": 1}, "with 2 repetitions.*of 1")],
+)
+def test_fewer_users_or_repetitions_than_a_folder_has_are_refused_and_replace_nothing(
+    tmp_path: Path, fewer: dict[str, object], says: str
+) -> None:
+    whole = small(repetitions=2)
+    trial = whole.trials[0]
+    with Database(tmp_path / DATABASE, whole._identity(), "small", "") as database:
+        database.add(Row(trial.key, "failed", "", {}, 0.0, "", ""), {"user": 2, "repetition": 1})
+    with pytest.raises(StudyError, match=says):
+        small(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
+    assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, "study.lock"}
+
+
 def test_a_trial_that_raises_is_a_row_with_its_reason_and_not_an_end(tmp_path: Path) -> None:
     # A curve that the Phantom does not reach is known only when the run is wired up.
     factors = {"around": {"near": {"radius": 0.0477}, "far": {"radius": 0.4}}}

@@ -3,7 +3,7 @@ import pytest
 
 from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g
 from experiments.trials.analysis.sentences import three_sentences
-from experiments.trials.analysis.statistics import statistics
+from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.design.study_config import study_from
 
 pd = pytest.importorskip("pandas")
@@ -97,6 +97,17 @@ def test_failed_trials_are_left_out_and_told() -> None:
     assert "of which 1 failed" in said[0]
     assert said[1].startswith("Tracking error, by guidance: lower (better) with river than with none")
     assert "no difference shown between river and none" in said[2]
+
+
+def test_an_interval_that_excludes_zero_and_shows_no_difference_is_beside_the_corrected_p() -> None:
+    contrast = Contrast(
+        "effort", "stiffness", "600", "50", 6, 0.4, 0.6, -0.2, -0.304, -0.188, -0.2, -0.2, -0.2, -0.3, -0.1, 0.01,
+        0.057, -1.0, 6,
+    )  # fmt: skip
+    study = study_from({"name": "s", "factors": {"stiffness": [50, 600]}, "cost": "effort"}, "")
+    said = three_sentences(study, Statistics((contrast,), {}, ()), frame(-1.0), 0)[2]
+    assert "no difference shown between 600 and 50" in said
+    assert "-0.304 to -0.188 N² s; p = 0.057 after Holm's correction)" in said
 
 
 def test_what_is_not_known_is_said_with_its_reason() -> None:
