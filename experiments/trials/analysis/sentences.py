@@ -62,7 +62,7 @@ def _compared(c: Contrast) -> str:
     interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
     if not c.shown:
         # An interval may exclude zero by itself, but not among all comparisons.
-        corrected = f"; p = {_number(c.p_holm)} after Holm's correction" if math.isfinite(c.p_holm) else ""
+        corrected = f"; p = {_number(c.p_holm)} corrected after Holm" if math.isfinite(c.p_holm) else ""
         return f"no difference shown between {c.level} and {c.reference} ({held}; {interval}{corrected})"
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")

@@ -107,7 +107,7 @@ def test_an_interval_that_excludes_zero_and_shows_no_difference_is_beside_the_co
     study = study_from({"name": "s", "factors": {"stiffness": [50, 600]}, "cost": "effort"}, "")
     said = three_sentences(study, Statistics((contrast,), {}, ()), frame(-1.0), 0)[2]
     assert "no difference shown between 600 and 50" in said
-    assert "-0.304 to -0.188 N² s; p = 0.057 after Holm's correction)" in said
+    assert "-0.304 to -0.188 N² s; p = 0.057 corrected after Holm)" in said
 
 
 def test_what_is_not_known_is_said_with_its_reason() -> None:
