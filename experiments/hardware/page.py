@@ -19,6 +19,7 @@ from experiments.setups.wiring import Ready, wire
 from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
+from sim.hardware.undisturbed import parent_id
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
@@ -46,7 +47,7 @@ def show_status(config: RunConfig, status: SharedNumbers, recorder_status: Share
     world = session.world
     static = session.static()
     page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), world.kind)
-    linkage, parent = shown_phantom(world.model, world.data), os.getppid()
+    linkage, parent = shown_phantom(world.model, world.data), parent_id()
     row, twin = np.zeros(ROW_SIZE), np.zeros(RECORDER_SIZE)
     while os.getppid() == parent:
         if status.read(row):

@@ -27,6 +27,7 @@ from sim.hardware.emulated import EmulatedPhantom, emulated_identity
 from sim.hardware.packets import BROKEN, NOTHING, monotonic, receive, transmit, wait_for_packet
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
+from sim.hardware.undisturbed import parent_id
 
 WATCHDOG = 0.02
 """Time without a command after which the device switches its motors off [s]: twenty periods at 1 kHz."""
@@ -48,7 +49,7 @@ class EmulatedEnd(NamedTuple):
 def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime: bool) -> None:
     """Run the device until the parent process is gone; the target of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    device, parent = make(), os.getppid()
+    device, parent = make(), parent_id()
     device.write(np.zeros(3), False)
     if realtime:
         become_realtime()

@@ -19,6 +19,7 @@ from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import CHANNELS, ROW_SIZE, columns
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
+from sim.hardware.undisturbed import parent_id
 from sim.recording.recorder import DiskFull, Group, Recorder
 from sim.recording.recording import RecordingError
 
@@ -68,7 +69,7 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: Sh
     A full disk, or any other error of writing, ends the recording and is in `report`; the servo is not affected.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    status, order, parent = np.zeros(RECORDER_SIZE), np.zeros(1), os.getppid()
+    status, order, parent = np.zeros(RECORDER_SIZE), np.zeros(1), parent_id()
     twin = Twin(job.scene)
     twin.follow(columns(np.zeros((0, ROW_SIZE))))
     try:

@@ -4,6 +4,7 @@ Each tick's row is written to shared memory without waiting for any reader. A mi
 the number of a tick always gives its time, and no burst of ticks follows a stall.
 """
 
+import contextlib
 import os
 import signal
 import time
@@ -32,6 +33,7 @@ from sim.hardware.duration_histogram import Quantiles, Spread, count_time
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers, append_row
+from sim.hardware.undisturbed import parent_id
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end
@@ -147,7 +149,8 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         broken = traceback.format_exc()
     finally:
         parts.driver.let_go()
-        channels.reports.send(process.ended(broken))
+        with contextlib.suppress(OSError):  # the controls are gone
+            channels.reports.send(process.ended(broken))
         process.close()
         parts.driver.close()
 
@@ -215,7 +218,7 @@ class ServoProcess:
 
     def run(self) -> None:
         """Tick at absolute deadlines, until there is an order to end or the parent process is gone."""
-        period, parent = self._period, float(os.getppid())
+        period, parent = self._period, float(parent_id())
         begin = self._heard = time.monotonic()
         number = 1.0
         while True:

@@ -1,5 +1,7 @@
-"""Start of processes that Ctrl-C does not end."""
+"""Start of processes that Ctrl-C does not end, and how they see that whoever started them is gone."""
 
+import multiprocessing
+import os
 import signal
 from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
@@ -13,3 +15,9 @@ def start_undisturbed(process: BaseProcess) -> None:
         process.start()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def parent_id() -> int:
+    """Id of the process that started this one, as it said itself; `os.getppid` is another once that one is gone."""
+    parent = multiprocessing.parent_process()
+    return os.getppid() if parent is None or parent.pid is None else parent.pid

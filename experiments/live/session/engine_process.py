@@ -44,6 +44,7 @@ from models.errors import ModelError
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
 from sim.errors import SimError
+from sim.hardware.undisturbed import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 
@@ -85,7 +86,7 @@ class _Runner:
         self._shown, self._held, self._orders, self._answers = shown, held, orders, answers
         self._engine: Engine | None = None
         self._take: Take | None = None
-        self._parent, self._going = os.getppid(), True
+        self._parent, self._going = parent_id(), True
         self._pictured, self._sliced, self._steps = 0.0, 0.0, 0.0
         self._paced = 0.0, 0.0
         self._curve, self._changed = 0, True

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.errors import ModelError
-from sim.hardware.undisturbed import start_undisturbed
+from sim.hardware.undisturbed import parent_id, start_undisturbed
 
 _LISTENS = 0.5  # [s] between two checks whether the page's process still exists
 
@@ -88,7 +88,7 @@ def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
 
 def newest(asked: Any) -> Any:
     """Wait for a request and return the newest one; None if the page's process has ended."""
-    parent = os.getppid()
+    parent = parent_id()
     while True:
         try:
             what = asked.get(timeout=_LISTENS)

@@ -1,0 +1,86 @@
+"""A process whose parent was killed while it started ends, too."""
+
+import queue
+import signal
+import socket
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from experiments.live.session.workers import newest
+from sim.hardware import undisturbed
+from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
+from sim.hardware.shared import SharedNumbers
+from tests.sim.hardware.hosted import PERIOD
+
+GONE = 2**22 + 1  # no process has such an id
+
+
+@pytest.fixture
+def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This process is one whose parent is gone."""
+    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=GONE))
+
+
+def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, monkeypatch) -> None:
+    class Device:
+        writes, torque, clock = 0, np.zeros(3), 0.0
+
+        def write(self, torque, enable) -> None:
+            self.writes += 1
+            assert self.writes < 3, "it goes on"
+
+        def read(self, reading, timeout) -> None: ...
+
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    shown = SharedNumbers(SHOWN_SIZE)
+    with ours, theirs:
+        host_device(Device, EmulatedEnd(theirs, shown, PERIOD), False)
+    shown.close()
+
+
+def test_a_worker_whose_page_went_while_it_worked_ends(orphan) -> None:
+    class Asked:
+        times = 0
+
+        def get(self, timeout: float) -> None:
+            self.times += 1
+            assert self.times < 3, "it goes on"
+            raise queue.Empty
+
+    assert newest(Asked()) is None
+
+
+SCRIPT = """
+import multiprocessing, os, signal, socket, time
+from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
+from sim.hardware.shared import SharedNumbers
+from tests.sim.hardware.hosted import PERIOD, device
+
+
+def late():
+    os.kill(os.getppid(), signal.SIGKILL)
+    time.sleep(0.2)
+    return device()
+
+
+if __name__ == "__main__":
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    end = EmulatedEnd(theirs, SharedNumbers(SHOWN_SIZE), PERIOD)
+    process = multiprocessing.get_context("spawn").Process(target=host_device, args=(late, end, False), daemon=True)
+    process.start()
+    process.join()
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_parent_leaves_no_device(tmp_path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(SCRIPT)
+    # Its output ends when the last process that has it is gone.
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, timeout=60, check=False)
+    assert ended.returncode == -signal.SIGKILL
