@@ -13,6 +13,7 @@ for _number in range(3):  # a file that is opened later would take the place of 
     except OSError:
         os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
 sys.stdout, sys.stderr = sys.stdout or open(os.devnull, "w"), sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115
 
 
 def stop_early(*_: object) -> None:

@@ -2,6 +2,8 @@
 
 import errno
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -113,3 +115,13 @@ def test_a_library_that_is_installed_is_listed_and_a_node_without_permission_has
     (finding,) = (finding for finding in findings([node]) if finding.what == "/dev/hidraw9")
     assert finding.state == MISSING
     assert node.udev_rule() in finding.remedy
+
+
+def test_a_standard_input_that_is_closed_is_no_terminal(tmp_path) -> None:
+    closed = "import os, sys; os.close(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    command = ["-m", "experiments.cli", "hardware", "run", "--out", str(tmp_path / "run")]
+    ended = subprocess.run(
+        [sys.executable, "-c", closed, *command], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert ended.stderr == "hvf: nobody is at a terminal to arm the device; expected --arm, or a terminal\n"
+    assert ended.returncode == 2
