@@ -129,6 +129,15 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
     )
 
 
+def holds_ticks(path: Path) -> bool:
+    """Whether a tick is in a recording; a file that cannot be read may have some."""
+    try:
+        with Recording(path) as recording:
+            return len(recording.groups["ticks"]["state"]) > 0
+    except RecordingError:
+        return path.exists()
+
+
 def _recorded(path: Path) -> dict[str, Any]:
     nothing: dict[str, Any] = dict.fromkeys(
         ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
@@ -139,9 +148,9 @@ def _recorded(path: Path) -> dict[str, Any]:
         return nothing
     with recording:
         channels = recording.groups["ticks"]
-        state = recording.channel("ticks", "state")[:]
-        if not len(state):
+        if not len(channels["state"]):
             return nothing
+        state = channels["state"][:]
         on = state == State.ACTIVE
         rows = {
             name: recording.channel("ticks", name)[:] for name in ("distance", "force", "heat", "apart", "hand_force")

@@ -19,19 +19,29 @@ from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.attend import attend
-from experiments.hardware.outcome import Outcome, outcome_of
+from experiments.hardware.outcome import Outcome, holds_ticks, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
+from experiments.results.folder import (
+    CONFIG,
+    DEVICE,
+    RECORDING,
+    REPORT,
+    SUMMARY,
+    check_folder,
+    check_holds,
+    claimed,
+    clear_folder,
+)
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
 from sim.devices.hardware_list import check_there
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun
-from sim.hardware.emulated import steps_late
+from sim.hardware.emulated import emulated_identity, steps_late
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
@@ -58,8 +68,9 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If there is no such device, or it may not be armed with this field. The folder is then left unchanged, unless
-        this is found only after the device has been opened.
+        If there is no such device, or it may not be armed with this field, or another run is being written into the
+        folder. The folder is then left unchanged, unless an earlier run is replaced and this is found only after a
+        real device has been opened.
     """
     console = Console(stderr=True)
     check_folder(options.out, options.overwrite)
@@ -70,10 +81,11 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     content = content_of(config.device)
     hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
     scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
+    calibrated = options.emulate is None or not any(hidden.offset)
     if options.name == EMULATED:
         steps_late(scene, hidden.delay)
+        check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
     session = _compiled(config, options, console)
-    _begin_folder(config, content, options)
     job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
         served(config),
@@ -83,11 +95,11 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         calibration_from(content),
         silent=options.silence,
     )
-    with contextlib.ExitStack() as stack:
+    with run_folder(config, content, options), contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             end = MakeEmulated(scene, start_of(session), hidden)
             packets = stack.enter_context(emulated(end, options.realtime))
-            make = replace(make, packets=packets, calibrated=options.emulate is None or not any(hidden.offset))
+            make = replace(make, packets=packets, calibrated=calibrated)
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
@@ -97,8 +109,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
             stack.enter_context(_page(config, run))
         last = attend(run, config.seconds, options, console)
         ended = run.stop()
-    outcome = outcome_of(options.out / RECORDING, ready, ended, last)
-    _write(outcome, options.out, options.json, console)
+        outcome = outcome_of(options.out / RECORDING, ready, ended, last)
+        _write(outcome, options.out, options.json, console)
     return 0 if outcome.sound else 1
 
 
@@ -112,12 +124,25 @@ def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Sess
     return session
 
 
-def _begin_folder(config: RunConfig, content: dict[str, Any], options: RunHardware) -> None:
-    """Clear the folder, and write the configuration and the device file into it."""
-    clear_folder(options.out)
-    (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
-    if content:
-        save_device(content, options.out / DEVICE)
+@contextlib.contextmanager
+def run_folder(config: RunConfig, content: dict[str, Any], options: RunHardware) -> Generator[None, None, None]:
+    """Lock the folder, clear it, and write configuration and device file; without a tick, all that is taken back."""
+    out, new = options.out, not options.out.exists()
+    with claimed(out):
+        check_holds(out, options.overwrite)
+        clear_folder(out)
+        try:
+            (out / CONFIG).write_text(to_json(config), encoding="utf-8")
+            if content:
+                save_device(content, out / DEVICE)
+            yield
+        finally:
+            if not holds_ticks(out / RECORDING):
+                for name in (CONFIG, DEVICE, RECORDING):
+                    (out / name).unlink(missing_ok=True)
+                with contextlib.suppress(OSError):  # other files are in it
+                    if new:
+                        out.rmdir()
 
 
 def _gate(config: RunConfig, options: RunHardware) -> Gate:
@@ -182,6 +207,9 @@ def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
 
 def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
     say(outcome.to_json(), as_json, outcome.lines())
+    if not holds_ticks(out / RECORDING):
+        console.print(f"Nothing was recorded, so nothing is left in {out}.", highlight=False)
+        return
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:

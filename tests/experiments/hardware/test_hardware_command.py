@@ -117,6 +117,7 @@ def test_a_library_that_is_installed_is_listed_and_a_node_without_permission_has
     assert node.udev_rule() in finding.remedy
 
 
+@pytest.mark.slow
 def test_a_standard_input_that_is_closed_is_no_terminal(tmp_path) -> None:
     closed = "import os, sys; os.close(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     command = ["-m", "experiments.cli", "hardware", "run", "--out", str(tmp_path / "run")]

@@ -222,6 +222,7 @@ def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -
 @pytest.mark.parametrize(
     ("content", "says"),
     [('{"format": "hvf-device-1", "delay": {"value": [0.5]}}', "a delay of 0.5 s; expected at most"),
+     ('{"format": "hvf-device-1", "offset": {"value": [0.1, 0, 0]}}', "is not calibrated"),
      ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
 )  # fmt: skip
 def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_was(
@@ -233,7 +234,7 @@ def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_wa
     if content is not None:
         file.write_text(content)
     assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
-    assert kept.exists()
+    assert list(kept.parent.iterdir()) == [kept]
 
 
 def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_again_or_drawn(
