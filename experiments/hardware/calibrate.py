@@ -7,7 +7,7 @@ import numpy as np
 from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
-from experiments.hardware.run_options import EMULATED, CalibrateHardware
+from experiments.hardware.run_options import EMULATED, CalibrateHardware, check_emulate
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
 from models.world.scene import SceneConfig
 from sim.devices.driver import Driver
@@ -27,7 +27,7 @@ def calibrate(options: CalibrateHardware) -> int:
 
     Raises
     ------
-    SimError
+    ParameterError, SimError
         If the pose is beyond the joint limits, there is no such device, it moves or gives no readings, or the file
         already has a calibration.
     """
@@ -36,6 +36,7 @@ def calibrate(options: CalibrateHardware) -> int:
             f"--pose {' '.join(f'{angle:g}' for angle in options.pose)} is beyond the joints' stops; expected three "
             "angles [rad] at which a Phantom can stand, such as 0 0 0"
         )
+    check_emulate(options)
     base = read_device_file(options.out) if options.out.exists() else {}
     if "offset" in base and not options.overwrite:
         raise SimError(

@@ -4,12 +4,14 @@ from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import Certificate, ChangedInputs
+from controllers.errors import ParameterError
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import RunConfig, meaningless
+from experiments.config.words import given_words
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
-from experiments.hardware.run_options import RunHardware
+from experiments.hardware.run_options import EMULATED, RunHardware, check_emulate
 from experiments.setups.certified_law import of_clips
 from models.mocap.motion.clip import Clip
 from sim.devices.driver import DeviceIdentity
@@ -65,6 +67,30 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
         if verdict.verdict != "certified":
             raise SimError(f"{file}: {name} is {verdict.verdict}, so no device is armed with it; {verdict.reason}")
     return found
+
+
+def check_meaning(options: RunHardware) -> None:
+    """Refuse options that are given and change nothing on this device, by name.
+
+    Raises
+    ------
+    ParameterError
+        If there is one.
+    """
+    given = given_words(options.options)
+    figure = ("figure", *meaningless("kinematic", given.get("mode") == "lead"))
+    wrong = dict.fromkeys(("user", "person"), "whoever holds the stylus is the hand; leave it out")
+    wrong |= dict.fromkeys(figure, "its figure is the animation, shown beside it by --view; leave it out")
+    for name in wrong:
+        if name in given:
+            option = f"--{name.replace('_', '-')} {given[name]}"
+            raise ParameterError(f"{option} has no meaning on a device: {wrong[name]}")
+    check_emulate(options)
+    if options.name == EMULATED and options.certificate is None and options.delay > 0.0:
+        raise ParameterError(
+            f"--delay {options.delay:g} has no meaning without --certificate: it is the delay that was certified; the "
+            "emulated device's own is in its device file"
+        )
 
 
 def check_limits(options: RunHardware) -> None:

@@ -22,7 +22,7 @@ from experiments.hardware.attend import attend
 from experiments.hardware.outcome import Outcome, holds_ticks, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
-from experiments.hardware.permit import check_device, check_limits, verified
+from experiments.hardware.permit import check_device, check_limits, check_meaning, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import (
     CONFIG,
@@ -68,11 +68,12 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If there is no such device, or it may not be armed with this field, or another run is being written into the
-        folder. The folder is then left unchanged, unless an earlier run is replaced and this is found only after a
-        real device has been opened.
+        If there is no such device, an option has no meaning on it, it may not be armed with this field, or another run
+        is being written into the folder. The folder is then left unchanged, unless an earlier run is replaced and this
+        is found only after a real device has been opened.
     """
     console = Console(stderr=True)
+    check_meaning(options)
     check_folder(options.out, options.overwrite)
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")

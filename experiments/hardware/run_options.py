@@ -5,6 +5,7 @@ from typing import Annotated
 
 import tyro
 
+from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, part
 from experiments.config.words import Options
 from experiments.console.output import Json
@@ -44,8 +45,8 @@ class RunHardware:
     """Time in which the force is brought in [s]."""
     late: Annotated[float, above(0.0, unit="s")] = 0.04
     """Lateness of the servo that is a fault [s]."""
-    silence: Annotated[float, at_least(2.0, unit="periods")] = 5.0
-    """Time without a new reading that is a fault; more than five only of the emulated device [periods of the servo]."""
+    silence: Annotated[float, at_least(2.0, unit="periods", most=5000.0)] = 5.0
+    """Time without a new reading that is a fault; above 5, up to 5000, only of the emulated device [servo periods]."""
     realtime: bool = True
     """Ask the system to run the servo before everything else."""
     view: bool = False
@@ -86,3 +87,16 @@ class IdentifyHardware:
     """Replace the file if it exists."""
     json: Json = False
     """Print the file's content instead of a table."""
+
+
+def check_emulate(options: RunHardware | CalibrateHardware) -> None:
+    """Refuse what an emulated device is beside a real one.
+
+    Raises
+    ------
+    ParameterError
+        If it is given.
+    """
+    if options.name != EMULATED and options.emulate is not None:
+        what = f"--emulate {options.emulate} has no meaning with --device {options.name}"
+        raise ParameterError(f"{what}; it belongs to --device {EMULATED}")

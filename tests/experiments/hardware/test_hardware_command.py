@@ -83,6 +83,12 @@ def test_a_pose_at_which_no_phantom_can_stand_is_refused(capsys, tmp_path, pose)
     assert not (tmp_path / "device.json").exists()
 
 
+def test_a_real_device_is_not_calibrated_as_an_emulated_one(capsys, tmp_path) -> None:
+    given = "--device", "hid", "--emulate", "x.json", "--out", str(tmp_path / "device.json")
+    assert main(["hardware", "calibrate", *given]) == 2
+    assert "--emulate x.json has no meaning with --device hid" in capsys.readouterr().err
+
+
 def test_seconds_that_are_none_are_refused(capsys) -> None:
     assert main(["hardware", "doctor", "--seconds", "0"]) == 2
     assert "seconds" in capsys.readouterr().err

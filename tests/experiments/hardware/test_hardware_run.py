@@ -82,6 +82,26 @@ def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: P
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [(("--user", "push"), "on a device: whoever holds the stylus is the hand"),
+     (("--person", "median"), "on a device: whoever holds the stylus is the hand"),
+     (("--figure", "physical"), "on a device: its figure is the animation"),
+     (("--residual-force", "0.4"), "on a device: its figure is the animation"),
+     (("--mass", "60.0"), "on a device: its figure is the animation"),
+     (("--delay", "5"), "without --certificate"), (("--emulate", "x.json", "--device", "hid"), "with --device hid")],
+)  # fmt: skip
+def test_what_changes_nothing_on_a_device_is_refused_by_name(tmp_path: Path, capsys, given, says) -> None:
+    said = refused(capsys, "run", "--arm", *given, "--out", str(tmp_path / "run"))
+    assert f"{given[0]} {given[1]} has no meaning {says}" in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_emulated_device_is_silent_for_some_seconds_at_most(tmp_path: Path, capsys) -> None:
+    said = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
+    assert "--silence is 2e+06; expected at most 5000 periods" in said
+
+
 def test_a_folder_that_holds_a_run_is_kept(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
     assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
