@@ -8,6 +8,7 @@ from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import EMULATED, CalibrateHardware, check_emulate
+from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
 from models.world.scene import SceneConfig
 from sim.devices.driver import Driver
@@ -15,7 +16,7 @@ from sim.devices.exchange import READING_SIZE, READING_THETA
 from sim.devices.hardware_list import open_device
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
-from sim.users.hand.arm import Arm
+from sim.world.linkage import Linkage
 
 STILL = 5e-3
 """Largest motion of a joint while it is read [rad], about a millimetre at the tip: allows tremor but no motion."""
@@ -42,7 +43,8 @@ def calibrate(options: CalibrateHardware) -> int:
         raise SimError(
             f"{options.out}: has an offset of the encoders; choose another --out, or --overwrite that offset"
         )
-    driver = _fixture(options) if options.name == EMULATED else open_device(options.name)
+    hidden = linkage_from(read_device_file(options.emulate) if options.emulate else {})
+    driver = Fixture(options.pose, hidden) if options.name == EMULATED else open_device(options.name)
     try:
         readings = still_readings(driver, options.seconds)
     finally:
@@ -96,10 +98,22 @@ def still_readings(driver: Driver, seconds: float) -> Array:
     return readings
 
 
-def _fixture(options: CalibrateHardware) -> EmulatedPhantom:
-    """The emulated device, held at the pose as stiffly as by a fixture."""
-    a, b, c = options.pose
-    start = np.array(vector_to_hand_frame(forward_kinematics((a, b, c))))
-    held = Arm(path=np.stack([start, start]), stiffness=2e4, damping=50.0)
-    linkage = linkage_from(read_device_file(options.emulate) if options.emulate else {})
-    return EmulatedPhantom(SceneConfig(servo_period=_PERIOD), start, linkage, held, holds=0.0)
+class Fixture(EmulatedPhantom):
+    """The emulated device in a rigid fixture at a pose; one that is only held would sag by a part of an encoder count.
+
+    Parameters
+    ----------
+    pose : three floats
+        Angles of the joints [rad].
+    linkage : Linkage
+        What the device is.
+    """
+
+    def __init__(self, pose: tuple[float, float, float], linkage: Linkage):
+        self._stands = np.array(vector_to_hand_frame(forward_kinematics(pose)))
+        super().__init__(SceneConfig(servo_period=_PERIOD), self._stands, linkage, holds=0.0)
+
+    def write(self, torque: Array, enable: bool) -> None:
+        """As `sim.devices.driver.Driver`."""
+        super().write(torque, enable)
+        self.world.reset(self._stands, rest_pose())

@@ -50,17 +50,14 @@ def steps_late(scene: SceneConfig, delay: float) -> float:
     Raises
     ------
     SimError
-        If that is more than the steps in a period.
+        If the delay is longer than a servo period.
     """
-    steps = scene.substeps()
-    # Semi-implicit integration moves positions half a step earlier than continuous time, hence the 0.5.
-    late = delay / scene.servo_period * steps + 0.5
-    if late > steps:
+    if delay > scene.servo_period:
         raise SimError(
-            f"a delay of {delay} s; expected at most {(1.0 - 0.5 / steps) * scene.servo_period:.4g} s of an emulated "
-            "device, the servo period less half a physics step"
+            f"a delay of {delay:g} s; expected at most {scene.servo_period:g} s of an emulated device, the servo period"
         )
-    return late
+    # Semi-implicit integration moves positions half a step earlier than continuous time, hence the 0.5.
+    return delay / scene.servo_period * scene.substeps() + 0.5
 
 
 class EmulatedPhantom:
@@ -97,13 +94,16 @@ class EmulatedPhantom:
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
         self._plant, self._offset = make_plant(self.world), np.array(linkage.offset)
         steps, late = self._plant.substeps, steps_late(scene, linkage.delay)
+        self._skips = late > steps  # the torque then begins to act in the period after its own
+        late -= steps * self._skips
         whole, part = int(late), late % 1.0
         spans = (whole, 0.0), (1 if part > 0.0 else 0, 1.0 - part), (steps - math.ceil(late), 1.0)
         self._spans = [(n, new) for n, new in spans if n > 0]
         self._tremor = tremor(600.0, 2e-3)
         self._holding = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
         self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
-        self._applied, self._last, self._motors = np.zeros((steps, 3)), np.zeros(3), list(self.port.motor)
+        self._applied, self._motors = np.zeros((steps, 3)), list(self.port.motor)
+        self._last, self._before = np.zeros(3), np.zeros(3)
         self._steps, self._sequence = 0, 0
         self.torque = np.zeros(3)
         self.telemetry = fresh_telemetry()
@@ -133,14 +133,16 @@ class EmulatedPhantom:
             self._take_hold()
         self._on = self._on + self._plant.period if enable else 0.0
         user = self._relaxed if self._holding is None or self._on > self._holds else self._holding
-        t = self.clock
+        t, (new_torque, old_torque) = self.clock, (self.torque, self._last)
+        if self._skips:
+            new_torque, old_torque = self._last, self._before
         for steps, new in self._spans:
             span = steps / self._plant.substeps * self._plant.period
             plant = self._plant._replace(substeps=steps, period=span)
-            self.world.data.ctrl[self._motors] = new * self.torque + (1.0 - new) * self._last
+            self.world.data.ctrl[self._motors] = new * new_torque + (1.0 - new) * old_torque
             pass_time(plant, self.port, user, t, self._applied[:steps])
             t += span
-        self._last[:] = self.torque
+        self._before[:], self._last[:] = self._last, self.torque
         self._steps += 1
 
     def _take_hold(self) -> None:
@@ -151,7 +153,7 @@ class EmulatedPhantom:
 
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`; no time passes."""
-        self.torque[:] = self._last[:] = 0.0
+        self.torque[:] = self._last[:] = self._before[:] = 0.0
 
     def close(self) -> None:
         """As `sim.devices.driver.Driver`."""

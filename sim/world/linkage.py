@@ -26,7 +26,7 @@ class Linkage:
     inertia : three floats
         Inertia added to the published one at the joints, such as a rotor's or a handle's [kg m²]; may be negative.
     delay : float
-        Latency from a command to the motors' torque [s], below a servo period.
+        Latency from a command to the motors' torque [s].
     offset : three floats
         Encoder reading minus angle [rad].
 

@@ -36,7 +36,7 @@ from experiments.files.device_files import (
     save_device,
 )
 from experiments.files.json_text import json_text
-from experiments.hardware.calibrate import still_readings
+from experiments.hardware.calibrate import Fixture, still_readings
 from experiments.hardware.permit import HAND_PUSH, check_device, verified
 from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
@@ -46,6 +46,7 @@ from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.identification import NAMES, Identified
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
+from sim.world.linkage import Linkage
 
 KNOWN = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True)
 
@@ -215,6 +216,13 @@ def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_s
     capsys.readouterr()
     assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == read_device_file(file)
+
+
+def test_a_fixture_holds_the_stylus_at_its_pose_without_sagging() -> None:
+    device = Fixture((0.5, 0.9, 0.2), Linkage())
+    for _ in range(200):
+        device.write(np.zeros(3), False)
+    np.testing.assert_allclose(device.port.qpos[list(device.port.arm_q)], [0.5, 0.9, 0.2], atol=1e-8)
 
 
 def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:

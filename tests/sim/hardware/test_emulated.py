@@ -1,11 +1,14 @@
 """The device that is real to the software: its hand, and what it does when commands stay out."""
 
 import numpy as np
+import pytest
 
 from models.phantom.kinematics import forward_kinematics
 from models.world.scene import SceneConfig
 from sim.devices.exchange import READING_SIZE, READING_THETA
+from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
+from sim.world.linkage import Linkage
 from tests.sim.bare_servos import START
 
 PERIOD = 1e-3
@@ -32,3 +35,18 @@ def test_a_hand_takes_the_stylus_where_it_is_when_the_motors_go_off() -> None:
     assert speeds[:50].max() < 0.7
     assert speeds[-50:].max() < 0.1
     assert np.linalg.norm(places[-1] - let_go) < 2e-3
+
+
+@pytest.mark.parametrize("step", [1.25e-4, 5e-4, 1e-3])
+def test_a_delay_of_a_servo_period_is_the_command_before_whatever_the_physics_step(step: float) -> None:
+    scene = SceneConfig(servo_period=PERIOD, physics_step=step)
+    late, prompt = (EmulatedPhantom(scene, START, Linkage(delay=delay), holds=0.0) for delay in (PERIOD, 0.0))
+    torques = 0.05 * np.random.default_rng(1).standard_normal((40, 3))
+    for torque, before in zip(torques, np.vstack([np.zeros(3), torques]), strict=False):
+        late.write(torque, True)
+        prompt.write(before, True)
+        np.testing.assert_array_equal(late.world.data.qpos, prompt.world.data.qpos)
+    with pytest.raises(
+        SimError, match=r"a delay of 0\.0011 s; expected at most 0\.001 s of an emulated device, the servo"
+    ):
+        EmulatedPhantom(scene, START, Linkage(delay=1.1e-3))
