@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, cast
 from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
 from experiments.files.whole_file import whole_file
+from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified
@@ -20,8 +21,12 @@ from sim.world.linkage import Linkage, Triple
 
 _TRIPLES = ("coulomb", "viscous", "inertia")
 _FORMAT = "hvf-device-1"
+_LENGTHS = dict.fromkeys((*_TRIPLES, "offset"), 3) | {"delay": 1, "weight": 2}
+_KNOWN = ("format", *_LENGTHS, "calibration", "windows", "unexplained", "recordings")
 _MOST = 1e3
 """Bound that no parameter can reach, in any of the units [N m], [N m s/rad], [kg m²], [s], [rad]."""
+_TORQUE = max(PREMIUM_1_5.peak_torque)
+"""Friction and weight that no motor can overcome [N m]: with them nothing moves."""
 
 
 class Calibration(NamedTuple):
@@ -66,7 +71,7 @@ def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[
         return {"value": [values[name] for name in names], "margin": [margins[name] for name in names]}
 
     taken_off = linkage_from(base).offset
-    first = cast(dict[str, list[float]], base.get("offset", {"margin": [None]}))["margin"][0]
+    first = cast(dict[str, list[float | None]], base.get("offset", {})).get("margin", [None])[0]
     return {
         **base,
         "format": _FORMAT,
@@ -111,6 +116,7 @@ def read_device_file(path: Path) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != _FORMAT:
             raise KeyError(f"format {content['format']!r}")
+        _check(content)
         linkage_from(content)
         calibration_from(content)
     except OSError as error:
@@ -120,6 +126,29 @@ def read_device_file(path: Path) -> dict[str, Any]:
             f"{path}: no device file ({error}); expected what hvf hardware identify or calibrate writes"
         ) from None
     return cast(dict[str, Any], content)
+
+
+def _check(content: Mapping[str, Any]) -> None:
+    """Refuse what does not belong into a device file, and numbers that no device has."""
+    _check_known(content, _KNOWN, "")
+    _check_known(content.get("calibration", {}), Calibration._fields, "calibration.")
+    for name, length in _LENGTHS.items():
+        entry = content.get(name, {})
+        _check_known(entry, ("value", "margin"), f"{name}.")
+        bound = _TORQUE if name in ("coulomb", "weight") else _MOST
+        for which, least, most in (("value", -bound, bound), ("margin", 0.0, float("inf"))):
+            numbers = entry.get(which, [None] * length)
+            if len(numbers) != length:
+                raise ValueError(f"{name}.{which} has {len(numbers)} numbers, not {length}")
+            for number in numbers:
+                if number is not None and (isinstance(number, bool) or not least <= number <= most):  # also NaN
+                    raise ValueError(f"{name}.{which} {number} is not from {least:.3g} to {most:.3g}")
+
+
+def _check_known(given: Mapping[str, Any], known: Sequence[str], within: str) -> None:
+    for name in given:
+        if name not in known:
+            raise ValueError(f"{within}{name} is not known, only {', '.join(known)}")
 
 
 def linkage_from(content: Mapping[str, Any]) -> Linkage:
@@ -133,10 +162,7 @@ def linkage_from(content: Mapping[str, Any]) -> Linkage:
     published = Linkage()
 
     def numbers(name: str, least: float) -> list[float]:
-        found = [float(x) for x in content[name]["value"]]
-        if not all(abs(x) < _MOST for x in found):  # also false for NaN
-            raise SimError(f"{name} {found}")
-        return [max(least, x) for x in found]
+        return [max(least, float(x)) for x in content[name]["value"]]
 
     def three(name: str, least: float, otherwise: Triple) -> Triple:
         if name not in content:

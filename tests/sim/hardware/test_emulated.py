@@ -46,7 +46,5 @@ def test_a_delay_of_a_servo_period_is_the_command_before_whatever_the_physics_st
         late.write(torque, True)
         prompt.write(before, True)
         np.testing.assert_array_equal(late.world.data.qpos, prompt.world.data.qpos)
-    with pytest.raises(
-        SimError, match=r"a delay of 0\.0011 s; expected at most 0\.001 s of an emulated device, the servo"
-    ):
+    with pytest.raises(SimError, match=r"expected at most 0\.001 s of an emulated device, the servo period"):
         EmulatedPhantom(scene, START, Linkage(delay=1.1e-3))
