@@ -33,9 +33,9 @@ class Outcome:
     ticks, missed : int
         Number of ticks run, and of deadlines missed.
     compute, lateness : three floats
-        p50, p99, p99.9 of a tick's computing time and of its lateness [s]; zeros if the servo was killed.
+        p50, p99, p99.9 of a tick's computing time and of its lateness [s]; None if the servo was killed.
     memory_growth, descriptors : float, int
-        Growth of the servo's process after its first second: memory [MB] and open files.
+        Growth of the servo's process after its first second: memory [MB] and open files; None if it was killed.
     recorded, dropped : int
         Number of ticks in the recording, and of ticks that the recorder's process did not take in time.
     active : float
@@ -56,10 +56,10 @@ class Outcome:
     broken: str
     ticks: int
     missed: int
-    compute: tuple[float, float, float]
-    lateness: tuple[float, float, float]
-    memory_growth: float
-    descriptors: int
+    compute: tuple[float, float, float] | None
+    lateness: tuple[float, float, float] | None
+    memory_growth: float | None
+    descriptors: int | None
     recorded: int
     dropped: int
     active: float
@@ -84,7 +84,7 @@ class Outcome:
             f"{name}: {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from the curve, at most "
             f"{self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
             f"The twin predicted a tick within {1e3 * self.apart:.3f} mm RMS; the hand pushed with at most "
-            f"{self.hand_force:.2f} N.",
+            f"{self.hand_force:.2f} N (estimated; errors of friction and inertia are in it).",
         ]
 
     def lines(self) -> list[str]:
@@ -94,25 +94,30 @@ class Outcome:
             wrong += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]
         wrong += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
         wrong += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
-        micro = [" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness)]
         name = f"{self.device} ({self.transport})"
         return [
             *wrong,
             *(self._under_force(name) if self.active > 0.0 else [f"{name}: it was never under force."]),
-            f"{self.ticks} ticks, {self.missed} deadlines missed; p50 / p99 / p99.9: computing {micro[0]} µs, late by "
-            f"{micro[1]} µs.",
+            f"{self.ticks} ticks, {self.missed} deadlines missed; {self._times()}.",
             f"The device answered: {'; '.join(self.link.lines())}.",
-            f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files; {self.recorded} ticks "
-            f"are recorded, {self.dropped} were dropped.",
+            f"{self._growth()}; {self.recorded} ticks are recorded, {self.dropped} were dropped.",
         ]
+
+    def _times(self) -> str:
+        if self.compute is None or self.lateness is None:
+            return "the servo was gone before it told how long they took and how late they were"
+        compute, late = (" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness))
+        return f"p50 / p99 / p99.9: computing {compute} µs, late by {late} µs"
+
+    def _growth(self) -> str:
+        if self.memory_growth is None:
+            return "By how much the servo grew is not known"
+        return f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files"
 
 
 def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStatus) -> Outcome:
     """The outcome of a run that has ended."""
     found = _recorded(recording)
-    compute, lateness = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if ended is not None:
-        compute, lateness = ended.compute[:3], ended.lateness[:3]
     return Outcome(
         device=ready.identity.name,
         transport=ready.identity.transport,
@@ -121,10 +126,10 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
         broken=ended.broken if ended else "",
         ticks=ended.ticks if ended else int(last.row["tick"]),
         missed=ended.missed if ended else int(last.row["missed"]),
-        compute=compute,
-        lateness=lateness,
-        memory_growth=ended.memory_growth if ended else 0.0,
-        descriptors=ended.descriptors if ended else 0,
+        compute=ended.compute[:3] if ended else None,
+        lateness=ended.lateness[:3] if ended else None,
+        memory_growth=ended.memory_growth if ended else None,
+        descriptors=ended.descriptors if ended else None,
         **found,
     )
 

@@ -1,4 +1,4 @@
-"""The folder of a hardware run: one run at a time writes into it, and one that recorded nothing leaves nothing."""
+"""The folder of a hardware run, and its summary: one run at a time, and no more than what is known of it."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,12 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from controllers.safety.arming import State
+from controllers.safety.faults import Fault
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig
-from experiments.hardware.outcome import holds_ticks
+from experiments.hardware.outcome import holds_ticks, outcome_of
 from experiments.hardware.run import run_folder
 from experiments.results.folder import check_folder
+from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
+from sim.hardware.controls import RunStatus
+from sim.hardware.gated_servo import ROW_SIZE, columns
+from sim.hardware.servo_process import Ready
 from sim.recording.recorder import Group, Recorder
 
 CONFIG, CONTENT = RunConfig(), {"format": "hvf-device-1"}
@@ -74,3 +80,18 @@ def test_what_was_recorded_until_an_interrupt_or_cannot_be_read_is_kept(tmp_path
     with pytest.raises(KeyboardInterrupt):
         stopped(tmp_path, 3, damaged=damaged)
     assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json", "run-device.json"}
+
+
+@pytest.mark.parametrize("ticks", [None, 0])
+def test_of_a_servo_that_was_killed_nothing_is_told_that_is_not_known(tmp_path: Path, ticks: int | None) -> None:
+    if ticks is not None:
+        record(tmp_path, ticks)
+    ready = Ready(DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True), 1e-3, [])
+    row = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
+    last = RunStatus(False, State.ACTIVE, Fault.NONE, 0.0, row, None)
+    outcome = outcome_of(tmp_path / "run.h5", ready, None, last)
+    said = "\n".join(outcome.lines())
+    assert "the servo was gone before it told how long they took" in said
+    assert "By how much the servo grew is not known" in said
+    told = outcome.to_json()
+    assert [told[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4
