@@ -96,7 +96,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         calibration_from(content),
         silent=options.silence,
     )
-    with run_folder(config, content, options), contextlib.ExitStack() as stack:
+    with run_folder(options), contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             end = MakeEmulated(scene, start_of(session), hidden)
             packets = stack.enter_context(emulated(end, options.realtime))
@@ -104,6 +104,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
+        _write_inputs(config, content, options.out)
         for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
             console.print(line, highlight=False)
         if options.view:
@@ -125,17 +126,21 @@ def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Sess
     return session
 
 
+def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None:
+    """Write configuration and device file; not before the servo ticks, as a program that is killed leaves them."""
+    (out / CONFIG).write_text(to_json(config), encoding="utf-8")
+    if content:
+        save_device(content, out / DEVICE)
+
+
 @contextlib.contextmanager
-def run_folder(config: RunConfig, content: dict[str, Any], options: RunHardware) -> Generator[None, None, None]:
-    """Lock the folder, clear it, and write configuration and device file; without a tick, all that is taken back."""
+def run_folder(options: RunHardware) -> Generator[None, None, None]:
+    """Lock the folder and clear it; without a tick, all that the run writes into it is taken back."""
     out, new = options.out, not options.out.exists()
     with claimed(out):
         check_holds(out, options.overwrite)
         clear_folder(out)
         try:
-            (out / CONFIG).write_text(to_json(config), encoding="utf-8")
-            if content:
-                save_device(content, out / DEVICE)
             yield
         finally:
             if not holds_ticks(out / RECORDING):

@@ -94,6 +94,8 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: Sh
                 time.sleep(_REST)
             recorder.flush()
             recorder.close({"rows": int(status[RECORDER_ROWS]), "dropped": int(status[RECORDER_DROPPED])})
+        if os.getppid() != parent and not status[RECORDER_ROWS]:
+            job.path.unlink(missing_ok=True)  # nobody else is left to do it, and it would be taken for a run
     except (OSError, RuntimeError, RecordingError) as error:
         full = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
         status[RECORDER_ERROR] = float(getattr(error, "errno", None) or full)

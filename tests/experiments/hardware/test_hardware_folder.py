@@ -21,7 +21,7 @@ from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.servo_process import Ready
 from sim.recording.recorder import Group, Recorder
 
-CONFIG, CONTENT = RunConfig(), {"format": "hvf-device-1"}
+CONFIG = RunConfig()
 
 
 def options(out: Path, overwrite: bool = False) -> Any:
@@ -29,6 +29,7 @@ def options(out: Path, overwrite: bool = False) -> Any:
 
 
 def record(out: Path, ticks: int) -> None:
+    (out / "config.json").write_text("{}")
     with Recorder(out / "run.h5", to_dict(CONFIG), 1, {"ticks": Group(1e3, {"state": ()})}, {}) as recorder:
         if ticks:
             recorder.append("ticks", {"state": np.zeros(ticks)})
@@ -36,7 +37,7 @@ def record(out: Path, ticks: int) -> None:
 
 def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
     """A run that Ctrl-C ends once it has made its recording, or before, with so many ticks."""
-    with run_folder(CONFIG, CONTENT, options(out, overwrite)):
+    with run_folder(options(out, overwrite)):
         if ticks is not None:
             record(out, ticks)
         if damaged:
@@ -45,13 +46,13 @@ def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool
 
 
 def test_no_other_run_is_written_into_it_meanwhile(tmp_path: Path) -> None:
-    with run_folder(CONFIG, CONTENT, options(tmp_path)):
+    with run_folder(options(tmp_path)):
         record(tmp_path, 3)
         with pytest.raises(SimError, match="another run is being written into it"):
             check_folder(tmp_path, overwrite=True)
         with (
             pytest.raises(SimError, match="another run is being written into it"),
-            run_folder(CONFIG, CONTENT, options(tmp_path, overwrite=True)),
+            run_folder(options(tmp_path, overwrite=True)),
         ):
             pass
     assert holds_ticks(tmp_path / "run.h5")
@@ -79,7 +80,7 @@ def test_what_is_of_somebody_else_stays(tmp_path: Path) -> None:
 def test_what_was_recorded_until_an_interrupt_or_cannot_be_read_is_kept(tmp_path: Path, damaged: bool) -> None:
     with pytest.raises(KeyboardInterrupt):
         stopped(tmp_path, 3, damaged=damaged)
-    assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json", "run-device.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json"}
 
 
 @pytest.mark.parametrize("ticks", [None, 0])

@@ -13,8 +13,11 @@ import pytest
 from experiments.live.session.workers import newest
 from sim.hardware import undisturbed
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
-from sim.hardware.shared import SharedNumbers
+from sim.hardware.gated_servo import ROW_SIZE
+from sim.hardware.recorder_process import RECORDER_SIZE, record_rows
+from sim.hardware.shared import Ring, SharedNumbers
 from tests.sim.hardware.hosted import PERIOD
+from tests.sim.hardware.test_processes import job
 
 GONE = 2**22 + 1  # no process has such an id
 
@@ -41,6 +44,15 @@ def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, mon
     with ours, theirs:
         host_device(Device, EmulatedEnd(theirs, shown, PERIOD), False)
     shown.close()
+
+
+def test_an_empty_recording_of_a_killed_run_is_taken_away(orphan, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    rows, orders, report = Ring(10, ROW_SIZE), SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
+    record_rows(job(tmp_path / "run.h5"), rows, orders, report)
+    assert not list(tmp_path.iterdir())
+    for shared in (rows, orders, report):
+        shared.close()
 
 
 def test_a_worker_whose_page_went_while_it_worked_ends(orphan) -> None:
