@@ -38,7 +38,9 @@ _TURN = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns 
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it goes on.
 _BLENDED, _FASTER = 0.1, 1.5
-_CALM = 0.4  # largest share of the first step of a jump that fades which the steps after it have
+# Largest share of the first step of a jump that fades which the steps after it have, and least cosine between its
+# steps: 0.96 and more in six captures. No motion begins by three such steps.
+_CALM, _ALONG = 0.4, 0.9
 _HELD = 0.1  # farthest that a pose which is held is from that before the jump, as a share of the jump
 # Of a calibration pose: bend of its limbs, difference of its sides, least angle of its arms to the trunk's line and
 # largest to the trunk's plane.
@@ -55,7 +57,7 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     turns = _turns(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    jumped = _faded(_size(turns), _jumped(rotations, turns, at_rest, lines), round(_BLENDED * motion.fps))
+    jumped = _faded(turns, _jumped(rotations, turns, at_rest, lines), round(_BLENDED * motion.fps))
     begun, ended = _spread(rotations, _size(turns), round(_BLENDED * motion.fps))
     soon = ended <= _SHARE * motion.n_frames or _stands(_size(turns)) == begun
     told = soon and (at_rest[: begun + 1].all() or _calibrating(lines))
@@ -86,15 +88,20 @@ def _jumped(rotations: Array, turns: Array, at_rest: Mask, lines: BodyLines) -> 
     return jump + 1 if as_zero or as_posed else 0
 
 
-def _faded(steps: Array, jumped: int, longest: int) -> int:
-    """Number of frames before a motion whose jump from a pose a filter has spread: its steps fade, then all is calm."""
+def _faded(turns: Array, jumped: int, longest: int) -> int:
+    """Number of frames before a motion whose jump from a pose a filter has spread.
+
+    Its steps, all in one direction, fade, and then all is calm.
+    """
     if not jumped:
         return 0
-    steps = steps[jumped:]
+    turns, steps = turns[jumped:], _size(turns[jumped:])
     lasts = int(np.argmax(np.append(steps < _CALM * steps[0], True)))
     calm = steps[lasts : lasts + longest].max(initial=0.0) < _CALM * steps[0]
-    fades = (np.diff(steps[:lasts]) < 0.0).all() and 1 < lasts <= longest and steps[:lasts].sum() > 3.0 * _TURN
-    return jumped + lasts if fades and calm else jumped
+    along = np.sum(turns[: lasts - 1] * turns[1:lasts], axis=(1, 2)) / turns.shape[1]
+    straight = (along > _ALONG * steps[: lasts - 1] * steps[1:lasts]).all() if lasts > 2 else False
+    fades = straight and lasts <= longest and (np.diff(steps[:lasts]) < 0.0).all()
+    return jumped + lasts if fades and calm and steps[:lasts].sum() > 3.0 * _TURN else jumped
 
 
 def _stands(steps: Array) -> int:

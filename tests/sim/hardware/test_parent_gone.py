@@ -1,10 +1,12 @@
 """A process whose parent was killed while it started ends, too."""
 
+import os
 import queue
 import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -94,5 +96,6 @@ def test_a_killed_parent_leaves_no_device(tmp_path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(SCRIPT)
     # Its output ends when the last process that has it is gone.
-    ended = subprocess.run([sys.executable, str(script)], capture_output=True, timeout=60, check=False)
+    paths = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, timeout=60, check=False, env=paths)
     assert ended.returncode == -signal.SIGKILL
