@@ -19,7 +19,7 @@ SIDES = ("left", "right")
 AT_REST = 0.3  # speed up to which a joint is at rest [leg lengths/s]: a walker's swinging foot has 3
 _UNMOVED = 1e-6  # step of a joint that does not move, by rounding [leg lengths]: files have four decimals or more
 _FILLED = 0.5  # least time for which nothing moves of a motion that is filled up [s]: no living body stands so still
-# Shares of a motion's usual step between which it is under way where it is held: 0.2 to 1.2 in motions that are filled
+# Shares of a motion's usual step between which it is under way where it is held: 0.2 to 1.7 in motions that are filled
 # up, below 0.08 in those that end at rest, above 6 in those that end in another pose.
 _UNDER_WAY = (0.15, 3.0)
 _TOES = np.sin(np.deg2rad(30.0))  # least median sine of toes to the shank: 50 to 90° off it in captures

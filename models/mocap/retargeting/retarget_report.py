@@ -168,7 +168,7 @@ def held_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
     """Frames (n,) that fill a motion up at its ends; `fps` and `dropped` as in `floor_remarks`."""
     if filled.any():
         told = f"nothing moves at all for {_lasting(spans(filled), fps, dropped)}"
-        yield f"{told}: frames that fill the motion up, which tell nothing of the body"
+        yield f"{told}, as where programs fill a motion up: soles, limbs and floor are told by the other frames"
 
 
 def haste_remarks(legs: Array, fps: float) -> Iterator[str]:
