@@ -41,6 +41,7 @@ from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
 from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
+from sim.devices.own_device import TipDevice, TipPose
 from sim.errors import SimError
 from sim.users import intents
 from sim.users.hand.actions import Grab, Push, Turn
@@ -83,6 +84,8 @@ __all__ = [
     "Study",
     "Swept",
     "Tick",
+    "TipDevice",
+    "TipPose",
     "Trajectory",
     "Turn",
     "User",

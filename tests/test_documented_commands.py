@@ -27,6 +27,7 @@ GIVEN = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
     "back.bvh": "models/mocap/clips/walk.bvh",
     "hidden.json": "examples/hidden.json",
+    "own_device.py": "examples/own_device.py",
 }
 TYPED = [page for page in PAGES if page == ROOT / "README.md" or page.parent.name in ("tutorials", "how-to")]
 NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [["COMMAND", "--help"]]

@@ -48,7 +48,7 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
             status = run.poll()
             line.update(link_now(status.row))
             if not status.alive:
-                console.print("The servo has stopped; the device's watchdog lets go.")
+                console.print("The servo has stopped; the device lets go if it has a watchdog.")
                 return status
             if status.recorded is not None and not status.recorded.alive and recording:
                 recording = False

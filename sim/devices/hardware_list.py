@@ -7,6 +7,7 @@
 | `spacemouse`, `spacemouse:PATH` | a 3Dconnexion SpaceMouse |
 | `hdapi`, `hdapi:NAME` | an OpenHaptics device, by its name in the vendor's configuration |
 | `dhd` | a Force Dimension device |
+| `FILE.py:CLASS` | a device of one's own (`sim.devices.own_device`) |
 """
 
 import contextlib
@@ -24,6 +25,7 @@ from sim.devices.driver import Driver
 from sim.devices.hdapi import HDAPI, HdapiDevice
 from sim.devices.hid import HidHandle, HidPhantom
 from sim.devices.hidapi_node import HidapiNode
+from sim.devices.own_device import is_own_device, open_own_device, own_device_class
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
@@ -186,6 +188,8 @@ def open_device(name: str) -> Driver:
     DriverFault
         If the device does not answer as it should.
     """
+    if is_own_device(name):
+        return open_own_device(name)
     check_there(name)
     kind, _, rest = name.partition(":")
     opens: dict[str, Callable[[str], Driver]] = {
@@ -203,6 +207,9 @@ def check_there(name: str) -> None:
     SimError
         If it does not; the message lists the devices found.
     """
+    if is_own_device(name):
+        own_device_class(name)
+        return
     kind, _, rest = name.partition(":")
     looks: dict[str, Callable[[], object]] = {
         "hid": lambda: _the_one(rest, "phantom", name), "hidraw": lambda: _the_one(rest, "phantom", name),
@@ -215,7 +222,7 @@ def check_there(name: str) -> None:
 
 def _what_there_is() -> str:
     names = [device.name for device in found_devices() if device.name]
-    kinds = "expected hid[:SERIAL], hidraw:PATH, spacemouse[:PATH], hdapi[:NAME] or dhd"
+    kinds = "expected hid[:SERIAL], hidraw:PATH, spacemouse[:PATH], hdapi[:NAME], dhd or FILE.py:CLASS"
     return f"{kinds}; found here: {', '.join(names) if names else 'none'}"
 
 

@@ -30,6 +30,7 @@ from models.phantom.kinematics import (
     forward_kinematics,
     gimbal_angles,
     inverse_kinematics,
+    vector_to_hand_frame,
     within_limits,
 )
 from sim.compilation.compiled import entry_point
@@ -176,3 +177,10 @@ def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
         return 0.0, 0.0, 0.0
     share = largest / size if size > largest else 1.0
     return share * x, share * y, share * z
+
+
+@entry_point
+def force_at_tip(theta: Array, torque: Array, largest: float, force: Array) -> None:
+    """`tip_force` from Python, in the hand frame H; written to `force` [N], shape (3,)."""
+    f_P = tip_force((theta[0], theta[1], theta[2]), (torque[0], torque[1], torque[2]), largest)
+    force[0], force[1], force[2] = vector_to_hand_frame(f_P)

@@ -11,10 +11,12 @@ from sim.devices.driver import Driver
 from sim.devices.exchange import Exchange
 from sim.devices.hdapi import HdapiDevice
 from sim.devices.hid import HidHandle, HidPhantom
+from sim.devices.own_device import TipDriver
 from sim.devices.spacemouse import SpaceMouse
 from sim.users.hand.arm import Arm
 from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compiled
 from tests.devices.mocks import BehindDhd, BehindHd, mock_dhd, mock_hd
+from tests.devices.own_tip import LinkageTip
 from tests.devices.rig import Behind, FirmwareBehind, Linkage, Rig
 from tests.devices.test_spacemouse import Cap
 
@@ -59,7 +61,12 @@ def _dhd(device: Exchange, arm: Arm, folder: Path) -> tuple[Driver, Behind]:
     return DhdDevice(behind.library, clock=lambda: behind.linkage.ticks * 1e-3), behind
 
 
-_MAKERS = {"hid": _hid, "hdapi": _hdapi, "dhd": _dhd}
+def _own(device: Exchange, arm: Arm, folder: Path) -> tuple[Driver, Behind]:
+    tip = LinkageTip(Linkage(arm))
+    return TipDriver(tip, "in memory", clock=lambda: tip.linkage.ticks * 1e-3), tip
+
+
+_MAKERS = {"hid": _hid, "hdapi": _hdapi, "dhd": _dhd, "own": _own}
 KINDS = (*_MAKERS, "spacemouse")
 NODE_KINDS = ("hid node", "spacemouse node")
 """Through /dev/hidraw0, the kernel's or umockdev's, and hidapi as it comes."""

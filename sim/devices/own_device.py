@@ -1,0 +1,230 @@
+"""A device of one's own: a class in a file, which reports the stylus's pose and takes a force at its tip.
+
+``hvf hardware run --device haply.py:Haply`` opens the class `Haply` of the file ``haply.py``. The device is treated as
+a virtual Phantom (`sim.devices.virtual_arm`): gate, watchdog of readings, certificate and recorder are those of every
+other device.
+"""
+
+import contextlib
+import importlib.util
+import sys
+import time
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar, NamedTuple, TypeVar
+
+import numpy as np
+
+from controllers.safety.faults import Fault
+from controllers.state import Array
+from models.phantom.kinematics import R_HP
+from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
+from sim.devices.virtual_arm import force_at_tip, write_pose
+from sim.errors import SimError
+
+_Result = TypeVar("_Result")
+
+
+class TipPose(NamedTuple):
+    """What a device of one's own reads.
+
+    Attributes
+    ----------
+    place : Array
+        Position of the tip in the hand frame H [m], shape (3,): x away from the user, y to the left, z up.
+    orientation : Array
+        Rotation matrix R_HS of the stylus in H, shape (3, 3).
+    pressed : bool
+        Whether the stylus's switch is pressed.
+    """
+
+    place: Array
+    orientation: Array = np.eye(3)
+    pressed: bool = False
+
+
+class TipDevice(ABC):
+    """A device of one's own, made without arguments; a subclass opens its device in ``__init__``.
+
+    Whatever `read` or `write` raises is a fault: the force is released, and the error is printed once.
+
+    Attributes
+    ----------
+    name, serial : str
+        For display; by default the class's name and nothing.
+    watchdog : bool
+        Whether its firmware switches the motors off when commands stop.
+    largest_force : float
+        Largest force that `write` is given [N]; by default the stall force of the Phantom Premium 1.5.
+    """
+
+    name: ClassVar[str] = ""
+    serial: ClassVar[str] = ""
+    watchdog: ClassVar[bool] = False
+    largest_force: ClassVar[float] = 8.5
+
+    @abstractmethod
+    def read(self) -> TipPose | None:
+        """The newest pose, or None if there is no new one; called once per servo period, so it must not wait."""
+
+    def write(self, force: Array) -> None:  # noqa: B027  # without motors it does nothing
+        """Exert a force at the tip, in H [N], shape (3,); the device compensates for its own weight.
+
+        A device that does not override this has no motors.
+        """
+
+    def release(self) -> None:  # noqa: B027
+        """Switch the motors off; called every period in which no force is allowed, and at the end."""
+
+    def close(self) -> None:  # noqa: B027
+        """Close the device, after `release`."""
+
+
+class TipDriver:
+    """The driver of a device of one's own (see `sim.devices.driver.Driver`).
+
+    Parameters
+    ----------
+    device : TipDevice
+        Open; owned from here on.
+    transport : str
+        File and class, for display.
+    clock : callable
+        Clock that timestamps the readings [s].
+    """
+
+    def __init__(self, device: TipDevice, transport: str, clock: Callable[[], float] = time.perf_counter):
+        self._device, self._clock = device, clock
+        name, forces = device.name or type(device).__name__, type(device).write is not TipDevice.write
+        self.identity = DeviceIdentity(
+            name, transport, device.serial, "", forces, device.watchdog, True, own_weight=True
+        )  # fmt: skip
+        self.telemetry = fresh_telemetry()
+        self._reading, self._force = np.zeros(READING_SIZE), np.zeros(3)
+        self._printed: set[str] = set()
+
+    def read(self, reading: Array, timeout: float) -> bool:
+        """See `sim.devices.driver.Driver.read`; `timeout` is unused.
+
+        Raises
+        ------
+        DriverFault
+            If the device raised an error, or the Phantom cannot take the pose.
+        """
+        pose = self._guarded(self._device.read)
+        if pose is None:
+            return False
+        fresh = self._reading
+        place, orientation = self._guarded(lambda: _checked(pose))
+        write_pose(fresh, np.array(R_HP).T @ place, orientation)
+        self.telemetry[READ] += 1.0
+        fresh[READING_SWITCH], fresh[READING_CLOCK] = float(bool(pose.pressed)), self._clock()
+        fresh[READING_SEQUENCE] = self.telemetry[READ]
+        np.copyto(reading, fresh)
+        return True
+
+    def write(self, torque: Array, enable: bool) -> None:
+        """See `sim.devices.driver.Driver.write`; the device is given the equivalent force at the tip.
+
+        Raises
+        ------
+        DriverFault
+            If the device raised an error, or a torque is not finite; the motors are then switched off.
+        """
+        if not np.isfinite(torque).all():
+            self.let_go()
+            raise DriverFault(Fault.FORCE_NOT_FINITE, float(torque[~np.isfinite(torque)][0]))
+        if not enable:
+            self._guarded(self._device.release)
+            return
+        theta = self._reading[READING_THETA : READING_THETA + 3]
+        force_at_tip(theta, torque, self._device.largest_force, self._force)
+        self._guarded(lambda: self._device.write(self._force.copy()))
+
+    def let_go(self) -> None:
+        """Switch the motors off at once; never raises."""
+        with contextlib.suppress(DriverFault):
+            self._guarded(self._device.release)
+
+    def close(self) -> None:
+        """Switch the motors off and close the device."""
+        self.let_go()
+        self._device.close()
+
+    def _guarded(self, call: Callable[[], _Result]) -> _Result:
+        """The result of a call of the user's code; an error in it is printed once, and becomes a fault."""
+        try:
+            return call()
+        except Exception as error:
+            words = _error_words(error)
+            if words not in self._printed:
+                self._printed.add(words)
+                print(f"\n{words}", file=sys.stderr, flush=True)
+            raise DriverFault(Fault.UNPLUGGED if isinstance(error, OSError) else Fault.DEVICE_REPORTED) from None
+
+
+def _error_words(error: Exception) -> str:
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{where.filename}:{where.lineno}: {type(error).__name__}: {error}"
+
+
+def _checked(pose: TipPose) -> tuple[Array, Array]:
+    place, orientation = np.asarray(pose.place, np.float64), np.asarray(pose.orientation, np.float64)
+    if place.shape != (3,) or orientation.shape != (3, 3):
+        raise ValueError(f"read returned shapes {place.shape} and {orientation.shape}; expected (3,) and (3, 3)")
+    return place, orientation
+
+
+def is_own_device(name: str) -> bool:
+    """Whether the name of a device is that of a class in a file, ``FILE.py:CLASS``."""
+    return name.rpartition(":")[0].endswith(".py") or name.endswith(".py")
+
+
+def own_device_class(name: str) -> type[TipDevice]:
+    """The class of a name ``FILE.py:CLASS``.
+
+    Raises
+    ------
+    SimError
+        If the file cannot be read or run, or has no such class.
+    """
+    file, _, wanted = name.rpartition(":") if not name.endswith(".py") else (name, "", "")
+    path = Path(file)
+    if not path.is_file():
+        raise SimError(f"there is no file {file}; expected FILE.py:CLASS, with a subclass of hvf.TipDevice")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None  # the name ends with .py
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise SimError(_error_words(error)) from None
+    found = {
+        key: value for key, value in vars(module).items()
+        if isinstance(value, type) and issubclass(value, TipDevice) and value.__module__ == module.__name__
+    }  # fmt: skip
+    if wanted not in found:
+        there = f"; there is {', '.join(found)}" if found else ""
+        which = f"has no device {wanted!r}" if wanted else "is named without its class"
+        raise SimError(f"{file} {which}{there}; expected FILE.py:CLASS, with a subclass of hvf.TipDevice")
+    return found[wanted]
+
+
+def open_own_device(name: str) -> TipDriver:
+    """Open the device of a name ``FILE.py:CLASS``.
+
+    Raises
+    ------
+    SimError
+        As `own_device_class`, or if the class cannot be made.
+    """
+    made = own_device_class(name)
+    try:
+        device = made()
+    except Exception as error:
+        raise SimError(f"{name} does not open: {_error_words(error)}") from None
+    return TipDriver(device, name)

@@ -1,0 +1,155 @@
+"""A device of one's own: a class in a file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
+from sim.devices.driver import READ, DriverFault
+from sim.devices.hardware_list import check_there, open_device
+from sim.devices.own_device import TipDevice, TipDriver, TipPose
+from sim.errors import SimError
+from tests.devices.follow import device_follow, rms, simulated_follow
+from tests.devices.own_tip import LinkageTip
+from tests.devices.rig import Linkage, Rig
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "own_device.py"
+HERE = np.array([0.01, -0.02, 0.03])
+
+
+class Scripted(TipDevice):
+    """Reads what it is told, and keeps what it is given; None is a release."""
+
+    def __init__(self, pose=None):
+        self.pose, self.given = pose, []
+
+    def read(self):
+        if isinstance(self.pose, Exception):
+            raise self.pose
+        return self.pose
+
+    def write(self, force):
+        self.given.append(force)
+
+    def release(self):
+        self.given.append(None)
+
+
+def test_the_tip_is_read_in_the_hand_frame_with_its_switch_and_a_number() -> None:
+    driver, reading = TipDriver(Scripted(TipPose(HERE, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
+    assert driver.read(reading, 0.0)
+    np.testing.assert_allclose(forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(HERE)), atol=1e-12)
+    np.testing.assert_array_equal(reading[:3], [1.0, 5.0, 1.0])
+    assert driver.telemetry[READ] == 1.0
+    driver = TipDriver(Scripted(), "here")
+    assert not driver.read(reading, 0.0)
+
+
+def test_the_force_is_the_field_s_and_no_larger_than_the_device_gives() -> None:
+    device, rng = Scripted(TipPose(HERE)), np.random.default_rng(3)
+    driver, reading = TipDriver(device, "here"), np.zeros(9)
+    driver.read(reading, 0.0)
+    theta = tuple(reading[3:6])
+    for _ in range(100):
+        f_H = rng.normal(0.0, 4.0, 3)
+        driver.write(
+            np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta)), enable=True
+        )
+        wanted = f_H * min(1.0, device.largest_force / np.linalg.norm(f_H))
+        np.testing.assert_allclose(device.given[-1], wanted, atol=1e-12)
+    driver.write(np.zeros(3), enable=False)
+    assert device.given[-1] is None
+
+
+def test_a_torque_that_is_no_number_releases_it() -> None:
+    device = Scripted(TipPose(HERE))
+    driver = TipDriver(device, "here")
+    with pytest.raises(DriverFault) as refused:
+        driver.write(np.array([0.0, np.nan, 0.0]), enable=True)
+    assert refused.value.fault is Fault.FORCE_NOT_FINITE
+    assert device.given == [None]
+
+
+@pytest.mark.parametrize(
+    ("pose", "fault"),
+    [
+        (OSError("gone"), Fault.UNPLUGGED), (ValueError("a bad cable"), Fault.DEVICE_REPORTED),
+        (TipPose(np.zeros(2)), Fault.DEVICE_REPORTED), ("here", Fault.DEVICE_REPORTED),
+        (TipPose(np.array([0.0, np.nan, 0.0])), Fault.READING_NOT_FINITE),
+        (TipPose(np.zeros(3), -np.eye(3)), Fault.READING_NOT_FINITE),
+        (TipPose(np.array([0.9, 0.0, 0.0])), Fault.LEFT_WORKSPACE),
+    ],
+)  # fmt: skip
+def test_what_it_raises_and_what_is_no_pose_is_a_fault_and_no_reading(pose, fault) -> None:
+    driver, reading = TipDriver(Scripted(pose), "here"), np.zeros(9)
+    with pytest.raises(DriverFault) as refused:
+        driver.read(reading, 0.0)
+    assert refused.value.fault is fault
+    assert not reading.any()
+
+
+def test_an_error_is_printed_once_with_its_line(capsys) -> None:
+    driver = TipDriver(Scripted(ValueError("a bad cable")), "here")
+    for _ in range(3):
+        with pytest.raises(DriverFault):
+            driver.read(np.zeros(9), 0.0)
+    assert capsys.readouterr().err.strip().count("ValueError: a bad cable") == 1
+
+
+def test_letting_go_never_raises() -> None:
+    class Stuck(Scripted):
+        def release(self):
+            raise RuntimeError("stuck")
+
+    TipDriver(Stuck(), "here").let_go()
+
+
+def test_one_that_takes_no_force_has_no_motors() -> None:
+    class Mouse(TipDevice):
+        def read(self):
+            return None
+
+    assert not TipDriver(Mouse(), "here").identity.forces
+    assert TipDriver(Scripted(), "here").identity.forces
+
+
+@pytest.mark.slow
+def test_follow_through_it_is_the_simulation_s_run_within_a_millimetre() -> None:
+    def rig(device):
+        tip = LinkageTip(Linkage())
+        return Rig(device, TipDriver(tip, "here", clock=lambda: tip.linkage.ticks * 1e-3), tip)
+
+    there, made = device_follow(rig)
+    assert made.fault == 0
+    assert rms(there, simulated_follow()) < 1e-3
+
+
+def test_the_example_is_opened_by_file_and_class() -> None:
+    name = f"{EXAMPLE}:Mass"
+    check_there(name)
+    driver = open_device(name)
+    assert driver.identity.name == "Mass"
+    assert driver.read(np.zeros(9), 0.0)
+    driver.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "why"),
+    [
+        (None, "own.py:Mine", "there is no file .*own.py"),
+        ("x = 1", "own.py:Mine", "has no device 'Mine'; expected FILE.py:CLASS"),
+        ("import hvf\nclass Mine(hvf.TipDevice): ...", "own.py", "is named without its class; there is Mine"),
+        ("x = 1\ny = z", "own.py:Mine", "own.py:2: NameError: name 'z'"),
+        ("import hvf\nclass Mine(hvf.TipDevice): ...", "own.py:Mine", "does not open: .*abstract"),
+        ("def", "own.py:Mine", "SyntaxError"),
+    ],
+)  # fmt: skip
+def test_a_file_that_gives_no_device_is_one_line(tmp_path, text, name, why) -> None:
+    if text is not None:
+        (tmp_path / "own.py").write_text(text, encoding="utf-8")
+    with pytest.raises(SimError, match=why) as refused:
+        open_device(f"{tmp_path}/{name}")
+    assert "\n" not in str(refused.value)
