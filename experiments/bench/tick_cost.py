@@ -19,7 +19,7 @@ from sim.loop.servo import FrameLog, TickLog, run_block
 
 STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
 SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
-SLICE = 50  # ticks of a run between those of its replay, so that both have the same load of the machine
+SLICE = 50  # ticks that are run before they are replayed, so that both see the same load of the machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
     "follow": lambda: run_config(physics_step=STEP),

@@ -248,9 +248,9 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
 def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
     """Check motors that are off although they were commanded on.
 
-    Either the firmware's watchdog switched them off: after a gap in the readings themselves they may be switched on
-    again, since the servo ramps the force in after a gap; without one, commands did not arrive, which is a fault. Or
-    they never came on: a fault once the waiting time has passed by both clocks, since either side may have been
+    Either the firmware's watchdog switched them off: after a gap in the readings they may be switched on again, since
+    the servo ramps the force in after a gap; without a gap, commands did not arrive, which is a fault. Or they were
+    never switched on: a fault once the waiting time has passed by both clocks, since either side may have been
     suspended between a reading and its command.
     """
     io, enable_command = hid.io, hid.numbers[N_ENABLED]

@@ -47,7 +47,7 @@ class EmulatedEnd(NamedTuple):
 
 
 def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime: bool) -> None:
-    """Run the device until the parent process is gone; the target of a process."""
+    """Run the device until the parent process has ended; the target of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     device, parent = make(), parent_id()
     device.write(np.zeros(3), False)

@@ -64,7 +64,7 @@ def hardware_groups(period: float) -> dict[str, Group]:
 
 
 def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: SharedNumbers) -> None:
-    """Record until `orders` holds a 1, or the parent process is gone, and no row is left; the target of a process.
+    """Record until `orders` holds a 1, or the parent process has ended, and no row is left; target of a process.
 
     A full disk, or any other error of writing, ends the recording and is in `report`; the servo is not affected.
     """

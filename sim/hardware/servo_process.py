@@ -49,10 +49,10 @@ class ServoClock:
     Parameters
     ----------
     late : float
-        Lateness of a tick from which it is a fault [s]; below, missed deadlines are counted, and if the firmware's
-        watchdog switched the motors off meanwhile, the force is ramped in again.
+        Lateness of a tick above which a fault is latched [s]; below it, missed deadlines are only counted, and if the
+        firmware's watchdog switched the motors off meanwhile, the force is ramped in again.
     heartbeat : float
-        Time without a heartbeat of the controls from which it is a fault [s].
+        Time without a heartbeat of the controls above which a fault is latched [s].
     realtime : bool
         Whether to request real-time scheduling.
 
@@ -113,7 +113,7 @@ class Ended(NamedTuple):
 
 
 class Channels(NamedTuple):
-    """Connections of the servo's process: orders in; out the last row, a ring of rows, and its reports."""
+    """Connections of the servo's process. In: orders. Out: the last row, a ring of rows, and reports."""
 
     orders: SharedNumbers
     status: SharedNumbers
@@ -122,7 +122,7 @@ class Channels(NamedTuple):
 
 
 def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock) -> None:
-    """Run a servo until it is ordered to end or its parent process is gone; the target of a process.
+    """Run a servo until it is ordered to end or its parent process has ended; the target of a process.
 
     Parameters
     ----------

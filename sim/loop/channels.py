@@ -1,4 +1,4 @@
-"""Recorded channels of a run, by the body that follows the hand, and the observer of a `Loop` that appends them."""
+"""Recorded channels of a run, depending on the body that follows the hand, and the observer that records them."""
 
 from collections.abc import Callable
 

@@ -45,9 +45,9 @@ class Field(NamedTuple):
     """A compiled field, its limiter and its energy tank: program, parameters, memory, and the last wrench and force.
 
     `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
-    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` are the haptic
-    maps whose values laws are given (see `controllers.fields.algebra.map_feed`), `walkers` the state of figures that
-    are led, which laws and the map read.
+    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` are the haptic maps whose values
+    are passed to laws (see `controllers.fields.algebra.map_feed`), `walkers` the state of led figures, which laws and
+    the map read.
     """
 
     units: IntArray
