@@ -1,1 +1,1 @@
-"""What `hvf bench` measures: speed, as ratios within one run."""
+"""Benchmarks of `hvf bench`: speed, as ratios within one run."""

@@ -48,7 +48,7 @@ from sim.compilation.kernel_units import linked_stages
 from sim.loop.servo import run_block
 
 ROUNDS = 7  # of which the fastest counts
-_START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
+_LIBRARY_IMPORTS = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
 
 
@@ -73,8 +73,8 @@ def figures() -> Iterator[Figure]:
     default = tick_cost(run_config())
     yield Figure("simulated seconds per second, default clock", 1e-3 / default.tick)
     yield Figure("a closed-loop tick of the default clock, two steps", default.tick / default.step, "mj_steps")
-    agree = all(cost.same for cost in (*costs.values(), default))
-    yield Figure("runs whose replayed controls give the same states, bit for bit, of all", float(agree), at_least=1.0)
+    agrees = all(cost.same for cost in (*costs.values(), default))
+    yield Figure("runs whose replayed controls give the same states, bit for bit, of all", float(agrees), at_least=1.0)
     cost = figure_cost()
     yield Figure(
         "kinematic figure, against the physical one", cost.physical / cost.kinematic, "× as fast", at_least=3.0
@@ -90,30 +90,30 @@ def figures() -> Iterator[Figure]:
     small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
     yield Figure("closest point, 10 → 10 000 pieces", large / small, "×", at_most=3.0)
 
-    def in_steps(name: str, microseconds: float, most: float) -> Figure:
-        return Figure(name, 1e-6 * microseconds / step, "mj_steps", at_most=most)
+    def in_mj_steps(name: str, microseconds: float, bound: float) -> Figure:
+        return Figure(name, 1e-6 * microseconds / step, "mj_steps", at_most=bound)
 
-    yield in_steps("ten rivers of higher order, with the limiter", tick_microseconds(*heaviest_field()), 0.3)
-    yield in_steps("soft walls of 17 joints", walls_microseconds(wire(config, clips)), 0.5)
-    yield in_steps("h(p) with h_* over four clips", map_microseconds(wire(config, clips)), 1.0)
+    yield in_mj_steps("ten rivers of higher order, with the limiter", tick_microseconds(*heaviest_field()), 0.3)
+    yield in_mj_steps("soft walls of 17 joints", walls_microseconds(wire(config, clips)), 0.5)
+    yield in_mj_steps("h(p) with h_* over four clips", map_microseconds(wire(config, clips)), 1.0)
     four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))
-    yield in_steps("lifted map, h(p) with h_*, four clips near", four, 1.0)
+    yield in_mj_steps("lifted map, h(p) with h_*, four clips near", four, 1.0)
     yield Figure("lifted map, 10 → 100 clips", hundred / ten, "×", at_most=2.0)
     trials = trial_cost()
     yield Figure("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
     yield Figure("trials on two threads / twice one", trials.scaling, at_least=0.9)
     yield Figure("memory after 2000 short trials / after 400", trials.grown, at_most=1.01)
-    yield in_steps("a picture of the live page", picture_microseconds(wire(config, clips)), 100.0)
+    yield in_mj_steps("a picture of the live page", picture_microseconds(wire(config, clips)), 100.0)
     start = libraries_seconds()
     yield Figure(
         "second start of hvf to its first tick", second_start_seconds() / start, "× its libraries", at_most=3.0
     )
     yield Figure("second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0)
-    yield Figure("hvf --help", _seconds_of("--help") / start, "× its libraries", at_most=1.5)
+    yield Figure("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
     made, verified = certificate_seconds()
-    yield in_steps("certificate of the demo", 1e6 * made, 300_000)
+    yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
     yield Figure("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
-    yield in_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
+    yield in_mj_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
     preparing = prepare_cost()
     yield Figure("preparing captures, processor time", preparing.clip, "× the clips' duration", at_most=6.0)
     yield Figure("preparing captures, against simulating their figure", preparing.simulating, "× the processor time")
@@ -124,14 +124,14 @@ def libraries_seconds() -> float:
     times: list[float] = []
     for _ in range(3):
         begin = time.perf_counter()
-        subprocess.run([sys.executable, "-c", _START], check=True)
+        subprocess.run([sys.executable, "-c", _LIBRARY_IMPORTS], check=True)
         times.append(time.perf_counter() - begin)
     return min(times)
 
 
 def thread_scaling(make: Callable[[], Session]) -> float:
-    """Throughput of two threads with a session each, over twice that of one; of all rounds the least times count."""
-    alone_took, pair_took = list[float](), list[float]()
+    """Throughput of two threads with a session each, over twice that of one; the shortest times of all rounds count."""
+    alone_times, pair_times = list[float](), list[float]()
     for _ in range(ROUNDS):
         alone, pair = prepared(make), [prepared(make) for _ in range(2)]
         threads = [
@@ -141,21 +141,21 @@ def thread_scaling(make: Callable[[], Session]) -> float:
         begin = time.perf_counter()
         session, ticks, frames, n = alone
         run_block(session.servo, 0, n, False, ticks, frames)
-        alone_took.append(time.perf_counter() - begin)
+        alone_times.append(time.perf_counter() - begin)
         begin = time.perf_counter()
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        pair_took.append(time.perf_counter() - begin)
-    return min(alone_took) / min(pair_took)
+        pair_times.append(time.perf_counter() - begin)
+    return min(alone_times) / min(pair_times)
 
 
 def second_start_seconds() -> float:
     """Time from the start of a new process to its first tick, with the code already compiled [s]."""
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(2):
-            _seconds_of("run", "--seconds", "0.1", "--overwrite", "--out", folder)
+            _command_seconds("run", "--seconds", "0.1", "--overwrite", "--out", folder)
         summary = json.loads((Path(folder) / SUMMARY).read_text(encoding="utf-8"))
     return float(summary["speed"]["first_tick_seconds"])
 
@@ -163,8 +163,8 @@ def second_start_seconds() -> float:
 def certificate_seconds() -> tuple[float, float]:
     """Times in which new processes certify the demo's field, and verify the certificate [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        made = _seconds_of("certify", "--out", folder)
-        return made, _seconds_of("certify", "--verify", str(Path(folder) / CERTIFICATE))
+        made = _command_seconds("certify", "--out", folder)
+        return made, _command_seconds("certify", "--verify", str(Path(folder) / CERTIFICATE))
 
 
 def lifting_seconds() -> float:
@@ -176,17 +176,17 @@ def lifting_seconds() -> float:
             clip = embedded(embedded_names()[k % len(embedded_names())])
             poses = clip_motion(clip, times * (1.0 - 0.05 * (k // len(embedded_names())))).poses
             write_bvh(Clip(poses, 60.0, file.stem), file)
-        return _seconds_of("lift", *map(str, files), "--out", str(Path(folder) / "map.npz"))
+        return _command_seconds("lift", *map(str, files), "--out", str(Path(folder) / "map.npz"))
 
 
-def _seconds_of(*arguments: str) -> float:
+def _command_seconds(*arguments: str) -> float:
     begin = time.perf_counter()
     subprocess.run([sys.executable, "-m", "experiments.cli", *arguments], check=True, capture_output=True)
     return time.perf_counter() - begin
 
 
 @njit
-def _closest_many(blob: Array, points: Array, phase: float) -> float:
+def _find_closest_points(blob: Array, points: Array, phase: float) -> float:
     total = 0.0
     for i in range(points.shape[0]):
         phase, distance = closest_phase(blob, 0, points[i, 0], points[i, 1], points[i, 2], phase)
@@ -205,12 +205,12 @@ def closest_point_microseconds(pieces: int) -> float:
     curve = Trajectory(t, 0.02 * points, periodic=True)
     blob = curve.packed()
     path = curve.point(np.linspace(0.0, 1.0, 4000)) + np.random.default_rng(0).normal(scale=1e-3, size=(4000, 3))
-    _closest_many(blob, path[:2], np.nan)
-    return _microseconds(lambda: _closest_many(blob, path, np.nan), len(path))
+    _find_closest_points(blob, path[:2], np.nan)
+    return _microseconds(lambda: _find_closest_points(blob, path, np.nan), len(path))
 
 
 @entry_point
-def _map_many(stages: IntArray, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+def _evaluate_map(stages: IntArray, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     for i in range(points.shape[0]):
         evaluate_map_jacobian(stages, params, points[i], memory, pose, jacobian)
 
@@ -238,12 +238,12 @@ def _map_microseconds(haptic_map: HapticMap, places: Array) -> float:
     stages, params, memory, _ = haptic_map.compiled()
     pose, jacobian, points = np.empty(haptic_map.nq), np.empty((haptic_map.nv, 6)), stylus_path(places)
     stages = linked_stages(stages)
-    _map_many(stages, params, points[:2], memory, pose, jacobian)
-    return _microseconds(lambda: _map_many(stages, params, points, memory, pose, jacobian), len(points))
+    _evaluate_map(stages, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _evaluate_map(stages, params, points, memory, pose, jacobian), len(points))
 
 
 @njit
-def _wall_many(maps: Maps, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
+def _evaluate_walls(maps: Maps, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
         feed_maps(maps, field.params, memory, hands[i])
         evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)
@@ -258,8 +258,8 @@ def walls_microseconds(session: Session) -> float:
     program, wrench = walls.program(), np.empty(6)
     memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.map_feeds)
     maps = maps._replace(stages=linked_stages(maps.stages))
-    _wall_many(maps, field, memory, hands[:2], wrench)
-    return _microseconds(lambda: _wall_many(maps, field, memory, hands, wrench), len(hands))
+    _evaluate_walls(maps, field, memory, hands[:2], wrench)
+    return _microseconds(lambda: _evaluate_walls(maps, field, memory, hands, wrench), len(hands))
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:

@@ -16,7 +16,7 @@ from controllers.state import Array, HandState
 
 
 @njit
-def _ticks(compiled: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array) -> float:
+def _run_ticks(compiled: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array) -> float:
     wrench, total = np.zeros(6), 0.0
     for i in range(hands.shape[0]):
         evaluate(compiled.units, compiled.ops, compiled.params, memory, hands[i], wrench)
@@ -48,6 +48,6 @@ def tick_microseconds(program: Program, hands: Array) -> float:
     for lap in range(6):
         rows = hands[:2] if lap == 0 else hands
         begin = time.thread_time()
-        _ticks(compiled, memory, limiter.limits(), heat, rows, np.zeros(3))
+        _run_ticks(compiled, memory, limiter.limits(), heat, rows, np.zeros(3))
         best = best if lap == 0 else min(best, time.thread_time() - begin)
     return 1e6 * best / len(hands)

@@ -12,7 +12,7 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import run_block
 from sim.world.world import FigureKind
 
-_TICKS, _BLOCKS = 1000, 6  # ticks of a block, and blocks that are timed
+_BLOCK_TICKS, _BLOCK_COUNT = 1000, 6  # ticks of a block, and blocks that are timed
 
 
 class FigureCost(NamedTuple):
@@ -27,17 +27,17 @@ class FigureCost(NamedTuple):
 def figure_cost() -> FigureCost:
     """Measure the kinds in turn; each is the best of several blocks after a warm-up block."""
     sessions = {kind: wire(run_config(figure=kind)) for kind in get_args(FigureKind)}
-    logs = {kind: make_logs(session.servo, _TICKS) for kind, session in sessions.items()}
+    logs = {kind: make_logs(session.servo, _BLOCK_TICKS) for kind, session in sessions.items()}
     model, cost = sessions["none"].world.model, dict.fromkeys((*sessions, "bare_step"), np.inf)
     data = mujoco.MjData(model)
     data.qpos[:] = sessions["none"].world.data.qpos
-    for block in range(_BLOCKS):
+    for block in range(_BLOCK_COUNT):
         for kind, session in sessions.items():
             begin = time.thread_time()
-            run_block(session.servo, _TICKS * block, _TICKS, False, *logs[kind])
+            run_block(session.servo, _BLOCK_TICKS * block, _BLOCK_TICKS, False, *logs[kind])
             if block > 0:
-                cost[kind] = min(cost[kind], (time.thread_time() - begin) / _TICKS)
+                cost[kind] = min(cost[kind], (time.thread_time() - begin) / _BLOCK_TICKS)
         begin = time.thread_time()
-        mujoco.mj_step(model, data, _TICKS)
-        cost["bare_step"] = min(cost["bare_step"], (time.thread_time() - begin) / _TICKS)
+        mujoco.mj_step(model, data, _BLOCK_TICKS)
+        cost["bare_step"] = min(cost["bare_step"], (time.thread_time() - begin) / _BLOCK_TICKS)
     return FigureCost(**cost)

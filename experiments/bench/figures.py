@@ -38,11 +38,11 @@ class Figure:
 
     def line(self) -> str:
         """As ``pass  a tick of follow: 1.42 mj_steps (≤ 1.5)``."""
-        said = {True: "pass", False: "FAIL", None: "    "}[self.passes]
+        verdict = {True: "pass", False: "FAIL", None: "    "}[self.passes]
         limits = (("≤", self.at_most), ("≥", self.at_least))
         bounds = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None]
-        told = f" ({', '.join(bounds)})" if bounds else ""
-        return f"{said}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{told}"
+        bounds_text = f" ({', '.join(bounds)})" if bounds else ""
+        return f"{verdict}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{bounds_text}"
 
 
 def print_figures(figures: Iterable[Figure], as_json: bool, check: bool) -> int:

@@ -1,4 +1,4 @@
-"""Cost of a picture of the live page for its process: poses and arrows of a moment, turned into messages."""
+"""Cost of an image of the live page in its process: poses and arrows of one time, turned into messages."""
 
 import contextlib
 import io
@@ -13,11 +13,11 @@ from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Shown
 
-PICTURES, WARM = 200, 20  # that are timed, and drawn before
+PICTURES, WARM = 200, 20  # images that are timed, and drawn before as a warm-up
 
 
 def picture_microseconds(session: Session) -> float:
-    """Processor time of a picture in which every body has moved [µs], without connected browsers."""
+    """Processor time of an image in which every body has moved [µs], without connected browsers."""
     model, data = session.world.full_model(), session.world.data
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)

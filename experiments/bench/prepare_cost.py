@@ -16,21 +16,21 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 
 _CLIPS = ("walk", "run", "jump", "squat_dance")  # gaits, a flight, and a dance in place
-# Error of joints [rad] and of the root [m], RMS, and its correlation time [s]: soles then slide and hover by
-# centimetres, as those of captures do.
-_TURNED, _MOVED, _SLOW = np.deg2rad(2.0), 0.01, 0.1
-_SECONDS = 5.0  # for which the physical figure follows each [s]
+# RMS error of joints [rad] and of the root [m], and its correlation time [s]: the soles then slide and hover by
+# centimetres, as in captures.
+_JOINT_ERROR, _ROOT_ERROR, _CORRELATION_TIME = np.deg2rad(2.0), 0.01, 0.1
+_FOLLOWING_TIME = 5.0  # [s] for which the physical figure follows each clip
 
 
 class PrepareCost(NamedTuple):
-    """Processor time of preparing.
+    """Processor time of the preparation of captures.
 
     Attributes
     ----------
     clip : float
-        Over the duration of the prepared clips.
+        Divided by the duration of the prepared clips.
     simulating : float
-        Over that of simulating the physical figure that follows them, for as long.
+        Divided by that of simulating, for the same duration, the physical figure that follows them.
     """
 
     clip: float
@@ -38,24 +38,24 @@ class PrepareCost(NamedTuple):
 
 
 def prepare_cost() -> PrepareCost:
-    """Prepare embedded clips with errors as of captures, and let the physical figure follow them."""
+    """Prepare embedded clips with errors like those of captures, and let the physical figure follow them."""
     rng = np.random.default_rng(0)
-    took = lasts = simulated = 0.0
+    preparing_time = clip_time = simulating_time = 0.0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "capture.bvh"
         for number, name in enumerate((_CLIPS[0], *_CLIPS)):
-            write_bvh(_captured(embedded(name), rng), path)
-            made = prepared(path)
-            cost = followed(made.clip, _SECONDS).cost
+            write_bvh(_add_capture_errors(embedded(name), rng), path)
+            result = prepared(path)
+            cost = followed(result.clip, _FOLLOWING_TIME).cost
             if number == 0:
-                continue  # compiles
-            took, lasts = took + made.seconds, lasts + made.clip.duration
-            simulated += made.clip.duration * cost
-    return PrepareCost(took / lasts, took / simulated)
+                continue  # warm-up: compiles
+            preparing_time, clip_time = preparing_time + result.seconds, clip_time + result.clip.duration
+            simulating_time += result.clip.duration * cost
+    return PrepareCost(preparing_time / clip_time, preparing_time / simulating_time)
 
 
-def _captured(clip: Clip, rng: np.random.Generator) -> Clip:
-    """The motion with smooth random errors of the root and all joints, and so with open ends."""
-    scale = np.where(np.arange(N_TANGENT) < 3, _MOVED, _TURNED)
-    errors = gaussian_filter1d(rng.normal(size=(clip.n_frames, N_TANGENT)), _SLOW * clip.fps, axis=0)
+def _add_capture_errors(clip: Clip, rng: np.random.Generator) -> Clip:
+    """The clip with smooth random errors of the root and of all joints, so that its ends do not match."""
+    scale = np.where(np.arange(N_TANGENT) < 3, _ROOT_ERROR, _JOINT_ERROR)
+    errors = gaussian_filter1d(rng.normal(size=(clip.n_frames, N_TANGENT)), _CORRELATION_TIME * clip.fps, axis=0)
     return Clip(plus(clip.poses, scale * errors / errors.std(axis=0)), clip.fps, clip.name)

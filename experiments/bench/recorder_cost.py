@@ -13,7 +13,7 @@ from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 
-_SECONDS, _LONG = 2.0, 20.0  # [s] of a short and of a long run
+_SHORT_RUN, _LONG_RUN = 2.0, 20.0  # [s] of a short and of a long run
 
 
 class RecorderCost(NamedTuple):
@@ -24,15 +24,15 @@ class RecorderCost(NamedTuple):
 
 
 def recorder_cost() -> RecorderCost:
-    """Measure the demo's run."""
-    _seconds(0.1, True)
-    alone, recorded = _seconds(_SECONDS, False), _seconds(_SECONDS, True)
+    """Measure both ratios on the demo's run."""
+    _processor_time(0.1, True)
+    alone, recorded = _processor_time(_SHORT_RUN, False), _processor_time(_SHORT_RUN, True)
     before = psutil.Process().memory_info().rss
-    _seconds(_LONG, True)
+    _processor_time(_LONG_RUN, True)
     return RecorderCost(recorded / alone, psutil.Process().memory_info().rss / before)
 
 
-def _seconds(seconds: float, recorded: bool) -> float:
+def _processor_time(seconds: float, recorded: bool) -> float:
     """Processor time of a run [s], all threads."""
     session = wire(run_config())
     with tempfile.TemporaryDirectory() as folder:

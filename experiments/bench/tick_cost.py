@@ -19,7 +19,7 @@ from sim.loop.servo import FrameLog, TickLog, run_block
 
 STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
 SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
-SLICE = 50  # ticks between a run and its replay, so that both meet the same machine
+SLICE = 50  # ticks that are run before they are replayed, so that both see the same load of the machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
     "follow": lambda: run_config(physics_step=STEP),
@@ -47,10 +47,10 @@ class TickCost(NamedTuple):
 def tick_cost(config: RunConfig) -> TickCost:
     """Measure a run and the replay of its controls, in turns of `SLICE` ticks.
 
-    Every round repeats the same work, slice by slice, so what a slice takes is the least over the rounds: other
+    Every round repeats the same work, slice by slice, so the time of a slice is its minimum over the rounds: other
     processes only add to it.
     """
-    closed, bare, same, substeps = [], [], True, 1
+    closed_loop_times, bare_times, states_agree, substeps = [], [], True, 1
     for _ in range(ROUNDS):
         session, other = wire(config), wire(config)
         ticks, frames = make_logs(session.servo, SLICE)
@@ -60,12 +60,12 @@ def tick_cost(config: RunConfig) -> TickCost:
             (timed(session, k, SLICE, False, ticks, frames), timed(other, k, SLICE, True, ticks, unused))
             for k in begins
         ]
-        closed.append([time[0] for time in times])
-        bare.append([time[1] for time in times])
-        same = same and bool((session.world.data.qpos == other.world.data.qpos).all())
+        closed_loop_times.append([time[0] for time in times])
+        bare_times.append([time[1] for time in times])
+        states_agree = states_agree and bool((session.world.data.qpos == other.world.data.qpos).all())
         substeps = session.servo.plant.substeps
-    tick, replayed = (float(np.min(rounds, axis=0).mean()) / SLICE for rounds in (closed, bare))
-    return TickCost(tick, replayed / substeps, same)
+    tick, replayed = (float(np.min(rounds, axis=0).mean()) / SLICE for rounds in (closed_loop_times, bare_times))
+    return TickCost(tick, replayed / substeps, states_agree)
 
 
 def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:

@@ -22,11 +22,11 @@ from experiments.trials.execution.drive import run_missing, warm
 from experiments.trials.execution.threads import Threads
 from experiments.trials.trial.run_trial import SHELF, Row, Task
 
-_THREADS, _SHORT, _MANY = 2, 0.02, 2_000  # simultaneous trials; duration of a short trial [s]; number of short trials
+_THREAD_COUNT, _SHORT_TIME, _SHORT_COUNT = 2, 0.02, 2_000  # simultaneous trials; short trials: duration [s] and number
 
 
 class TrialCost(NamedTuple):
-    """Ratios of one study of `_study`, without a figure, and its trials.
+    """Ratios of one study of `_make_study`, without a figure, and its trials.
 
     Attributes
     ----------
@@ -49,37 +49,37 @@ class TrialCost(NamedTuple):
 def trial_cost() -> TrialCost:
     """Measure all ratios; needs an idle machine, as some times are wall-clock times."""
     quiet = Console(stderr=True, quiet=True)
-    more, one = overhead(6, 5.0, quiet)
-    _, two = _run(_study(6, 5.0), Threads(_THREADS), quiet)
-    return TrialCost(more, one / (_THREADS * two), grown(_MANY, quiet), start_seconds())
+    added, one = overhead(6, 5.0, quiet)
+    _, two = _run_study(_make_study(6, 5.0), Threads(_THREAD_COUNT), quiet)
+    return TrialCost(added, one / (_THREAD_COUNT * two), grown(_SHORT_COUNT, quiet), start_seconds())
 
 
 def overhead(users: int, seconds: float, console: Console) -> tuple[float, float]:
     """Processor time of planning, driving and database over that of the trials, and the total time [s]."""
-    warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, console)
+    warm([trial.config for trial in planned(_make_study(1, 0.1))[:1]], SHELF, console)
     begin = time.process_time()
-    own, whole = _run(_study(users, seconds), Threads(1), console)
-    return (time.process_time() - begin) / own - 1.0, whole
+    trial_seconds, study_seconds = _run_study(_make_study(users, seconds), Threads(1), console)
+    return (time.process_time() - begin) / trial_seconds - 1.0, study_seconds
 
 
 def grown(trials: int, console: Console) -> float:
     """Memory of this process after a number of short trials of a study, over that after a fifth of them."""
-    watched = _Watched(trials // 5)
-    _run(_study(trials // 4, _SHORT), watched, console)
-    return psutil.Process().memory_info().rss / watched.then
+    watch = _MemoryWatch(trials // 5)
+    _run_study(_make_study(trials // 4, _SHORT_TIME), watch, console)
+    return psutil.Process().memory_info().rss / watch.memory
 
 
-class _Watched(Threads):
-    """An executor with one thread that notes the memory of the process after a number of trials."""
+class _MemoryWatch(Threads):
+    """An executor with one thread that stores the memory of the process after a number of trials."""
 
     def __init__(self, after: int):
         super().__init__(1)
-        self._after, self.then = after, 0
+        self._after, self.memory = after, 0
 
     def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
         for done, row in enumerate(super().rows(tasks)):
             if done == self._after:
-                self.then = psutil.Process().memory_info().rss
+                self.memory = psutil.Process().memory_info().rss
             yield row
 
 
@@ -94,13 +94,13 @@ def start_seconds() -> float:
 
 def first_row() -> None:
     """Run the first trial of a study, and print its state."""
-    study = _study(1, _SHORT)
+    study = _make_study(1, _SHORT_TIME)
     trial = planned(study)[0]
     warm([trial.config], SHELF, Console(stderr=True, quiet=True))
     print(next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))]))).state, flush=True)
 
 
-def _study(users: int, seconds: float) -> StudyConfig:
+def _make_study(users: int, seconds: float) -> StudyConfig:
     values: Mapping[str, object] = {
         "name": "cost", "seconds": seconds, "run": {"figure": "none"}, "users": {"number": users},
         "factors": {"stiffness": [100, 300], "damping": [4, 8]},
@@ -108,13 +108,13 @@ def _study(users: int, seconds: float) -> StudyConfig:
     return study_from(values, "cost")
 
 
-def _run(study: StudyConfig, executor: Threads, console: Console) -> tuple[float, float]:
+def _run_study(study: StudyConfig, executor: Threads, console: Console) -> tuple[float, float]:
     """The trials' own processor time, and the time that the study took [s]."""
     with tempfile.TemporaryDirectory() as folder, Database(Path(folder) / "s.sqlite", "cost", "cost", "") as database:
         begin = time.perf_counter()
         trials: tuple[Trial, ...] = planned(study)
-        told = {trial.key: {"user": trial.meeting.user} for trial in trials}
-        run_missing(trials, database, executor, "", console, told)
+        factors = {trial.key: {"user": trial.meeting.user} for trial in trials}
+        run_missing(trials, database, executor, "", console, factors)
         return sum(row.seconds for row in database.rows()), time.perf_counter() - begin
 
 

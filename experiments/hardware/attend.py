@@ -1,7 +1,7 @@
 """Operator's terminal of a hardware run: Enter arms and disarms, Ctrl-C ends, and changes of state are printed.
 
 Enter never does more than the screen says: keys pressed before a prompt or a fault are discarded, Enter under force
-disarms, and the end of the input, such as Ctrl-D, ends the run.
+disarms, and the end of the input, such as by Ctrl-D, ends the run.
 """
 
 import contextlib
@@ -19,8 +19,8 @@ from experiments.hardware.link import link_now
 from experiments.hardware.run_options import RunHardware
 from sim.hardware.controls import HardwareRun, RecorderStatus, RunStatus
 
-_POLL = 0.05  # [s] between two polls, each of which is also the heartbeat of the controls
-_DISARMED = "Disarmed: the motors are off."
+_POLL_INTERVAL = 0.05  # [s] between two polls, each of which is also the heartbeat of the controls
+_DISARMED_TEXT = "Disarmed: the motors are off."
 
 
 class _Key(enum.Enum):
@@ -35,65 +35,65 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
     With `options.arm` no operator is asked: the device is armed at once, and a fault ends the run.
     """
     terminal = sys.stdin.isatty() and not options.arm
-    until, state, status, recording = None, None, run.poll(), True
+    end_time, state, status, was_recording = None, None, run.poll(), True
     if terminal:
-        _forget_keys()
+        _discard_pending_keys()
         console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
     else:
         run.request(ARM)
-        until = time.monotonic() + seconds
+        end_time = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt), console.status("") as line:
-        while until is None or time.monotonic() < until:
-            time.sleep(_POLL)
+        while end_time is None or time.monotonic() < end_time:
+            time.sleep(_POLL_INTERVAL)
             status = run.poll()
             line.update(link_now(status.row))
             if not status.alive:
                 console.print("The servo has stopped; the device lets go if it has a watchdog.")
                 return status
-            if status.recorded is not None and not status.recorded.alive and recording:
-                recording = False
+            if status.recorded is not None and not status.recorded.alive and was_recording:
+                was_recording = False
                 console.print(_recording_ended(status.recorded), highlight=False)
             if status.state is not state:
                 state = status.state
                 console.print(_status_line(status, options.dead_man, terminal), highlight=False)
                 if terminal and state is State.FAULT:
-                    _forget_keys()
+                    _discard_pending_keys()
             if status.fault is not Fault.NONE and not terminal:
                 return status
-            key = _key() if terminal else _Key.NONE
+            key = _pressed_key() if terminal else _Key.NONE
             if key is _Key.END:
                 break
-            if key is _Key.ENTER and _obeyed(run, status):
-                until = until or time.monotonic() + seconds
+            if key is _Key.ENTER and _handle_enter(run, status):
+                end_time = end_time or time.monotonic() + seconds
     run.request(DISARM)
     return status
 
 
 def _recording_ended(recorded: RecorderStatus) -> str:
-    why = f" ({os.strerror(recorded.error)})" if recorded.error else ""
-    return f"The recording has ended{why} after {recorded.rows} ticks; what it has is kept, and the run goes on."
+    reason = f" ({os.strerror(recorded.error)})" if recorded.error else ""
+    return f"The recording has ended{reason} after {recorded.rows} ticks; what it has is kept, and the run goes on."
 
 
-def _obeyed(run: HardwareRun, status: RunStatus) -> bool:
+def _handle_enter(run: HardwareRun, status: RunStatus) -> bool:
     """Do what Enter means in the current state; returns whether it arms the device."""
     if status.state not in (State.DISARMED, State.FAULT):
         run.request(DISARM)
         return False
     if status.state is State.FAULT:
         run.request(CLEAR)
-        time.sleep(2.0 * _POLL)
+        time.sleep(2.0 * _POLL_INTERVAL)
     run.request(ARM)
     return True
 
 
-def _key() -> _Key:
+def _pressed_key() -> _Key:
     """The key that was pressed, without waiting."""
     if not select.select([sys.stdin], [], [], 0.0)[0]:
         return _Key.NONE
     return _Key.ENTER if sys.stdin.readline() else _Key.END
 
 
-def _forget_keys() -> None:
+def _discard_pending_keys() -> None:
     """Discard pending input."""
     import termios  # not on Windows
 
@@ -101,9 +101,9 @@ def _forget_keys() -> None:
 
 
 def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
-    again = " Enter arms it." if terminal else ""
-    said = {
-        State.DISARMED: _DISARMED + again,
+    hint = " Enter arms it." if terminal else ""
+    texts = {
+        State.DISARMED: _DISARMED_TEXT + hint,
         State.ARMING: "Arming: no force yet"
         + (", the switch has to be held, and" if dead_man else ";")
         + " the force that is asked for has to be small first.",
@@ -112,4 +112,4 @@ def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
         State.FAULT: f"The device let go at {float(status.row['t']):.3f} s: {status.fault.words(status.value)}."
         + (" Enter clears it, and arms again." if terminal else ""),
     }
-    return f"{float(status.row['t']):8.2f} s  {said[status.state]}"
+    return f"{float(status.row['t']):8.2f} s  {texts[status.state]}"

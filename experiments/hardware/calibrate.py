@@ -43,8 +43,8 @@ def calibrate(options: CalibrateHardware) -> int:
         raise SimError(
             f"{options.out}: has an offset of the encoders; choose another --out, or --overwrite that offset"
         )
-    hidden = linkage_from(read_device_file(options.emulate) if options.emulate else {})
-    driver = Fixture(options.pose, hidden) if options.name == EMULATED else open_device(options.name)
+    emulated_linkage = linkage_from(read_device_file(options.emulate) if options.emulate else {})
+    driver = Fixture(options.pose, emulated_linkage) if options.name == EMULATED else open_device(options.name)
     try:
         readings = still_readings(driver, options.seconds)
     finally:
@@ -55,8 +55,8 @@ def calibrate(options: CalibrateHardware) -> int:
     if options.json:
         print(json_text(content))
         return 0
-    for i, (value, half) in enumerate(zip(offset, margin, strict=True), start=1):
-        print(f"offset{i}  {value: .5f} ± {half:.5f} rad")
+    for i, (value, half_width) in enumerate(zip(offset, margin, strict=True), start=1):
+        print(f"offset{i}  {value: .5f} ± {half_width:.5f} rad")
     device = f"{driver.identity.name} {driver.identity.serial}".rstrip()
     print(f"{device}: {len(readings)} readings; in {options.out}.")
     return 0
@@ -99,21 +99,21 @@ def still_readings(driver: Driver, seconds: float) -> Array:
 
 
 class Fixture(EmulatedPhantom):
-    """The emulated device in a rigid fixture at a pose; one that is only held would sag by a part of an encoder count.
+    """The emulated device in a rigid fixture at a pose; in a hand, it would sag by a fraction of an encoder count.
 
     Parameters
     ----------
     pose : three floats
         Angles of the joints [rad].
     linkage : Linkage
-        What the device is.
+        Parameters of the device.
     """
 
     def __init__(self, pose: tuple[float, float, float], linkage: Linkage):
-        self._stands = np.array(vector_to_hand_frame(forward_kinematics(pose)))
-        super().__init__(SceneConfig(servo_period=_PERIOD), self._stands, linkage, holds=0.0)
+        self._tip_position = np.array(vector_to_hand_frame(forward_kinematics(pose)))
+        super().__init__(SceneConfig(servo_period=_PERIOD), self._tip_position, linkage, holds=0.0)
 
     def write(self, torque: Array, enable: bool) -> None:
-        """As `sim.devices.driver.Driver`."""
+        """See `sim.devices.driver.Driver`; the device stays in its pose."""
         super().write(torque, enable)
-        self.world.reset(self._stands, rest_pose())
+        self.world.reset(self._tip_position, rest_pose())

@@ -34,7 +34,7 @@ class Finding:
     says : str
         What was found.
     remedy : str
-        How to mend it; empty if nothing is wrong.
+        How to fix it; empty if nothing is wrong.
     """
 
     what: str
@@ -107,7 +107,7 @@ def _limits() -> list[Finding]:
     return [
         _preemption(),
         Finding("realtime priority", OK, "allowed")
-        if priority != 0 or _is_given_precedence()
+        if priority != 0 or _is_realtime_allowed()
         else Finding("realtime priority", WEAK, "not allowed (RLIMIT_RTPRIO 0)", f"put `USER - rtprio 80` {limits}"),
         Finding("memory lock", OK, "unlimited" if memory == unlimited else f"{memory / 2**20:.0f} MB")
         if memory == unlimited or memory >= 2**30
@@ -118,7 +118,7 @@ def _limits() -> list[Finding]:
     ]
 
 
-def _is_given_precedence() -> bool:
+def _is_realtime_allowed() -> bool:
     """Whether the system grants this process SCHED_FIFO; the scheduling policy is restored afterwards."""
     policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
@@ -130,7 +130,7 @@ def _is_given_precedence() -> bool:
 
 
 def _preemption() -> Finding:
-    if _text("/sys/kernel/realtime") == "1":
+    if _read("/sys/kernel/realtime") == "1":
         return Finding("kernel", OK, "PREEMPT_RT")
     build = platform.version()
     kind = next((word for word in ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT") if word in build), "no preemption")
@@ -140,7 +140,7 @@ def _preemption() -> Finding:
 
 
 def _governor() -> Finding:
-    found = {_text(str(path)) for path in Path("/sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor")}
+    found = {_read(str(path)) for path in Path("/sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor")}
     if not found:
         return Finding("processor's frequency", OK, "not scaled by the system")
     if found == {"performance"}:
@@ -150,7 +150,7 @@ def _governor() -> Finding:
     )
 
 
-def _text(path: str) -> str:
+def _read(path: str) -> str:
     try:
         return Path(path).read_text(encoding="ascii").strip()
     except OSError:

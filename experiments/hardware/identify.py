@@ -15,8 +15,8 @@ from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified, Motion, identify_linkage, motions_of
 from sim.recording.recording import Recording
 
-_SETTLING = 2.5
-"""Time left out after the device becomes active [s], in which the hand that held the stylus lets go."""
+_SETTLING_TIME = 2.5
+"""Time left out after activation [s], in which the hand that held the stylus lets go."""
 _UNITS = {"coulomb": "N m", "viscous": "N m s/rad", "inertia": "kg m²", "delay": "s", "offset": "rad", "weight": "N m"}
 
 
@@ -75,22 +75,22 @@ def recorded_motions(path: Path) -> list[Motion]:
         rate = recording.rates["ticks"]
     active = state == State.ACTIVE
     settled = np.zeros(len(active), dtype=bool)
-    wait = round(_SETTLING * rate)
-    counted = 0
+    settling_ticks = round(_SETTLING_TIME * rate)
+    active_ticks = 0
     for k, on in enumerate(active):
-        counted = counted + 1 if on else 0
-        settled[k] = counted > wait
+        active_ticks = active_ticks + 1 if on else 0
+        settled[k] = active_ticks > settling_ticks
     return motions_of(tick, clock, theta, torque, settled)
 
 
 def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
     """Identified parameters in words, one per line."""
     seconds = sum(float(motion.clock[-1] - motion.clock[0]) for motion in motions)
-    said = [
+    lines = [
         f"{seconds:.1f} s of motion, {found.windows} windows; {found.unexplained:.2%} of the torque is unexplained."
     ]
     for name, value, margin in zip(NAMES, found.values, found.margins, strict=True):
         unit = _UNITS[name.rstrip("123")]
-        known = "" if margin < abs(value) else "  (not told apart from zero)"
-        said.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{known}")
-    return [*said, "offset1    does not show in motions; hvf hardware calibrate measures it."]
+        remark = "" if margin < abs(value) else "  (not told apart from zero)"
+        lines.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{remark}")
+    return [*lines, "offset1    does not show in motions; hvf hardware calibrate measures it."]

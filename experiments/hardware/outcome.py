@@ -79,7 +79,7 @@ class Outcome:
         """All attributes by name, as plain data."""
         return {**asdict(self), "link": self.link._asdict()}
 
-    def _under_force(self, name: str) -> list[str]:
+    def _force_lines(self, name: str) -> list[str]:
         return [
             f"{name}: {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from the curve, at most "
             f"{self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
@@ -89,27 +89,27 @@ class Outcome:
 
     def lines(self) -> list[str]:
         """The outcome in words, faults and failures first."""
-        wrong = [f"The device let go: {self.fault}."] if self.fault else []
+        errors = [f"The device let go: {self.fault}."] if self.fault else []
         if len(self.let_go) > bool(self.fault):
-            wrong += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]
-        wrong += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
-        wrong += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
+            errors += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]
+        errors += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
+        errors += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
         name = f"{self.device} ({self.transport})"
         return [
-            *wrong,
-            *(self._under_force(name) if self.active > 0.0 else [f"{name}: it was never under force."]),
-            f"{self.ticks} ticks, {self.missed} deadlines missed; {self._times()}.",
+            *errors,
+            *(self._force_lines(name) if self.active > 0.0 else [f"{name}: it was never under force."]),
+            f"{self.ticks} ticks, {self.missed} deadlines missed; {self._timing_text()}.",
             f"The device answered: {'; '.join(self.link.lines())}.",
-            f"{self._growth()}; {self.recorded} ticks are recorded, {self.dropped} were dropped.",
+            f"{self._growth_text()}; {self.recorded} ticks are recorded, {self.dropped} were dropped.",
         ]
 
-    def _times(self) -> str:
+    def _timing_text(self) -> str:
         if self.compute is None or self.lateness is None:
             return "the servo was gone before it told how long they took and how late they were"
         compute, late = (" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness))
         return f"p50 / p99 / p99.9: computing {compute} µs, late by {late} µs"
 
-    def _growth(self) -> str:
+    def _growth_text(self) -> str:
         if self.memory_growth is None:
             return "By how much the servo grew is not known"
         return f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files"
@@ -117,7 +117,7 @@ class Outcome:
 
 def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStatus) -> Outcome:
     """The outcome of a run that has ended."""
-    found = _recorded(recording)
+    found = _summarize_recording(recording)
     return Outcome(
         device=ready.identity.name,
         transport=ready.identity.transport,
@@ -135,7 +135,7 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
 
 
 def holds_ticks(path: Path) -> bool:
-    """Whether a tick is in a recording; a file that cannot be read may have some."""
+    """Whether a recording has a tick; a file that cannot be read counts as if it had."""
     try:
         with Recording(path) as recording:
             return len(recording.groups["ticks"]["state"]) > 0
@@ -143,26 +143,26 @@ def holds_ticks(path: Path) -> bool:
         return path.exists()
 
 
-def _recorded(path: Path) -> dict[str, Any]:
-    nothing: dict[str, Any] = dict.fromkeys(
+def _summarize_recording(path: Path) -> dict[str, Any]:
+    empty: dict[str, Any] = dict.fromkeys(
         ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
     ) | {"let_go": (), "link": Link.of(0.0, (0, 0, 0), np.full((1, 3), np.nan))}
     try:
         recording = Recording(path)
     except RecordingError:
-        return nothing
+        return empty
     with recording:
         channels = recording.groups["ticks"]
         if not len(channels["state"]):
-            return nothing
+            return empty
         state = channels["state"][:]
-        on = state == State.ACTIVE
+        is_active = state == State.ACTIVE
         rows = {
             name: recording.channel("ticks", name)[:] for name in ("distance", "force", "heat", "apart", "hand_force")
         }
-        rows = {name: rows[name][on] for name in rows if name in channels}
+        rows = {name: rows[name][is_active] for name in rows if name in channels}
         sizes = {name: np.linalg.norm(rows[name], axis=1) for name in ("force", "hand_force")}
-        some = bool(on.any())
+        was_active = bool(is_active.any())
         t, fault, value = (recording.channel("ticks", name)[:] for name in ("t", "fault", "fault_value"))
         sequence, lost, refused, *times = (
             recording.channel("ticks", name)[:]
@@ -170,14 +170,14 @@ def _recorded(path: Path) -> dict[str, Any]:
         )
         new = np.diff(sequence, prepend=0.0) != 0.0
         counts = np.sum(new), lost[-1], refused[-1]
-        begun = np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))
+        fault_starts = np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))
         return {
-            "let_go": tuple(f"{t[k]:.3f} s, {Fault(int(fault[k])).words(value[k])}" for k in begun),
+            "let_go": tuple(f"{t[k]:.3f} s, {Fault(int(fault[k])).words(value[k])}" for k in fault_starts),
             "recorded": len(state), "dropped": int(recording.channel("ticks", "dropped")[-1]),
-            "active": float(np.sum(on)) / recording.rates["ticks"],
-            "distance": float(np.sqrt(np.mean(rows["distance"] ** 2))) if some else 0.0,
+            "active": float(np.sum(is_active)) / recording.rates["ticks"],
+            "distance": float(np.sqrt(np.mean(rows["distance"] ** 2))) if was_active else 0.0,
             "force": float(sizes["force"].max(initial=0.0)), "heat": float(rows["heat"].max(initial=0.0)),
-            "apart": float(np.sqrt(np.mean(rows["apart"] ** 2))) if some else 0.0,
+            "apart": float(np.sqrt(np.mean(rows["apart"] ** 2))) if was_active else 0.0,
             "hand_force": float(sizes["hand_force"].max(initial=0.0)),
             "link": Link.of(float(t[-1] - t[0]), counts, np.stack(times, axis=1)[new]),
         }  # fmt: skip

@@ -26,7 +26,7 @@ from sim.viewer.live_page import LivePage
 from sim.viewer.shown import Shown
 from sim.world.shown_phantom import show_angles, shown_phantom
 
-_PAUSE = 1.0 / 60.0  # [s] between two polls: half the time between two pictures
+_POLL_INTERVAL = 1.0 / 60.0  # [s] between two polls: half the time between two images
 
 
 def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Session:
@@ -37,13 +37,13 @@ def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Sessio
 
 
 def show_status(config: RunConfig, status: SharedNumbers, recorder_status: SharedNumbers) -> None:
-    """Show a run until the parent process ends; the target of a process on which no other one waits.
+    """Show a run until the parent process ends; the target of a process that no other one waits for.
 
     The force of the hand is the twin's estimate (`recorder_status`). The figure is the animation h(p) itself; a
     figure that is led is not shown, as its walker is in the servo's process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    led, session = config.leads, page_session(config)
+    is_led, session = config.leads, page_session(config)
     world = session.world
     static = session.static()
     page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), world.kind)
@@ -53,13 +53,13 @@ def show_status(config: RunConfig, status: SharedNumbers, recorder_status: Share
         if status.read(row):
             tick = {name: channel[0] for name, channel in columns(row[None]).items()}
             show_angles(linkage, tuple(tick["theta"]), tuple(tick["gimbal"]))
-            pose = np.zeros(0) if led else _pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
+            pose = np.zeros(0) if is_led else _animation_pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
             qpos = np.concatenate([world.data.qpos, pose])
             recorder_status.read(twin)
             hand = twin[RECORDER_FORCE : RECORDER_FORCE + 3].copy()
             shown = Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan))
             page.show(shown, notes_of(tick))
-        time.sleep(_PAUSE)
+        time.sleep(_POLL_INTERVAL)
 
 
 def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
     return (f"{state}: {fault.words(float(tick['fault_value']))}" if fault else state, *link_now(tick).split(", "))
 
 
-def _pose(session: Session, argument: Array) -> Array:
+def _animation_pose(session: Session, argument: Array) -> Array:
     """Pose of the animation at a stylus pose (7,), shape (75,)."""
     reference, poses = session.servo.reference, np.empty((1, session.haptic_map.nq))
     poses_along(reference.stages, reference.params, reference.memory.copy(), argument[None], poses)

@@ -46,7 +46,7 @@ def served(config: RunConfig) -> RunConfig:
 def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: float = SILENT_PERIODS) -> Session:
     """Put together the run of a field on a device that is accessed through two arrays (`sim.devices.exchange`).
 
-    The device may be silent for `silent` periods of the servo before that is a fault.
+    After `silent` servo periods without a reading from the device, a fault is latched.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class MakeServo:
     calibrated : bool
         Whether the emulated device knows its zero.
     silent : float
-        Number of periods without a new reading after which there is a fault.
+        Number of periods without a new reading after which a fault is latched.
     """
 
     config: RunConfig

@@ -56,10 +56,10 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     try:
         found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))
     except ChangedInputs:
-        differ = changed_options(file, certified_options(config, delay, HandRange(), HAND_PUSH))
-        if not differ:
+        changes = changed_options(file, certified_options(config, delay, HandRange(), HAND_PUSH))
+        if not changes:
             raise
-        raise ChangedInputs(f"{file} certifies another field or device: {differ}; certify this one") from None
+        raise ChangedInputs(f"{file} certifies another field or device: {changes}; certify this one") from None
     stable = {name: verdict for name, verdict in found.verdicts.items() if name.startswith("stability")}
     if not stable:
         raise SimError(f"{file}: says nothing of stability; expected the certificate of a field")
@@ -70,7 +70,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
 
 
 def check_meaning(options: RunHardware) -> None:
-    """Refuse options that are given and change nothing on this device, by name.
+    """Refuse given options that have no effect on this device, by name.
 
     Raises
     ------
@@ -79,12 +79,12 @@ def check_meaning(options: RunHardware) -> None:
     """
     given = given_words(options.options)
     figure = ("figure", *meaningless("kinematic", given.get("mode") == "lead"))
-    wrong = dict.fromkeys(("user", "person"), "whoever holds the stylus is the hand; leave it out")
-    wrong |= dict.fromkeys(figure, "its figure is the animation, shown beside it by --view; leave it out")
-    for name in wrong:
+    reasons = dict.fromkeys(("user", "person"), "whoever holds the stylus is the hand; leave it out")
+    reasons |= dict.fromkeys(figure, "its figure is the animation, shown beside it by --view; leave it out")
+    for name in reasons:
         if name in given:
             option = f"--{name.replace('_', '-')} {given[name]}"
-            raise ParameterError(f"{option} has no meaning on a device: {wrong[name]}")
+            raise ParameterError(f"{option} has no meaning on a device: {reasons[name]}")
     check_emulate(options)
     if options.name == EMULATED and options.certificate is None and options.delay > 0.0:
         raise ParameterError(
@@ -101,14 +101,14 @@ def check_limits(options: RunHardware) -> None:
     SimError
         If an option is beyond its bound; the message names both.
     """
-    for name, most, unit in (
+    for name, limit, unit in (
         ("force", 8.5, "N, the Premium's peak"), ("speed", 2.0, "m/s"), ("small", 2.0, "N"),
         ("silence", 5.0, "periods"),
     ):  # fmt: skip
         value = getattr(options, name)
-        if value > most:
+        if value > limit:
             raise SimError(
-                f"--{name} {value:g} is too much for a hand on a real device; expected at most {most:g} {unit}"
+                f"--{name} {value:g} is too much for a hand on a real device; expected at most {limit:g} {unit}"
             )
     if options.ramp < RAMP:
         raise SimError(
@@ -138,15 +138,15 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
             f"the device file {calibration.why_not(identity)}, this is {identity.name} {identity.serial}".rstrip()
             + "; calibrate it with hvf hardware calibrate"
         )
-    said: list[str] = []
+    warnings: list[str] = []
     if not identity.watchdog:
-        said.append(
+        warnings.append(
             f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; "
             "keep its power switch within reach"
         )
     if identity.own_weight and not identified:
-        said.append(
+        warnings.append(
             f"{identity.name} is no Phantom by build, and the certificate is for the friction and inertia of one; find "
             "out its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
         )
-    return said
+    return warnings

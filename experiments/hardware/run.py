@@ -69,8 +69,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     ------
     ModelError, ControllerError, SimError
         If there is no such device, an option has no meaning on it, it may not be armed with this field, or another run
-        is being written into the folder. The folder is then left unchanged, unless an earlier run is replaced and this
-        is found only after a real device has been opened.
+        is being written into the folder. The folder is then left unchanged, unless an earlier run is replaced and the
+        error is found only after a real device has been opened.
     """
     console = Console(stderr=True)
     check_meaning(options)
@@ -78,15 +78,15 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     config = resolved(config)
-    _permit(config, options, console)
+    _check_permit(config, options, console)
     content = content_of(config.device)
-    hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
+    emulated_linkage = linkage_from(read_device_file(options.emulate) if options.emulate else content)
     scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
-    calibrated = options.emulate is None or not any(hidden.offset)
+    calibrated = options.emulate is None or not any(emulated_linkage.offset)
     if options.name == EMULATED:
-        steps_late(scene, hidden.delay)
+        steps_late(scene, emulated_linkage.delay)
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
-    session = _compiled(config, options, console)
+    session = _compile_session(config, options, console)
     job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
         served(config),
@@ -98,8 +98,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     )
     with run_folder(options), contextlib.ExitStack() as stack:
         if options.name == EMULATED:
-            end = MakeEmulated(scene, start_of(session), hidden)
-            packets = stack.enter_context(emulated(end, options.realtime))
+            make_device = MakeEmulated(scene, start_of(session), emulated_linkage)
+            packets = stack.enter_context(emulated(make_device, options.realtime))
             make = replace(make, packets=packets, calibrated=calibrated)
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
@@ -108,15 +108,15 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
             console.print(line, highlight=False)
         if options.view:
-            stack.enter_context(_page(config, run))
+            stack.enter_context(_serve_page(config, run))
         last = attend(run, config.seconds, options, console)
         ended = run.stop()
         outcome = outcome_of(options.out / RECORDING, ready, ended, last)
-        _write(outcome, options.out, options.json, console)
+        _write_results(outcome, options.out, options.json, console)
     return 0 if outcome.sound else 1
 
 
-def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Session:
+def _compile_session(config: RunConfig, options: RunHardware, console: Console) -> Session:
     """The session of the servo; compiles all units that servo and page need before their processes start."""
     session = session_of(served(config), ready=lambda units: compile_once(console, units))
     if options.view:
@@ -127,7 +127,7 @@ def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Sess
 
 
 def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None:
-    """Write configuration and device file; not before the servo ticks, as a program that is killed leaves them."""
+    """Write configuration and device file; only once the servo ticks, since a killed program would leave them."""
     (out / CONFIG).write_text(to_json(config), encoding="utf-8")
     if content:
         save_device(content, out / DEVICE)
@@ -135,8 +135,8 @@ def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None
 
 @contextlib.contextmanager
 def run_folder(options: RunHardware) -> Generator[None, None, None]:
-    """Lock the folder and clear it; without a tick, all that the run writes into it is taken back."""
-    out, new = options.out, not options.out.exists()
+    """Lock the folder and clear it; if no tick is recorded, all that the run wrote into it is removed."""
+    out, is_new = options.out, not options.out.exists()
     with claimed(out):
         check_holds(out, options.overwrite)
         clear_folder(out)
@@ -147,19 +147,19 @@ def run_folder(options: RunHardware) -> Generator[None, None, None]:
                 for name in (CONFIG, DEVICE, RECORDING):
                     (out / name).unlink(missing_ok=True)
                 with contextlib.suppress(OSError):  # other files are in it
-                    if new:
+                    if is_new:
                         out.rmdir()
 
 
 def _gate(config: RunConfig, options: RunHardware) -> Gate:
-    """The safety gate with the limits of the options, for a device that has passed `_permit`."""
+    """The safety gate with the limits of the options, for a device that has passed `_check_permit`."""
     return Gate(
         config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
         small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
     )  # fmt: skip
 
 
-def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
+def _check_permit(config: RunConfig, options: RunHardware, console: Console) -> None:
     """Refuse a real device without a certificate of this field, and limits that would not protect a hand.
 
     Raises
@@ -200,7 +200,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 
 
 @contextlib.contextmanager
-def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
+def _serve_page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
     page = context.Process(target=show_status, args=(config, run.status, run.recorder_status), name="page", daemon=True)
     start_undisturbed(page)
@@ -211,7 +211,7 @@ def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
         page.join()
 
 
-def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
+def _write_results(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
     say(outcome.to_json(), as_json, outcome.lines())
     if not holds_ticks(out / RECORDING):
         console.print(f"Nothing was recorded, so nothing is left in {out}.", highlight=False)

@@ -1,4 +1,4 @@
-"""The options of ``hvf hardware run``, ``calibrate`` and ``identify``; light, for the command line reads them."""
+"""Options of ``hvf hardware run``, ``calibrate`` and ``identify``; few imports, so that ``hvf`` starts quickly."""
 
 from pathlib import Path
 from typing import Annotated
@@ -90,7 +90,7 @@ class IdentifyHardware:
 
 
 def check_emulate(options: RunHardware | CalibrateHardware) -> None:
-    """Refuse what an emulated device is beside a real one.
+    """Refuse a device file for the emulated device if another device is used.
 
     Raises
     ------

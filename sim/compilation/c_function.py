@@ -15,26 +15,26 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-_HIDDEN = sys.platform == "win32" and platform.machine().lower() in ("amd64", "x86_64")
+_STRUCT_BY_POINTER = sys.platform == "win32" and platform.machine().lower() in ("amd64", "x86_64")
 
 
-def _calls(result: types.Type) -> Any:
-    def calling(_: Any, function: Any, arguments: Any) -> Any:
+def _call_intrinsic(result: types.Type) -> Any:
+    def typing(_: Any, function: Any, arguments: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             values = cgutils.unpack_tuple(builder, given[1], len(arguments.types))
-            told = ir.VoidType() if result == types.none else context.get_value_type(result)
-            shape = ir.FunctionType(told, [value.type for value in values])
-            called = builder.call(builder.inttoptr(given[0], shape.as_pointer()), values)
-            return context.get_dummy_value() if result == types.none else called
+            result_type = ir.VoidType() if result == types.none else context.get_value_type(result)
+            function_type = ir.FunctionType(result_type, [value.type for value in values])
+            call = builder.call(builder.inttoptr(given[0], function_type.as_pointer()), values)
+            return context.get_dummy_value() if result == types.none else call
 
         return result(types.intp, arguments), generate
 
-    return intrinsic(calling)
+    return intrinsic(typing)
 
 
-call_int: Any = _calls(types.int32)
+call_int: Any = _call_intrinsic(types.int32)
 """Calls a C function that returns int: ``call_int(address, arguments)``."""
-call_void: Any = _calls(types.none)
+call_void: Any = _call_intrinsic(types.none)
 """Calls a C function that returns nothing: ``call_void(address, arguments)``."""
 
 
@@ -48,24 +48,24 @@ def struct_heads(hidden: bool) -> Any:
         returned in two registers.
     """
 
-    def calling(_: Any, function: Any) -> Any:
+    def typing(_: Any, function: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             word, number = ir.IntType(64), ir.IntType(32)
             if hidden:
-                room = cgutils.alloca_once(builder, word, 2)
-                shape = ir.FunctionType(ir.VoidType(), [room.type])
-                builder.call(builder.inttoptr(given[0], shape.as_pointer()), [room])
-                return builder.load(builder.bitcast(room, number.as_pointer()))
-            shape = ir.FunctionType(ir.LiteralStructType([word, word]), [])
-            called = builder.call(builder.inttoptr(given[0], shape.as_pointer()), [])
-            return builder.trunc(builder.extract_value(called, 0), number)
+                buffer = cgutils.alloca_once(builder, word, 2)
+                function_type = ir.FunctionType(ir.VoidType(), [buffer.type])
+                builder.call(builder.inttoptr(given[0], function_type.as_pointer()), [buffer])
+                return builder.load(builder.bitcast(buffer, number.as_pointer()))
+            function_type = ir.FunctionType(ir.LiteralStructType([word, word]), [])
+            call = builder.call(builder.inttoptr(given[0], function_type.as_pointer()), [])
+            return builder.trunc(builder.extract_value(call, 0), number)
 
         return types.int32(types.intp), generate
 
-    return intrinsic(calling)
+    return intrinsic(typing)
 
 
-call_struct_head: Any = struct_heads(_HIDDEN)
+call_struct_head: Any = struct_heads(_STRUCT_BY_POINTER)
 """`struct_heads` for this platform: ``call_struct_head(address)``."""
 
 
@@ -87,5 +87,5 @@ def address_for_c(function: Callable[..., object], signature: Any) -> int:
         Types of result and arguments.
     """
     compiled: Any = function
-    found = compiled.get_compile_result(signature)
-    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+    compiled_result = compiled.get_compile_result(signature)
+    return int(compiled_result.library.get_pointer_to_function(compiled_result.fndesc.llvm_cfunc_wrapper_name))

@@ -27,6 +27,6 @@ def entry_point(function: _Function) -> _Function:
 
 
 def keep_on_disk(compiled: Any) -> None:
-    """Cache a numba function on disk: called by Python or by address, it is compiled once."""
+    """Cache a numba function on disk, so that it is compiled once, whether called by Python or by address."""
     if not isinstance(compiled._cache, unit_cache.UnitCache):
         compiled._cache = unit_cache.UnitCache(compiled.py_func, compiled.targetoptions)

@@ -36,9 +36,9 @@ class KeptCall:
         self, function: Callable[..., None], before: tuple[Any, ...], number: Array | None = None,
         after: tuple[Any, ...] = (),
     ):  # fmt: skip
-        kept = before, () if number is None else (number,), after
-        self._call, self._release = _compiled(function, *(numba.typeof(part) for part in kept))
-        self._address = keep_arguments(kept)
+        stored = before, () if number is None else (number,), after
+        self._call, self._release = _compile_call(function, *(numba.typeof(part) for part in stored))
+        self._address = keep_arguments(stored)
 
     def __call__(self) -> None:
         """Call the function."""
@@ -49,70 +49,70 @@ class KeptCall:
             self._release(self._address)
 
 
-def _place(context: Any, builder: Any, kind: Any, address: Any) -> Any:
+def _typed_pointer(context: Any, builder: Any, kind: Any, address: Any) -> Any:
     return builder.inttoptr(address, context.get_value_type(kind).as_pointer())
 
 
-def _keeping(_: Any, kind: Any) -> Any:
+def _store_typing(_: Any, kind: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         size = context.get_abi_sizeof(context.get_value_type(kind))
         memory = context.nrt.allocate(builder, context.get_constant(types.uintp, size))
         context.nrt.incref(builder, kind, given[0])
         address = builder.ptrtoint(memory, context.get_value_type(_ADDRESS))
-        builder.store(given[0], _place(context, builder, kind, address))
+        builder.store(given[0], _typed_pointer(context, builder, kind, address))
         return address
 
     return _ADDRESS(kind), generate
 
 
-_keep: Any = intrinsic(_keeping)
+_store: Any = intrinsic(_store_typing)
 
 
 @entry_point
 def keep_arguments(arguments: Any) -> int:
     """Store arguments in their compiled representation; returns the address. The copy keeps their arrays alive."""
-    return _keep(arguments)
+    return _store(arguments)
 
 
 @cache
-def _compiled(function: Any, before: Any, number: Any, after: Any) -> tuple[Any, Any]:
+def _compile_call(function: Any, before: Any, number: Any, after: Any) -> tuple[Any, Any]:
     """Functions of the address of stored arguments: one that calls `function` with them, and one that frees them."""
-    kinds = (before, number, after)
-    together, parts = types.Tuple(kinds), (*before.types, *(_NUMBER for _ in number.types), *after.types)
-    function.compile(parts)
-    found = function.overloads[parts]
+    group_types = (before, number, after)
+    storage, argument_types = types.Tuple(group_types), (*before.types, *(_NUMBER for _ in number.types), *after.types)
+    function.compile(argument_types)
+    found = function.overloads[argument_types]
     code = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
 
-    def calling(_: Any, address: Any) -> Any:
+    def call_typing(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            kept = builder.load(_place(context, builder, together, given[0]))
-            first, between, last = (
-                cgutils.unpack_tuple(builder, builder.extract_value(kept, i), len(kind.types))
-                for i, kind in enumerate(kinds)
+            stored = builder.load(_typed_pointer(context, builder, storage, given[0]))
+            leading, numbers, trailing = (
+                cgutils.unpack_tuple(builder, builder.extract_value(stored, i), len(kind.types))
+                for i, kind in enumerate(group_types)
             )
-            places = (context.make_array(number[0])(context, builder, value) for value in between)
-            whole = [builder.fptosi(builder.load(place.data), context.get_value_type(_NUMBER)) for place in places]
-            shape = context.call_conv.get_function_type(types.none, parts)
-            where = builder.inttoptr(context.get_constant(types.uintp, code), shape.as_pointer())
-            arguments = [*first, *whole, *last]
-            status, _ = context.call_conv.call_function(builder, where, types.none, parts, arguments)
+            arrays = (context.make_array(number[0])(context, builder, value) for value in numbers)
+            integers = [builder.fptosi(builder.load(array.data), context.get_value_type(_NUMBER)) for array in arrays]
+            shape = context.call_conv.get_function_type(types.none, argument_types)
+            pointer = builder.inttoptr(context.get_constant(types.uintp, code), shape.as_pointer())
+            arguments = [*leading, *integers, *trailing]
+            status, _ = context.call_conv.call_function(builder, pointer, types.none, argument_types, arguments)
             with cgutils.if_unlikely(builder, status.is_error):
                 context.call_conv.return_status_propagate(builder, status)
             return context.get_dummy_value()
 
         return types.none(_ADDRESS), generate
 
-    def releasing(_: Any, address: Any) -> Any:
+    def release_typing(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            where = _place(context, builder, together, given[0])
-            context.nrt.decref(builder, together, builder.load(where))
-            context.nrt.free(builder, builder.bitcast(where, cgutils.voidptr_t))
+            pointer = _typed_pointer(context, builder, storage, given[0])
+            context.nrt.decref(builder, storage, builder.load(pointer))
+            context.nrt.free(builder, builder.bitcast(pointer, cgutils.voidptr_t))
             return context.get_dummy_value()
 
         return types.none(_ADDRESS), generate
 
-    call: Any = intrinsic(calling)
-    release: Any = intrinsic(releasing)
+    call: Any = intrinsic(call_typing)
+    release: Any = intrinsic(release_typing)
 
     def call_at(address: int) -> None:
         call(address)

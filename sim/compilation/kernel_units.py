@@ -21,22 +21,22 @@ from controllers.walking.walking import follow_hand
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
 
-keep_on_disk(evaluate)  # what Python asks of a field is answered by its unit
+keep_on_disk(evaluate)  # calls of `evaluate` from Python use its cached unit
 
 
 def linked_stages(stages: IntArray) -> IntArray:
     """Stages of a map with the addresses of their kernels. Compiles those that are not in the cache."""
-    return linked(stages, lambda kernel: _address(kernel, MAP_ARGUMENTS))
+    return linked(stages, lambda kernel: _kernel_address(kernel, MAP_ARGUMENTS))
 
 
 def law_units(program: Program) -> IntArray:
     """Addresses of the kernels of a field's laws, in order. Compiles those that are not in the cache."""
-    return np.array([_address(kernel, LAW_ARGUMENTS) for kernel in program.kernels], dtype=np.int64)
+    return np.array([_kernel_address(kernel, LAW_ARGUMENTS) for kernel in program.kernels], dtype=np.int64)
 
 
 def linked_walkers(walkers: Walkers) -> Walkers:
     """The walkers of a field with the address of their kernel; compiles it if it is not in the cache."""
-    return walkers.linked(_address(follow_hand, LAW_ARGUMENTS)) if len(walkers.feeds) else walkers
+    return walkers.linked(_kernel_address(follow_hand, LAW_ARGUMENTS)) if len(walkers.feeds) else walkers
 
 
 def is_kept(kernel: Callable[..., None]) -> bool:
@@ -45,7 +45,7 @@ def is_kept(kernel: Callable[..., None]) -> bool:
 
 
 @add_keeper
-def _keep(kernel: Any, arguments: tuple[Any, ...]) -> None:
+def _cache_kernel(kernel: Any, arguments: tuple[Any, ...]) -> None:
     if arguments in (LAW_ARGUMENTS, MAP_ARGUMENTS) and is_kept(kernel):
         keep_on_disk(kernel)
 
@@ -62,5 +62,5 @@ def units_of_laws(program: Program) -> tuple[Unit, ...]:
     return tuple(Unit.of(kernel, *LAW_ARGUMENTS) for kernel in (*program.kernels, *walker) if is_kept(kernel))
 
 
-def _address(kernel: Callable[..., None], arguments: tuple[Any, ...]) -> int:
+def _kernel_address(kernel: Callable[..., None], arguments: tuple[Any, ...]) -> int:
     return Unit.of(kernel, *arguments).address() if is_kept(kernel) else address_of(kernel, arguments)

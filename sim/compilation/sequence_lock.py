@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 
-_TRIES = 20  # bounds the time that a reader loses to a writer that stopped in the middle of writing to microseconds
+_MAX_ATTEMPTS = 20  # limits to microseconds what a reader loses to a writer that stopped while writing
 
 
 def _fence(_: Any) -> Any:
@@ -49,7 +49,7 @@ def read_whole(count: IntArray, shared: Array, whole: Array, into: Array) -> boo
     whole, into : Array
         Scratch, which may be left inconsistent, and result, of the same length.
     """
-    for _ in range(_TRIES):
+    for _ in range(_MAX_ATTEMPTS):
         before = count[0]
         barrier()
         for i in range(len(whole)):

@@ -16,7 +16,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-_MOST_WORKERS = 4  # each needs 200 MB and more
+_MAX_WORKERS = 4  # each needs 200 MB and more
 _ROOT = Path(__file__).resolve().parents[2]
 
 Call = tuple[Callable[..., object], tuple[Any, ...]]
@@ -56,10 +56,10 @@ def side_by_side(
 def processors() -> int:
     """Largest number of calls that are made at a time."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
-    return min(_MOST_WORKERS, available)
+    return min(_MAX_WORKERS, available)
 
 
-def _made(numbered: tuple[int, Call]) -> tuple[int, bool]:
+def _make_call(numbered: tuple[int, Call]) -> tuple[int, bool]:
     number, (function, arguments) = numbered
     try:
         with redirect_stdout(sys.stderr):  # standard output is reserved for the numbers of finished calls
@@ -69,17 +69,17 @@ def _made(numbered: tuple[int, Call]) -> tuple[int, bool]:
     return number, True
 
 
-def _work(calls: Sequence[Call], first: Callable[[], None] | None) -> None:
-    ways = multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
+def _run_calls(calls: Sequence[Call], first: Callable[[], None] | None) -> None:
+    start_methods = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("fork" if "fork" in start_methods else "spawn")
     if first is not None:
         first()
     gc.freeze()  # keeps the pages of imported modules shared between the workers
     with context.Pool(min(len(calls), processors()), maxtasksperchild=1) as pool:
-        for number, well in pool.imap_unordered(_made, enumerate(calls)):
-            if well:
+        for number, succeeded in pool.imap_unordered(_make_call, enumerate(calls)):
+            if succeeded:
                 print(number, flush=True)
 
 
 if __name__ == "__main__":
-    _work(*pickle.load(sys.stdin.buffer))
+    _run_calls(*pickle.load(sys.stdin.buffer))

@@ -1,6 +1,6 @@
 """The code that a module reaches by imports, within this project, and hashes of it.
 
-Comments and docstrings do not count, so a change of wording invalidates no cached result.
+Comments and docstrings do not count, so a change of wording does not invalidate a cached result.
 """
 
 import ast
@@ -42,30 +42,30 @@ def sources_hash(module: str) -> str:
     str
         Hexadecimal digits.
     """
-    found = reached_code(module)
+    code_hashes = reached_code(module)
     libraries = [f"{library} {version(library)}" for library in _LIBRARIES]
     # Rounding in libraries depends on the processor's instructions.
     processor = [llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()]
-    text = "\n".join([*(f"{name} {found[name]}" for name in sorted(found)), *libraries, *processor])
+    text = "\n".join([*(f"{name} {code_hashes[name]}" for name in sorted(code_hashes)), *libraries, *processor])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def reached_code(module: str) -> dict[str, str]:
     """Hash of the code of a module, and of each that it reaches by imports within the project, by name."""
-    known = _Known(cache_folder() / "code.json")
-    found: dict[str, str] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        if name in found or (path := _file(name)) is None:
+    hashes = _CodeHashes(cache_folder() / "code.json")
+    code_hashes: dict[str, str] = {}
+    pending = [module]
+    while pending:
+        name = pending.pop()
+        if name in code_hashes or (path := _module_file(name)) is None:
             continue
-        found[name], imported = known.read(path)
-        waiting += imported
-    known.keep()
-    return found
+        code_hashes[name], imported = hashes.read(path)
+        pending += imported
+    hashes.save()
+    return code_hashes
 
 
-class _Known:
+class _CodeHashes:
     """A cache of hashes and imports of files, by modification time and size, since parsing all of them is slow.
 
     Parameters
@@ -75,7 +75,7 @@ class _Known:
     """
 
     def __init__(self, file: Path):
-        self._file, self._new = file, False
+        self._file, self._changed = file, False
         self._entries: dict[str, tuple[list[int], str, list[str]]] = {}
         with suppress(OSError, ValueError, TypeError):
             self._entries = dict(json.loads(file.read_text(encoding="utf-8")))
@@ -83,16 +83,16 @@ class _Known:
     def read(self, path: Path) -> tuple[str, list[str]]:
         """Hash of a file's code, and the names that it imports."""
         stamp = [path.stat().st_mtime_ns, path.stat().st_size]
-        kept = self._entries.get(str(path))
-        if kept is None or kept[0] != stamp:
+        entry = self._entries.get(str(path))
+        if entry is None or entry[0] != stamp:
             tree = ast.parse(path.read_bytes())
-            kept = stamp, _hash(tree), list(_imported(tree))
-            self._entries[str(path)], self._new = kept, True
-        return kept[1], kept[2]
+            entry = stamp, _code_hash(tree), list(_imported_names(tree))
+            self._entries[str(path)], self._changed = entry, True
+        return entry[1], entry[2]
 
-    def keep(self) -> None:
+    def save(self) -> None:
         """Write new entries to the file; a folder that cannot be written to is ignored."""
-        if not self._new:
+        if not self._changed:
             return
         with suppress(OSError):
             self._file.parent.mkdir(parents=True, exist_ok=True)
@@ -102,25 +102,25 @@ class _Known:
             os.replace(name, self._file)
 
 
-def _file(name: str) -> Path | None:
+def _module_file(name: str) -> Path | None:
     if name.partition(".")[0] not in _PACKAGES:
         return None
     path = _ROOT.joinpath(*name.split("."))
     return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
 
 
-def _hash(tree: ast.Module) -> str:
-    return hashlib.sha256(ast.dump(_WithoutWords().visit(tree)).encode()).hexdigest()
+def _code_hash(tree: ast.Module) -> str:
+    return hashlib.sha256(ast.dump(_DocstringRemover().visit(tree)).encode()).hexdigest()
 
 
-class _WithoutWords(ast.NodeTransformer):
+class _DocstringRemover(ast.NodeTransformer):
     """Removes docstrings, and other strings that stand alone as statements."""
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
         return None if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) else node
 
 
-def _imported(tree: ast.Module) -> Iterator[str]:
+def _imported_names(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

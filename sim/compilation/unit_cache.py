@@ -6,7 +6,7 @@ is ignored. Units that were not used for a long time are removed.
 """
 
 # pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
-# The cache of a dispatcher is not public in numba; `deferred_codegen` says of which versions this is true.
+# The cache of a dispatcher is not public in numba; `deferred_codegen` lists the versions that were tested.
 
 import hashlib
 import os
@@ -28,9 +28,9 @@ from sim.compilation.deferred_codegen import is_nested, referred_by_name
 from sim.compilation.unit_key import unit_key
 
 _SUFFIX = ".unit"
-_HASH = hashlib.sha256().digest_size
-_FORGOTTEN = 60 * 86400.0  # [s] after which an unused unit is removed
-_LOOKED_AT = 86400.0  # [s] resolution of the stored time of last use
+_HASH_SIZE = hashlib.sha256().digest_size
+_MAX_UNUSED_TIME = 60 * 86400.0  # [s] after which an unused unit is removed
+_USE_TIME_RESOLUTION = 86400.0  # [s] resolution of the stored time of last use
 
 
 def cache_folder() -> Path:
@@ -79,11 +79,11 @@ class UnitCache(_Cache):
         if content is None:
             return None
         try:
-            found = CompileResult._rebuild(target_context, *pickle.loads(content))
+            compiled = CompileResult._rebuild(target_context, *pickle.loads(content))
         except Exception:  # unpickling an unusable file may raise anything
             return None
         _mark_used(path)
-        return found
+        return compiled
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a compiled unit; a folder that cannot be written to is ignored."""
@@ -125,7 +125,7 @@ def remove_forgotten(folder: Path) -> None:
     now = time.time()
     for path in folder.glob(f"*{_SUFFIX}*"):
         with suppress(OSError):
-            if now - path.stat().st_mtime > _FORGOTTEN:
+            if now - path.stat().st_mtime > _MAX_UNUSED_TIME:
                 path.unlink()
 
 
@@ -134,7 +134,7 @@ def _read(path: Path) -> bytes | None:
         content = path.read_bytes()
     except OSError:
         return None
-    return content[_HASH:] if hashlib.sha256(content[_HASH:]).digest() == content[:_HASH] else None
+    return content[_HASH_SIZE:] if hashlib.sha256(content[_HASH_SIZE:]).digest() == content[:_HASH_SIZE] else None
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -151,5 +151,5 @@ def _write(path: Path, content: bytes) -> None:
 
 def _mark_used(path: Path) -> None:
     with suppress(OSError):
-        if time.time() - path.stat().st_mtime > _LOOKED_AT:
+        if time.time() - path.stat().st_mtime > _USE_TIME_RESOLUTION:
             os.utime(path)

@@ -2,7 +2,7 @@
 
 The key is computed by a walk from the unit's function over the globals and closure variables that it names: functions
 count by their bytecode, constants by their value, types by their fields. Comments, docstrings, line numbers and folders
-do not count, so a unit is found again after a change that it does not depend on, and from another copy of the sources.
+do not count, so a unit is still found after a change that it does not depend on, and from another copy of the sources.
 A value of unknown kind is an error, since the code might depend on it.
 """
 
@@ -74,29 +74,29 @@ def unit_key(function: Function, arguments: Iterable[Any], options: dict[str, An
     """
     digest = hashlib.sha256(repr((_platform(), [describe_type(argument) for argument in arguments])).encode())
     seen: dict[int, int] = {}
-    waiting: list[tuple[Function, dict[str, Any]]] = [(function, options)]
+    pending: list[tuple[Function, dict[str, Any]]] = [(function, options)]
     # A function reached again is denoted by its place in the walk, which distinguishes functions of the same name.
-    while waiting:
-        reached, its_options = waiting.pop()
+    while pending:
+        reached, its_options = pending.pop()
         if id(reached) in seen:
             digest.update(f"again {seen[id(reached)]};".encode())
             continue
         seen[id(reached)] = len(seen)
-        digest.update(repr(_items(its_options)).encode())
-        described, others = _described(reached)
+        digest.update(repr(_describe_options(its_options)).encode())
+        described, callees = _describe_function(reached)
         digest.update(described)
-        waiting.extend(reversed(others))
+        pending.extend(reversed(callees))
     return digest.hexdigest()[:24]
 
 
 def reached_functions(function: Function) -> list[Function]:
     """All functions that are compiled into a unit of a given function, which comes first."""
-    found, waiting = {id(function): function}, [function]
-    while waiting:
-        for other, _ in _described(waiting.pop())[1]:
+    found, pending = {id(function): function}, [function]
+    while pending:
+        for other, _ in _describe_function(pending.pop())[1]:
             if id(other) not in found:
                 found[id(other)] = other
-                waiting.append(other)
+                pending.append(other)
     return list(found.values())
 
 
@@ -105,52 +105,52 @@ def _platform() -> tuple[object, ...]:
     """Versions, processor and settings that compiled code depends on."""
     settings = tuple((name, repr(getattr(config, name, None))) for name in _SETTINGS)
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__, mujoco.__version__)
-    return versions, cpu_target.target_context.codegen().magic_tuple(), settings, _generation()
+    return versions, cpu_target.target_context.codegen().magic_tuple(), settings, _code_generator()
 
 
-def _generation() -> str:
+def _code_generator() -> str:
     """The code generator: numba's own, or `deferred_codegen`, by the hash of its source file."""
     return hashlib.sha256(Path(deferred_codegen.__file__).read_bytes()).hexdigest() if install() else "numba"
 
 
-_Others = list[tuple[Function, dict[str, Any]]]
+_Callees = list[tuple[Function, dict[str, Any]]]
 
 
 @cache
-def _described(function: Function) -> tuple[bytes, _Others]:
+def _describe_function(function: Function) -> tuple[bytes, _Callees]:
     """Description of a function without its callees, and the functions it refers to with their options, in order."""
-    others: _Others = []
+    callees: _Callees = []
     name = f"{function.__module__}.{function.__qualname__}"
-    items: list[object] = [name, _code(function.__code__, name)]
-    items.append(_value(function.__defaults__, name, others))
-    items.append(_value(function.__kwdefaults__, name, others))
+    items: list[object] = [name, _describe_code(function.__code__, name)]
+    items.append(_describe_value(function.__defaults__, name, callees))
+    items.append(_describe_value(function.__kwdefaults__, name, callees))
     for free, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        items.append((free, _value(cell.cell_contents, f"{name}: {free}", others)))
+        items.append((free, _describe_value(cell.cell_contents, f"{name}: {free}", callees)))
     for chain in sorted(_global_names(function.__code__)):
-        items.append((chain, _global(function, chain, others)))
-    return repr(items).encode(), others
+        items.append((chain, _describe_global(function, chain, callees)))
+    return repr(items).encode(), callees
 
 
 def _instructions(code: python_types.CodeType) -> Iterator[tuple[int, int]]:
     """Opcodes with their arguments, as by `dis` but in a sixth of its time, which matters at the start of a run."""
-    raw, above = code.co_code, 0
-    for opcode, low in zip(raw[::2], raw[1::2], strict=True):
-        argument = above | low
+    bytecode, high = code.co_code, 0
+    for opcode, low in zip(bytecode[::2], bytecode[1::2], strict=True):
+        argument = high | low
         if opcode == dis.EXTENDED_ARG:
-            above = argument << 8
+            high = argument << 8
         else:
-            above = 0
+            high = 0
             yield opcode, argument
 
 
-def _code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
+def _describe_code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
     """Description of bytecode with its constants and names; without line numbers and docstring."""
     instructions: list[tuple[int, object]] = []
     for opcode, argument in _instructions(code):
-        if opcode in _CONSTANTS:
+        if opcode in _CONSTANT_LOADS:
             value = code.co_consts[argument]
             is_code = isinstance(value, python_types.CodeType)
-            instructions.append((opcode, _code(value, name) if is_code else _constant(value, name)))
+            instructions.append((opcode, _describe_code(value, name) if is_code else _describe_constant(value, name)))
         else:
             instructions.append((opcode, argument))
     names = code.co_names, code.co_varnames, code.co_cellvars, code.co_freevars
@@ -159,25 +159,25 @@ def _code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
 
 
 _HAS_DOCSTRING = 0x4000000  # a flag of code from Python 3.13 on
-_CONSTANTS = frozenset(dis.hasconst)
-_GLOBALS = {dis.opmap["LOAD_GLOBAL"]: 1, dis.opmap["LOAD_NAME"]: 0}
-_ATTRIBUTES = {dis.opmap["LOAD_ATTR"]: 1} if sys.version_info >= (3, 12) else {
+_CONSTANT_LOADS = frozenset(dis.hasconst)
+_GLOBAL_LOADS = {dis.opmap["LOAD_GLOBAL"]: 1, dis.opmap["LOAD_NAME"]: 0}
+_ATTRIBUTE_LOADS = {dis.opmap["LOAD_ATTR"]: 1} if sys.version_info >= (3, 12) else {
     dis.opmap["LOAD_ATTR"]: 0, dis.opmap["LOAD_METHOD"]: 0,
 }  # fmt: skip
 """Opcodes that load a global, and an attribute of the last loaded value; the values are the number of low bits of the
 argument that are not part of the name's index."""
-_NOTHING = frozenset(dis.opmap[opcode] for opcode in ("CACHE", "PUSH_NULL") if opcode in dis.opmap)
+_IGNORED_OPCODES = frozenset(dis.opmap[opcode] for opcode in ("CACHE", "PUSH_NULL") if opcode in dis.opmap)
 
 
-def _constant(value: object, name: str) -> object:
+def _describe_constant(value: object, name: str) -> object:
     if isinstance(value, tuple):
-        return tuple(_constant(item, name) for item in value)
+        return tuple(_describe_constant(item, name) for item in value)
     if isinstance(value, frozenset):
-        return ("frozenset", sorted(repr(_constant(item, name)) for item in value))
-    return _literal(value, name)
+        return ("frozenset", sorted(repr(_describe_constant(item, name)) for item in value))
+    return _describe_literal(value, name)
 
 
-def _literal(value: object, name: str) -> object:
+def _describe_literal(value: object, name: str) -> object:
     if isinstance(value, _LITERALS):
         return type(value).__name__, repr(value)
     raise UnknownIngredient(f"{name} is a {type(value).__qualname__}; expected a number, an array, a function, a type")
@@ -188,12 +188,12 @@ def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
     found: set[tuple[str, ...]] = set()
     chain: tuple[str, ...] = ()
     for opcode, argument in _instructions(code):
-        if opcode in _GLOBALS:
+        if opcode in _GLOBAL_LOADS:
             found |= {chain} if chain else set()
-            chain = (code.co_names[argument >> _GLOBALS[opcode]],)
-        elif opcode in _ATTRIBUTES and chain:
-            chain = (*chain, code.co_names[argument >> _ATTRIBUTES[opcode]])
-        elif opcode not in _NOTHING:
+            chain = (code.co_names[argument >> _GLOBAL_LOADS[opcode]],)
+        elif opcode in _ATTRIBUTE_LOADS and chain:
+            chain = (*chain, code.co_names[argument >> _ATTRIBUTE_LOADS[opcode]])
+        elif opcode not in _IGNORED_OPCODES:
             found |= {chain} if chain else set()
             chain = ()
     for constant in code.co_consts:
@@ -202,7 +202,7 @@ def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
     return found
 
 
-def _global(function: Function, chain: tuple[str, ...], others: _Others) -> object:
+def _describe_global(function: Function, chain: tuple[str, ...], callees: _Callees) -> object:
     name = f"{function.__module__}.{function.__qualname__}: {'.'.join(chain)}"
     if chain[0] not in function.__globals__:
         builtins = function.__globals__["__builtins__"]
@@ -216,20 +216,20 @@ def _global(function: Function, chain: tuple[str, ...], others: _Others) -> obje
         if not isinstance(value, python_types.ModuleType) and not _is_enumeration(value):
             break
         value = getattr(value, attribute)
-    return _value(value, name, others)
+    return _describe_value(value, name, callees)
 
 
 def _is_enumeration(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, enum.Enum)
 
 
-def _value(value: Any, name: str, others: _Others) -> object:  # noqa: C901 - a kind of value a branch
+def _describe_value(value: Any, name: str, callees: _Callees) -> object:  # noqa: C901 - a kind of value a branch
     """Description of a global, closure variable, default or option that differs for different values."""
     if isinstance(value, Dispatcher):
-        others.append((value.py_func, value.targetoptions))
+        callees.append((value.py_func, value.targetoptions))
         return "compiled function"
     if isinstance(value, _Intrinsic):
-        others.append((value._defn, {}))
+        callees.append((value._defn, {}))
         return "intrinsic"
     if isinstance(value, types.ExternalFunction):
         return "external", value.symbol, str(value.sig)
@@ -245,28 +245,32 @@ def _value(value: Any, name: str, others: _Others) -> object:  # noqa: C901 - a 
     if isinstance(value, np.dtype):
         return "dtype", repr(value)
     if isinstance(value, dict):
-        return "dict", [(_value(key, name, others), _value(item, name, others)) for key, item in value.items()]
+        return "dict", [
+            (_describe_value(key, name, callees), _describe_value(item, name, callees)) for key, item in value.items()
+        ]
     if isinstance(value, tuple):
-        kind = _class(type(value), name) if type(value) is not tuple else "tuple"
-        return kind, [_value(item, name, others) for item in value]
+        kind = _describe_class(type(value), name) if type(value) is not tuple else "tuple"
+        return kind, [_describe_value(item, name, callees) for item in value]
     if isinstance(value, type):
-        return _class(value, name)
+        return _describe_class(value, name)
     if _is_library(value):
         return "library", type(value).__qualname__, str(getattr(value, "__module__", "")), _name_of(value)
     if isinstance(value, python_types.FunctionType):
-        others.append((value, {}))
-        others.extend((template._overload_func, template._jit_options) for template in _overloads(value))
+        callees.append((value, {}))
+        callees.extend((template._overload_func, template._jit_options) for template in _overloads(value))
         return "function"
-    return _literal(value, name)
+    return _describe_literal(value, name)
 
 
-def _items(options: dict[str, Any]) -> list[object]:
-    others: _Others = []
-    described: list[object] = [(key, _value(options[key], f"option {key}", others)) for key in sorted(options)]
-    return [*described, *(f"{other.__module__}.{other.__qualname__}" for other, _ in others)]
+def _describe_options(options: dict[str, Any]) -> list[object]:
+    callees: _Callees = []
+    described: list[object] = [
+        (key, _describe_value(options[key], f"option {key}", callees)) for key in sorted(options)
+    ]
+    return [*described, *(f"{other.__module__}.{other.__qualname__}" for other, _ in callees)]
 
 
-def _class(kind: type, name: str) -> tuple[object, ...]:
+def _describe_class(kind: type, name: str) -> tuple[object, ...]:
     """Description of a class: of a library by name; of this project NamedTuples, exceptions and numba types."""
     identity = (kind.__module__, kind.__qualname__)
     fields = getattr(kind, "_fields", None)
@@ -274,7 +278,7 @@ def _class(kind: type, name: str) -> tuple[object, ...]:
         return "named tuple", *identity, fields, repr(getattr(kind, "_field_defaults", {}))
     if _is_library(kind) or issubclass(kind, BaseException):
         return "class", *identity
-    if issubclass(kind, types.Type):  # its module registers how it is represented and lowered
+    if issubclass(kind, types.Type):  # its module defines its representation and lowering
         return "numba type", *identity, hashlib.sha256(Path(inspect.getfile(kind)).read_bytes()).hexdigest()
     raise UnknownIngredient(
         f"{name} is the class {kind.__qualname__}; expected a NamedTuple, an exception or a numba type"
@@ -288,15 +292,15 @@ def _is_library(value: object) -> bool:
     """
     if isinstance(value, python_types.ModuleType):
         name: object = value.__name__
-    elif callable(value) and _name_of(value) and isinstance(getattr(value, "__self__", None), _OF_MODULES):
+    elif callable(value) and _name_of(value) and isinstance(getattr(value, "__self__", None), _MODULE_OWNERS):
         name = getattr(value, "__module__", None) or type(value).__module__
     else:
         return False
-    top = str(name).split(".")[0]
-    return top in sys.stdlib_module_names - {"__main__"} or top in _LIBRARIES
+    package = str(name).split(".")[0]
+    return package in sys.stdlib_module_names - {"__main__"} or package in _LIBRARIES
 
 
-_OF_MODULES = (python_types.NoneType, python_types.ModuleType)
+_MODULE_OWNERS = (python_types.NoneType, python_types.ModuleType)
 _LIBRARIES = ("numpy", "numba", "llvmlite", "mujoco")
 
 

@@ -14,7 +14,7 @@ from sim.compilation.units import Unit, unit_function
 def missing_units(units: Sequence[Unit]) -> tuple[Unit, ...]:
     """The units that are not in the cache, the largest first."""
     missing = [unit for unit in dict.fromkeys(units) if not unit.is_kept()]
-    return tuple(sorted(missing, key=_size, reverse=True))
+    return tuple(sorted(missing, key=_function_count, reverse=True))
 
 
 def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda unit: None) -> None:
@@ -30,15 +30,15 @@ def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda u
     missing = missing_units(units)
     if not missing:
         return
-    calls = [(_compile, (unit,)) for unit in missing]
-    side_by_side(calls, lambda number: done(missing[number]), _type_common_parts if len(missing) > 1 else None)
+    calls = [(_load_unit, (unit,)) for unit in missing]
+    side_by_side(calls, lambda number: done(missing[number]), _compile_common_functions if len(missing) > 1 else None)
 
 
-def _size(unit: Unit) -> int:
+def _function_count(unit: Unit) -> int:
     return len(reached_functions(unit_function(unit.module, unit.name).py_func))
 
 
-def _type_common_parts() -> None:
+def _compile_common_functions() -> None:
     """Compile functions of numba that nearly all units use, before the workers are forked, so that they share them."""
 
     def assign(target: Any, source: Any) -> Any:
@@ -52,5 +52,5 @@ def _type_common_parts() -> None:
     njit(nogil=True)(assign).compile((vector, vector))
 
 
-def _compile(unit: Unit) -> None:
+def _load_unit(unit: Unit) -> None:
     unit.load()

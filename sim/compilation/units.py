@@ -34,8 +34,8 @@ class Unit(NamedTuple):
 
     def is_kept(self) -> bool:
         """Whether the cache holds it, compiled from the present code."""
-        kept: Any = unit_function(self.module, self.name)
-        return is_sound(kept._cache.path(self.arguments))
+        dispatcher: Any = unit_function(self.module, self.name)
+        return is_sound(dispatcher._cache.path(self.arguments))
 
     def load(self) -> Any:
         """Its compilation result, from the cache or compiled now."""
@@ -56,8 +56,8 @@ def unit_function(module: str, name: str) -> Any:
     SimError
         If it is not a compiled function of a module.
     """
-    found: Any = getattr(importlib.import_module(module), name, None)
-    if not hasattr(found, "py_func"):
+    dispatcher: Any = getattr(importlib.import_module(module), name, None)
+    if not hasattr(dispatcher, "py_func"):
         raise SimError(f"{module}.{name} is not a compiled function of a module; expected one that is")
-    keep_on_disk(found)
-    return found
+    keep_on_disk(dispatcher)
+    return dispatcher

@@ -67,13 +67,13 @@ def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
 
 @entry_point
 def read_device(device: DeviceState, t: float) -> None:
-    """`sense`, from Python, before the loop's tick of the same time t, which then does not sense again."""
+    """Call `sense` from Python before the loop's tick of the same time t; that tick then does not sense again."""
     sense(device, t)
 
 
 @entry_point
 def write_device(device: DeviceState, plant: Plant, t: float, force: Array, applied: Array) -> None:
-    """`actuate` and `advance`, from Python, where no servo runs; `applied` (substeps, columns) is written."""
+    """Call `actuate` and `advance` from Python, without a servo; `applied` (substeps, columns) is written."""
     actuate(device, force)
     advance(device, plant, t, False, applied)
 
@@ -95,11 +95,11 @@ def ticks_of(device: DeviceState) -> int | None:
 
 
 def known_start(device: DeviceState) -> HandState | None:
-    """Reading with which a device begins, where that is known before the run; otherwise None."""
+    """First reading of a device if it is known before the run; otherwise None."""
     return HandState.of(device.rows[0]) if isinstance(device, ReplayedHand) else None
 
 
 def measure_in_motion(device: DeviceState) -> None:
-    """Let a device whose joints move when the run begins measure their velocity from the first tick on."""
+    """Initialise the velocity filter of a device whose joints already move when the run begins."""
     if isinstance(device, SimulatedPhantom):
         sense_in_motion(device.port)

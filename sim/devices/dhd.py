@@ -27,23 +27,23 @@ from sim.devices.virtual_arm import place_stylus, pose_fault, tip_force
 from sim.errors import SimError
 
 LARGEST = 8.5
-"""Largest force that is sent [N]: the stall force of the Premium. Falcon, omega and delta give 8 to 20 N and more."""
+"""Largest force that is sent [N]: the stall force of the Premium. Falcon, omega and delta reach 8 to 20 N or more."""
 
 _SIGNS = np.array([-1.0, -1.0, 1.0])  # diagonal of the rotation from the library's axes D to H
-_TIME_GUARD = 1  # result of a call with nothing new since the last one
+_TIME_GUARD = 1  # result of a call if there is nothing new since the last one
 _WATCHDOG_UNIT = 125e-6  # [s]
 _ERROR_COM, _ERROR_TIMEOUT, _ERROR_NO_DEVICE = 2, 7, 5
-_UNKNOWN = -1.0  # state of the motors not known: the next command switches them again
+_MOTOR_STATE_UNKNOWN = -1.0  # state of the motors is unknown: the next command sends it again
 _FORCE_NOT_FINITE = int(Fault.FORCE_NOT_FINITE)
 
-_double_p = ctypes.POINTER(ctypes.c_double)
+_double_pointer = ctypes.POINTER(ctypes.c_double)
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "dhdOpen": (ctypes.c_int, []),
     "dhdClose": (ctypes.c_int, [ctypes.c_char]),
     "dhdGetSystemName": (ctypes.c_char_p, [ctypes.c_char]),
     "dhdGetSerialNumber": (ctypes.c_int, [ctypes.POINTER(ctypes.c_ushort), ctypes.c_char]),
     "dhdGetPositionAndOrientationFrame": (
-        ctypes.c_int, [_double_p, _double_p, _double_p, _double_p, ctypes.c_char],
+        ctypes.c_int, [_double_pointer, _double_pointer, _double_pointer, _double_pointer, ctypes.c_char],
     ),
     "dhdGetButton": (ctypes.c_int, [ctypes.c_int, ctypes.c_char]),
     "dhdSetForce": (ctypes.c_int, [ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.c_char]),
@@ -59,8 +59,8 @@ DHD = VendorLibrary(
     "install the Force Dimension SDK, so that libdhd.so (dhd64.dll) is found", _SIGNATURES,
 )  # fmt: skip
 
-_IN_LOOP = "dhdGetPositionAndOrientationFrame", "dhdGetButton", "dhdSetForce", "dhdEnableForce"
-_GET_POSE, _GET_BUTTON, _SET_FORCE, _ENABLE_FORCE = range(len(_IN_LOOP))
+_LOOP_FUNCTIONS = "dhdGetPositionAndOrientationFrame", "dhdGetButton", "dhdSetForce", "dhdEnableForce"
+_GET_POSE, _GET_BUTTON, _SET_FORCE, _ENABLE_FORCE = range(len(_LOOP_FUNCTIONS))
 IO_RESULT, IO_FAULT, IO_VALUE, IO_ENABLE, IO_ENABLED, IO_SIZE = range(6)
 """Places in `DhdMemory.io`: the library's result, negative for an error; the fault of a pose or a torque, with its
 value; 1 if the motors are to be on; 1 if they are on."""
@@ -72,7 +72,7 @@ class DhdMemory(NamedTuple):
     Attributes
     ----------
     functions : IntArray
-        Addresses of the library's functions, in the order of `_IN_LOOP`.
+        Addresses of the library's functions, in the order of `_LOOP_FUNCTIONS`.
     number : int
         The device's number in the library.
     pose : Array
@@ -98,11 +98,11 @@ class DhdMemory(NamedTuple):
 
 @entry_point
 def take_pose(dhd: DhdMemory) -> None:
-    """Ask the library for pose and button, and write them into the reading."""
+    """Get pose and button from the library, and write them into the reading."""
     io, pose, number = dhd.io, dhd.pose, np.int32(dhd.number)
     io[IO_FAULT] = 0.0
-    x = pose.ctypes.data
-    io[IO_RESULT] = call_int(dhd.functions[_GET_POSE], (x, x + 8, x + 16, x + 24, number))
+    address = pose.ctypes.data
+    io[IO_RESULT] = call_int(dhd.functions[_GET_POSE], (address, address + 8, address + 16, address + 24, number))
     if io[IO_RESULT] < 0.0 or io[IO_RESULT] == _TIME_GUARD:
         return
     for i in range(3):
@@ -153,7 +153,7 @@ class DhdDevice:
         self._dhd, self._clock = library, clock
         device = library.dhdOpen()
         if device < 0:
-            raise SimError(f"DHD opens no device: {self._words()}; expected one that is connected and switched on")
+            raise SimError(f"DHD opens no device: {self._error_text()}; expected one that is connected and switched on")
         self._id = bytes([device])
         serial = ctypes.c_ushort(0)
         library.dhdGetSerialNumber(ctypes.byref(serial), self._id)
@@ -161,21 +161,21 @@ class DhdDevice:
         name = (library.dhdGetSystemName(self._id) or b"").decode(errors="replace")
         self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True, own_weight=True)
         self.telemetry = fresh_telemetry()
-        functions = np.array([address_of(getattr(library, name)) for name in _IN_LOOP], np.int64)
+        functions = np.array([address_of(getattr(library, name)) for name in _LOOP_FUNCTIONS], np.int64)
         memory = DhdMemory(
             functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(IO_SIZE)
         )
-        self._memory, self._off, self._taken = memory, np.zeros(3), 0.0
-        self._io, self._numbers, self._telemetry = items(memory.io), items(memory.reading), items(self.telemetry)
-        self._take, self._send = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
+        self._memory, self._zero_torque, self._reading_count = memory, np.zeros(3), 0.0
+        self._io, self._reading_items, self._telemetry = items(memory.io), items(memory.reading), items(self.telemetry)
+        self._take_pose, self._send_force = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
 
-    def _words(self) -> str:
+    def _error_text(self) -> str:
         return (self._dhd.dhdErrorGetLastStr() or b"").decode(errors="replace")
 
-    def _fault(self) -> DriverFault:
+    def _library_fault(self) -> DriverFault:
         code = self._dhd.dhdErrorGetLast()
-        gone = code in (_ERROR_COM, _ERROR_TIMEOUT, _ERROR_NO_DEVICE)
-        return DriverFault(Fault.UNPLUGGED if gone else Fault.DEVICE_REPORTED, code, self._words())
+        is_unplugged = code in (_ERROR_COM, _ERROR_TIMEOUT, _ERROR_NO_DEVICE)
+        return DriverFault(Fault.UNPLUGGED if is_unplugged else Fault.DEVICE_REPORTED, code, self._error_text())
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; the library does not block, so `timeout` is unused.
@@ -185,17 +185,17 @@ class DhdDevice:
         DriverFault
             If the library reported an error, or the Phantom cannot reach the pose.
         """
-        io, numbers = self._io, self._numbers
-        self._take()
+        io, reading_items = self._io, self._reading_items
+        self._take_pose()
         if io[IO_RESULT] == _TIME_GUARD:
             return False
         if io[IO_RESULT] < 0.0:
-            raise self._fault()
+            raise self._library_fault()
         if io[IO_FAULT] != 0.0:
             raise pose_fault(io[IO_FAULT], io[IO_VALUE])
-        self._taken += 1.0
-        numbers[READING_CLOCK] = self._clock()
-        numbers[READING_SEQUENCE] = self._telemetry[READ] = self._taken
+        self._reading_count += 1.0
+        reading_items[READING_CLOCK] = self._clock()
+        reading_items[READING_SEQUENCE] = self._telemetry[READ] = self._reading_count
         np.copyto(reading, self._memory.reading)
         return True
 
@@ -210,17 +210,17 @@ class DhdDevice:
         io = self._io
         np.copyto(self._memory.torque, torque)
         io[IO_ENABLE] = enable
-        self._send()
+        self._send_force()
         if io[IO_FAULT] != 0.0:
             raise DriverFault(Fault.FORCE_NOT_FINITE, io[IO_VALUE])
         if io[IO_RESULT] < 0.0:
-            raise self._fault()
+            raise self._library_fault()
 
     def let_go(self) -> None:
         """Switch the motors off at once; never raises."""
-        np.copyto(self._memory.torque, self._off)
-        self._io[IO_ENABLE], self._io[IO_ENABLED] = 0.0, _UNKNOWN
-        self._send()
+        np.copyto(self._memory.torque, self._zero_torque)
+        self._io[IO_ENABLE], self._io[IO_ENABLED] = 0.0, _MOTOR_STATE_UNKNOWN
+        self._send_force()
 
     def close(self) -> None:
         """Switch the motors off and close the device."""

@@ -74,7 +74,7 @@ refused, jitter of the arrivals [s] (RFC 3550, section 6.4.1), and latency of th
 A value that a transport or a device cannot give is NaN."""
 
 DRIFT = 2e-4
-"""Largest relative drift of two clocks: 100 ppm each, which quartz keeps; in ten minutes that is 0.12 s."""
+"""Largest relative drift between two clocks: 100 ppm each, the accuracy of quartz; 0.12 s in ten minutes."""
 
 
 def fresh_telemetry() -> Array:

@@ -30,7 +30,7 @@ from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
 _TOUCH_IDS = (0x2988, 0x0304)  # USB vendor and product of the Touch
-_CONNEXION, _LOGITECH = 0x256F, 0x046D
+_CONNEXION_VENDOR, _LOGITECH_VENDOR = 0x256F, 0x046D
 _GENERIC_DESKTOP, _MULTI_AXIS = 0x01, 0x08
 _BUSES = {1: "usb", 2: "bluetooth", 3: "i2c", 4: "spi"}  # hidapi's hid_bus_type
 
@@ -127,7 +127,7 @@ def _hid_device(row: dict[str, Any]) -> FoundDevice:
         note = "its HID reports are not public, so nothing is sent to it; use hdapi, with OpenHaptics installed"
     elif usage == (protocol.USAGE_PAGE, protocol.USAGE):
         name, kind, note = f"hid:{serial}" if serial else f"hidraw:{path}", "phantom", "speaks the open HID protocol"
-    elif ids[0] in (_CONNEXION, _LOGITECH) and usage == (_GENERIC_DESKTOP, _MULTI_AXIS):
+    elif ids[0] in (_CONNEXION_VENDOR, _LOGITECH_VENDOR) and usage == (_GENERIC_DESKTOP, _MULTI_AXIS):
         name, kind, note = f"spacemouse:{path}", "spacemouse", "six axes in, no force out"
     usable = not path.startswith("/") or os.access(path, os.R_OK | os.W_OK)
     if kind in ("phantom", "spacemouse") and not usable:
@@ -147,7 +147,7 @@ def open_hid(path: str) -> HidHandle:
         If it cannot be opened; the message says what to do about it.
     """
     handle = hid_backend().device()
-    with _said_why(path):
+    with _explain_open_failure(path):
         handle.open_path(path.encode())
     return handle
 
@@ -163,13 +163,13 @@ def open_node(path: str) -> HidHandle | HidapiNode:
     library = ctypes.CDLL(hid_backend().__file__)
     if not hasattr(library, "hid_read_timeout"):
         return open_hid(path)
-    with _said_why(path):
+    with _explain_open_failure(path):
         return HidapiNode(library, path)
 
 
 @contextlib.contextmanager
-def _said_why(path: str) -> Generator[None, None, None]:
-    """Turn an OSError into a `SimError` that says why the node cannot be opened."""
+def _explain_open_failure(path: str) -> Generator[None, None, None]:
+    """Replace an OSError by a `SimError` that says why the node cannot be opened."""
     try:
         yield
     except OSError:
@@ -192,11 +192,11 @@ def open_device(name: str) -> Driver:
         return open_own_device(name)
     check_there(name)
     kind, _, rest = name.partition(":")
-    opens: dict[str, Callable[[str], Driver]] = {
+    openers: dict[str, Callable[[str], Driver]] = {
         "hid": _open_phantom, "hidraw": _open_phantom, "spacemouse": _open_spacemouse,
         "hdapi": lambda which: HdapiDevice(HDAPI.load(), which), "dhd": lambda _: DhdDevice(DHD.load()),
     }  # fmt: skip
-    return opens[kind](rest)
+    return openers[kind](rest)
 
 
 def check_there(name: str) -> None:
@@ -211,38 +211,38 @@ def check_there(name: str) -> None:
         own_device_class(name)
         return
     kind, _, rest = name.partition(":")
-    looks: dict[str, Callable[[], object]] = {
-        "hid": lambda: _the_one(rest, "phantom", name), "hidraw": lambda: _the_one(rest, "phantom", name),
-        "spacemouse": lambda: _the_one(rest, "spacemouse", name), "hdapi": HDAPI.path, "dhd": DHD.path,
+    checks: dict[str, Callable[[], object]] = {
+        "hid": lambda: _single_device(rest, "phantom", name), "hidraw": lambda: _single_device(rest, "phantom", name),
+        "spacemouse": lambda: _single_device(rest, "spacemouse", name), "hdapi": HDAPI.path, "dhd": DHD.path,
     }  # fmt: skip
-    if kind not in looks or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
-        raise SimError(f"no device is called {name!r}; {_what_there_is()}")
-    looks[kind]()
+    if kind not in checks or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
+        raise SimError(f"no device is called {name!r}; {_describe_devices()}")
+    checks[kind]()
 
 
-def _what_there_is() -> str:
+def _describe_devices() -> str:
     names = [device.name for device in found_devices() if device.name]
     kinds = "expected hid[:SERIAL], hidraw:PATH, spacemouse[:PATH], hdapi[:NAME], dhd or FILE.py:CLASS"
     return f"{kinds}; found here: {', '.join(names) if names else 'none'}"
 
 
-def _the_one(which: str, kind: str, name: str) -> FoundDevice:
-    """The device of a kind with a given serial number or path; if `which` is empty, the only one; `name`: as asked."""
-    there = found_devices()
-    for device in there:
+def _single_device(which: str, kind: str, name: str) -> FoundDevice:
+    """The device of a kind by serial number or path, or the only one if `which` is empty; `name` is for messages."""
+    connected = found_devices()
+    for device in connected:
         if which and which in (device.serial, device.path) and device.kind != kind:
             raise SimError(f"{which} is {device.product or 'a device'}, no {kind}: {device.note}")
-    fitting = [device for device in there if device.kind == kind and which in ("", device.serial, device.path)]
-    if len(fitting) != 1:
-        raise SimError(f"{len(fitting) or 'no'} devices are connected for {name!r}; {_what_there_is()}")
-    return fitting[0]
+    matches = [device for device in connected if device.kind == kind and which in ("", device.serial, device.path)]
+    if len(matches) != 1:
+        raise SimError(f"{len(matches) or 'no'} devices are connected for {name!r}; {_describe_devices()}")
+    return matches[0]
 
 
 def _open_phantom(which: str) -> Driver:
-    device = _the_one(which, "phantom", f"hid:{which}")
+    device = _single_device(which, "phantom", f"hid:{which}")
     return HidPhantom(open_node(device.path), device.path)
 
 
 def _open_spacemouse(which: str) -> Driver:
-    device = _the_one(which, "spacemouse", f"spacemouse:{which}")
+    device = _single_device(which, "spacemouse", f"spacemouse:{which}")
     return SpaceMouse(open_hid(device.path), device.product, device.path)

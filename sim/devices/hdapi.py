@@ -41,7 +41,7 @@ from sim.devices.virtual_arm import pose_fault
 from sim.errors import SimError
 
 RATE = 1000  # [Hz] of the vendor's scheduler
-_LOOK = 5e-5  # [s] polling interval for a new sample
+_POLL_INTERVAL = 5e-5  # [s] polling interval for a new sample
 
 _INVALID_HANDLE = 0xFFFFFFFF
 _MAX_PRIORITY = 0xFFFF
@@ -123,33 +123,33 @@ class HdapiDevice:
     def __init__(self, library: ctypes.CDLL, name: str = "", clock: Callable[[], float] = time.perf_counter):
         self._hd, self._clock = library, clock_for_c(clock)
         self._device: int = library.hdInitDevice(name.encode() or None)
-        code = self._error()
+        code = self._take_error()
         if code or self._device == _INVALID_HANDLE:
             raise SimError(
-                f"HDAPI does not open {name or 'the default device'}: {_words(code)}; expected a name of the vendor's "
+                f"HDAPI does not open {name or 'the default device'}: {_symbol(code)}; expected a name of the vendor's "
                 "set-up, and the device switched on"
             )
         self.telemetry = fresh_telemetry()
-        self.identity = self._identity(self._calibrated())
+        self.identity = self._read_identity(self._ensure_calibrated())
         functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
         addresses = [address_of(function) for function in functions]
-        memory = HdMemory.fresh(addresses, self._device, self._nominal_force(), self.telemetry)
-        self._memory, self._io, self._off = memory, items(memory.io), np.zeros(3)
-        self._take, self._send = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
-        for ability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
-            library.hdEnable(ability)
-        # The arguments are kept for ever: the vendor's thread may use them after this driver is gone.
+        memory = HdMemory.fresh(addresses, self._device, self._read_nominal_force(), self.telemetry)
+        self._memory, self._io, self._zero_torque = memory, items(memory.io), np.zeros(3)
+        self._take_sample, self._send_force = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
+        for capability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
+            library.hdEnable(capability)
+        # The arguments are never freed: the vendor's thread may use them after this driver is gone.
         self._task = library.hdScheduleAsynchronous(frame_for_c(), keep_arguments(memory), _MAX_PRIORITY)
         library.hdSetSchedulerRate(RATE)
         library.hdStartScheduler()
-        code = self._error()
+        code = self._take_error()
         if code:
             library.hdUnschedule(self._task)
             library.hdDisableDevice(self._device)
-            raise SimError(f"HDAPI does not start its scheduler at {RATE} Hz: {_words(code)}")
-        _asked[addresses[-1]] = self._clock
+            raise SimError(f"HDAPI does not start its scheduler at {RATE} Hz: {_symbol(code)}")
+        _clocks_in_use[addresses[-1]] = self._clock
 
-    def _error(self) -> int:
+    def _take_error(self) -> int:
         """Empty the library's error stack and return its first error, 0 if there was none."""
         first = 0
         for _ in range(len(ERRORS)):
@@ -159,23 +159,23 @@ class HdapiDevice:
             first = first or code
         return first
 
-    def _nominal_force(self) -> float:
-        room = ctypes.c_double(0.0)
-        self._hd.hdGetDoublev(_MAX_FORCE, ctypes.byref(room))
-        return room.value
+    def _read_nominal_force(self) -> float:
+        buffer = ctypes.c_double(0.0)
+        self._hd.hdGetDoublev(_MAX_FORCE, ctypes.byref(buffer))
+        return buffer.value
 
-    def _integer(self, parameter: int) -> int:
-        room = ctypes.c_int(0)
-        self._hd.hdGetIntegerv(parameter, ctypes.byref(room))
-        return room.value
+    def _read_integer(self, parameter: int) -> int:
+        buffer = ctypes.c_int(0)
+        self._hd.hdGetIntegerv(parameter, ctypes.byref(buffer))
+        return buffer.value
 
-    def _calibrated(self) -> bool:
-        """Whether the encoders' zero is known; a device that can calibrate itself is told to do so first."""
+    def _ensure_calibrated(self) -> bool:
+        """Let a device that can calibrate itself do so; returns whether the zero of the encoders is known."""
         if self._hd.hdCheckCalibration() == _CALIBRATION_NEEDS_UPDATE:
-            self._hd.hdUpdateCalibration(self._integer(_CALIBRATION_STYLE))
+            self._hd.hdUpdateCalibration(self._read_integer(_CALIBRATION_STYLE))
         return self._hd.hdCheckCalibration() == _CALIBRATION_OK
 
-    def _identity(self, calibrated: bool) -> DeviceIdentity:
+    def _read_identity(self, calibrated: bool) -> DeviceIdentity:
         name, serial = (self._hd.hdGetString(which) or b"" for which in (_MODEL, _SERIAL))
         # The library documents no watchdog of the device, so none is assumed.
         return DeviceIdentity(
@@ -191,15 +191,15 @@ class HdapiDevice:
         DriverFault
             If the library reported an error, or the Phantom cannot reach the pose.
         """
-        io, take = self._io, self._take
+        io, take = self._io, self._take_sample
         take()
         deadline = time.monotonic() + timeout
         while io[IO_NEW] == 0.0 and io[IO_CODE] == 0.0 and time.monotonic() < deadline:
-            time.sleep(_LOOK)
+            time.sleep(_POLL_INTERVAL)
             take()
         if io[IO_CODE] != 0.0:
             code = int(io[IO_CODE])
-            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), io[IO_VALUE], _words(code))
+            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), io[IO_VALUE], _symbol(code))
         if io[IO_FAULT] != 0.0:
             raise pose_fault(io[IO_FAULT], io[IO_VALUE])
         if io[IO_NEW] == 0.0:
@@ -218,15 +218,15 @@ class HdapiDevice:
         io = self._io
         np.copyto(self._memory.torque, torque)
         io[IO_ENABLE] = enable
-        self._send()
+        self._send_force()
         if io[IO_FAULT] != 0.0:
             raise DriverFault(Fault.FORCE_NOT_FINITE, io[IO_VALUE])
 
     def let_go(self) -> None:
         """Switch the motors off with the next callback; never raises."""
-        np.copyto(self._memory.torque, self._off)
+        np.copyto(self._memory.torque, self._zero_torque)
         self._io[IO_ENABLE] = 0.0
-        self._send()
+        self._send_force()
 
     def close(self) -> None:
         """Switch the motors off, stop the scheduler and close the device."""
@@ -236,12 +236,12 @@ class HdapiDevice:
         self._hd.hdStopScheduler()
         self._hd.hdUnschedule(self._task)
         self._hd.hdDisableDevice(self._device)
-        _asked.pop(address_of(self._clock), None)
+        _clocks_in_use.pop(address_of(self._clock), None)
 
 
-_asked: dict[int, Any] = {}
+_clocks_in_use: dict[int, Any] = {}
 """Clocks by address, kept alive here because a vendor's thread may call them after their driver is gone."""
 
 
-def _words(code: int) -> str:
+def _symbol(code: int) -> str:
     return ERRORS.get(code, f"error {code:#06x}")

@@ -25,7 +25,7 @@ from sim.devices.virtual_arm import place_stylus, tip_force
 SILENCE = 5e-3
 """Watchdog: age of the last command beyond which the callback commands zero force [s]; five of its periods."""
 MOST_ERRORS = 32
-"""Most errors that are fetched from the library per frame; the rest is fetched after the next frame."""
+"""Largest number of errors fetched from the library per frame; the rest is fetched after the next frame."""
 
 _DONE, _CONTINUE = np.uint32(0), np.uint32(1)
 _BUTTONS, _POSITION, _VELOCITY, _TRANSFORM = np.uint32(0x2000), np.uint32(0x2050), np.uint32(0x2051), np.uint32(0x2052)
@@ -41,8 +41,8 @@ FUNCTIONS = (
 _BEGIN, _END, _GET_DOUBLES, _GET_INTEGERS, _SET_DOUBLES, _ENABLE, _DISABLE, _GET_ERROR, _CLOCK = range(9)
 
 N_CLOSING, N_PRESSED, N_ENABLED, N_RAISED, N_HEARD, N_SIZE = range(6)
-"""Places in `HdMemory.numbers`: 1 once the callback is to end; the buttons, as an int; 1 while the motors are on; count
-of errors that the callback has raised, and count of those that the servo has taken."""
+"""Places in `HdMemory.numbers`: 1 to end the callback; the buttons, as an int; 1 while the motors are on; number of
+errors that the callback has raised, and number of those that the servo has taken."""
 ERROR_CODE, ERROR_VALUE, ERROR_SIZE = range(3)
 """Places in `HdMemory.error`: its number, and its value: a temperature [share of the highest], a speed [m/s], or the
 number again."""
@@ -133,7 +133,7 @@ _memory_at: Any = loader(numba.typeof(HdMemory.fresh([], 0, 0.0, np.zeros(1))))
 
 
 @njit
-def _first_error(get_error: int) -> int:
+def _take_errors(get_error: int) -> int:
     """Take up to `MOST_ERRORS` errors off the library's error stack; returns the first, 0 if there is none."""
     first = 0
     for _ in range(MOST_ERRORS):
@@ -146,7 +146,7 @@ def _first_error(get_error: int) -> int:
 
 
 @njit
-def _raise_error(hd: HdMemory, code: int) -> None:
+def _report_error(hd: HdMemory, code: int) -> None:
     """Store an error for the servo, unless the servo has not taken the previous one yet."""
     numbers, error, sample = hd.numbers, hd.error, hd.sample.written
     if numbers[N_RAISED] != numbers[N_HEARD]:
@@ -166,17 +166,17 @@ def _raise_error(hd: HdMemory, code: int) -> None:
 def serve_frame(memory: int) -> np.uint32:
     """The scheduler's callback, with the address of an `HdMemory`: read the state, command the force."""
     hd = _memory_at(memory)
-    call, numbers, sample, command = hd.functions, hd.numbers, hd.sample.written, hd.command.read
+    functions, numbers, sample, command = hd.functions, hd.numbers, hd.sample.written, hd.command.read
     if numbers[N_CLOSING] != 0:
         return _DONE
-    device, place = np.uint32(hd.device), sample.ctypes.data
-    call_void(call[_BEGIN], (device,))
-    call_void(call[_GET_DOUBLES], (_POSITION, place))
-    call_void(call[_GET_DOUBLES], (_TRANSFORM, place + 8 * SAMPLE_TRANSFORM))
-    call_void(call[_GET_DOUBLES], (_VELOCITY, place + 8 * SAMPLE_VELOCITY))
-    call_void(call[_GET_INTEGERS], (_BUTTONS, numbers.ctypes.data + 8 * N_PRESSED))
+    device, sample_address = np.uint32(hd.device), sample.ctypes.data
+    call_void(functions[_BEGIN], (device,))
+    call_void(functions[_GET_DOUBLES], (_POSITION, sample_address))
+    call_void(functions[_GET_DOUBLES], (_TRANSFORM, sample_address + 8 * SAMPLE_TRANSFORM))
+    call_void(functions[_GET_DOUBLES], (_VELOCITY, sample_address + 8 * SAMPLE_VELOCITY))
+    call_void(functions[_GET_INTEGERS], (_BUTTONS, numbers.ctypes.data + 8 * N_PRESSED))
     sample[SAMPLE_BUTTONS] = int32_at(numbers.ctypes.data + 8 * N_PRESSED)
-    sample[SAMPLE_CLOCK] = seconds(call[_CLOCK])
+    sample[SAMPLE_CLOCK] = seconds(functions[_CLOCK])
     # While a command is being written, the previous one stays in use, until it is older than SILENCE.
     read_whole(hd.command.changes, hd.command.shared, hd.command.whole, command)
     enable = command[COMMAND_ENABLE] > 0.0
@@ -184,13 +184,13 @@ def serve_frame(memory: int) -> np.uint32:
     for i in range(3):
         hd.force[i] = command[i] if alive else 0.0
     if enable != (numbers[N_ENABLED] != 0):
-        call_void(call[_ENABLE] if enable else call[_DISABLE], (_FORCE_OUTPUT,))
+        call_void(functions[_ENABLE] if enable else functions[_DISABLE], (_FORCE_OUTPUT,))
         numbers[N_ENABLED] = 1 if enable else 0
-    call_void(call[_SET_DOUBLES], (_CURRENT_FORCE, hd.force.ctypes.data))
-    call_void(call[_END], (device,))
-    code = _first_error(call[_GET_ERROR])
+    call_void(functions[_SET_DOUBLES], (_CURRENT_FORCE, hd.force.ctypes.data))
+    call_void(functions[_END], (device,))
+    code = _take_errors(functions[_GET_ERROR])
     if code != 0:
-        _raise_error(hd, code)
+        _report_error(hd, code)
     sample[SAMPLE_NUMBER] += 1.0
     write_whole(hd.sample.changes, hd.sample.shared, sample)
     return _CONTINUE
@@ -221,9 +221,9 @@ def take_sample(hd: HdMemory) -> None:
     # x_P → −y_H, y_P → z_H, z_P → −x_H, of rows and of columns.
     for i in range(3):
         for j in range(3):
-            same = (i == 2) == (j == 2)
+            same_sign = (i == 2) == (j == 2)
             entry = sample[SAMPLE_TRANSFORM + 4 * ((j + 2) % 3) + (i + 2) % 3]
-            hd.frame[i, j] = entry if same else -entry
+            hd.frame[i, j] = entry if same_sign else -entry
     p_P = 1e-3 * sample[SAMPLE_POSITION], 1e-3 * sample[SAMPLE_POSITION + 1], 1e-3 * sample[SAMPLE_POSITION + 2]
     io[IO_FAULT], io[IO_VALUE] = place_stylus(reading, p_P, hd.frame)
     reading[READING_SWITCH] = float(int(sample[SAMPLE_BUTTONS]) & 1)

@@ -42,8 +42,8 @@ from sim.devices.hid_reports import (
 from sim.devices.hidapi_node import Bytes, HidapiNode
 from sim.errors import SimError
 
-_DRAIN = 64  # length of Linux's report queue of a hidraw node
-_RESET = float(Fault.DEVICE_RESET)
+_MAX_REPORTS_PER_READ = 64  # length of Linux's report queue of a hidraw node
+_DEVICE_RESET = float(Fault.DEVICE_RESET)
 
 
 class HidHandle(Protocol):
@@ -83,22 +83,22 @@ class HidPhantom:
         handle.set_nonblocking(True)
         self.telemetry = fresh_telemetry()
         self._hid = HidMemory.fresh(self.telemetry)
-        self._take_identity()
-        self._take_calibration()
-        self._io, self._reading, self._off = items(self._hid.io), items(self._hid.reading), np.zeros(3)
-        self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
+        self._read_identity()
+        self._read_calibration()
+        self._io, self._reading, self._zero_torque = items(self._hid.io), items(self._hid.reading), np.zeros(3)
+        self._judge, self._make_command = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
         incoming = incoming[: protocol.REPORT_SIZE + 1]  # one byte more, so that a report that is too long shows
-        self._receive, self._send = _transfers(handle, incoming, outgoing)
+        self._receive, self._send = _make_transfers(handle, incoming, outgoing)
 
-    def _feature(self, number: int) -> Any:
+    def _read_feature(self, number: int) -> Any:
         try:
             return protocol.unsealed(bytes(self._handle.get_feature_report(number, protocol.REPORT_SIZE)), number)
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
 
-    def _take_identity(self) -> None:
-        identity = self._feature(protocol.IDENTITY)
+    def _read_identity(self) -> None:
+        identity = self._read_feature(protocol.IDENTITY)
         if int(identity["magic"]) != protocol.MAGIC:
             raise SimError(
                 f"{self._transport} answers with the mark {int(identity['magic']):#x}; expected {protocol.MAGIC:#x}"
@@ -111,8 +111,8 @@ class HidPhantom:
         self._hid.peak[:] = identity["peak_torque"] * protocol.PEAK_UNIT
         self._capabilities = int(identity["capabilities"])
 
-    def _take_calibration(self) -> None:
-        found = self._feature(protocol.CALIBRATION)
+    def _read_calibration(self) -> None:
+        found = self._read_feature(protocol.CALIBRATION)
         counts, turns = found["counts_per_turn"] * protocol.COUNT_UNIT, found["motor_turns"] * protocol.TURN_UNIT
         if not (np.all(counts) and np.all(turns > 0.0)):
             raise SimError(
@@ -120,11 +120,11 @@ class HidPhantom:
                 f"{turns.tolist()}; expected none to be 0"
             )
         self._hid.zero[:], self._hid.angle[:], self._hid.turns[:] = found["zero"], 2.0 * np.pi / counts, turns
-        given = self._identity_report
-        motors, watchdog = (bool(self._capabilities & able) for able in (protocol.HAS_MOTORS, protocol.HAS_WATCHDOG))
+        identity = self._identity_report
+        motors, watchdog = (bool(self._capabilities & flag) for flag in (protocol.HAS_MOTORS, protocol.HAS_WATCHDOG))
         self.identity = DeviceIdentity(
-            given["name"].decode(errors="replace"), self._transport, given["serial"].decode(errors="replace"),
-            given["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
+            identity["name"].decode(errors="replace"), self._transport, identity["serial"].decode(errors="replace"),
+            identity["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
             watchdog and int(self._hid.numbers[N_WATCHDOG]) > 0, bool(found["flags"] & protocol.CALIBRATED),
             int(self._hid.numbers[N_BOOT]),
         )  # fmt: skip
@@ -145,65 +145,65 @@ class HidPhantom:
         if not self.read(reading, 0.1):
             raise SimError(f"{self._transport}: no reading came within 0.1 s, so there is nothing to calibrate")
         counts = self._hid.zero + reading[READING_THETA:] / self._hid.angle
-        wanted = protocol.blank(protocol.CALIBRATION)
-        wanted["flags"] = protocol.CALIBRATED
+        calibration = protocol.blank(protocol.CALIBRATION)
+        calibration["flags"] = protocol.CALIBRATED
         zero = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
         if not np.all(np.abs(zero) < 2**31):  # false for NaN too
             raise SimError(
                 f"{self._transport}: a zero at {zero.tolist()} counts cannot be kept; expected numbers of 32 bits"
             )
-        wanted["zero"] = zero
-        wanted["counts_per_turn"] = np.rint(2.0 * np.pi / self._hid.angle / protocol.COUNT_UNIT)
-        wanted["motor_turns"] = np.rint(self._hid.turns / protocol.TURN_UNIT)
-        self._handle.send_feature_report(protocol.sealed(wanted))
-        self._take_calibration()
-        if not np.array_equal(self._hid.zero, wanted["zero"]):
+        calibration["zero"] = zero
+        calibration["counts_per_turn"] = np.rint(2.0 * np.pi / self._hid.angle / protocol.COUNT_UNIT)
+        calibration["motor_turns"] = np.rint(self._hid.turns / protocol.TURN_UNIT)
+        self._handle.send_feature_report(protocol.sealed(calibration))
+        self._read_calibration()
+        if not np.array_equal(self._hid.zero, calibration["zero"]):
             raise SimError(f"{self._transport} did not keep the calibration; expected its motors to be off")
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; readings are timestamped by the device's time since its power-up."""
-        io, taken, new = self._io, 0, False
+        io, report_count, has_new = self._io, 0, False
         try:
             size = self._receive(math.ceil(timeout * 1e3))
             while size > 0:
                 io[IO_SIZE], io[IO_NOW] = size, self._clock()
                 self._judge()
                 if io[IO_FAULT] != 0.0:
-                    self._refuse()
-                new, taken = io[IO_NEW] > 0.0 or new, taken + 1
-                size = self._receive(0) if taken < _DRAIN else 0
+                    self._raise_report_fault()
+                has_new, report_count = io[IO_NEW] > 0.0 or has_new, report_count + 1
+                size = self._receive(0) if report_count < _MAX_REPORTS_PER_READ else 0
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
-        if new:
+        if has_new:
             np.copyto(reading, self._hid.reading)
             io[IO_GIVEN] = self._reading[READING_CLOCK]
-        return new
+        return has_new
 
-    def _refuse(self) -> None:
+    def _raise_report_fault(self) -> None:
         """Raise the fault of a report; after a reset of the device, its identity is read again first."""
-        if self._io[IO_FAULT] == _RESET:
-            self._judge_boot()
+        if self._io[IO_FAULT] == _DEVICE_RESET:
+            self._reread_after_reset()
         raise DriverFault(Fault(int(self._io[IO_FAULT])), self._io[IO_VALUE])
 
-    def _judge_boot(self) -> None:
+    def _reread_after_reset(self) -> None:
         """Read identity and calibration again after a reset of the device, in which it may have lost its zero.
 
         A device that still has its zero may be cleared and armed again; for any other the old boot number is kept, so
-        that the fault recurs until it is closed.
+        that the fault recurs until the device is closed.
         """
         numbers = self._hid.numbers
-        before = int(numbers[N_BOOT])
+        old_boot = int(numbers[N_BOOT])
         numbers[[N_LAST, N_ENABLED]] = -1
-        self._hid.clocks[0] = math.nan  # the device's clock began anew
+        self._hid.clocks[0] = math.nan  # the device's clock has restarted
         try:
-            self._take_identity()
-            self._take_calibration()
+            self._read_identity()
+            self._read_calibration()
         except DriverFault:
             raise
         except SimError:  # no valid answer
-            numbers[N_BOOT] = before
+            numbers[N_BOOT] = old_boot
         if not self.identity.calibrated:
-            numbers[N_BOOT] = before
+            numbers[N_BOOT] = old_boot
 
     def write(self, torque: Array, enable: bool) -> None:
         """See `sim.devices.driver.Driver.write`; torques are limited to the peak torque that the device reports.
@@ -216,7 +216,7 @@ class HidPhantom:
         io = self._io
         np.copyto(self._hid.torque, torque)
         io[IO_ENABLE], io[IO_NOW] = enable, self._clock()
-        self._make()
+        self._make_command()
         if io[IO_FAULT] != 0.0:
             value = io[IO_VALUE]
             self.let_go()
@@ -231,7 +231,7 @@ class HidPhantom:
     def let_go(self) -> None:
         """Switch the motors off at once; never raises."""
         with contextlib.suppress(DriverFault):
-            self.write(self._off, False)
+            self.write(self._zero_torque, False)
 
     def close(self) -> None:
         """Switch the motors off and close the device."""
@@ -239,7 +239,7 @@ class HidPhantom:
         self._handle.close()
 
 
-def _transfers(
+def _make_transfers(
     handle: HidHandle | HidapiNode, incoming: Bytes, outgoing: Bytes
 ) -> tuple[Callable[[int], int], Callable[[], int]]:
     """Functions that receive a report into `incoming` within a timeout [ms], and that send `outgoing`."""

@@ -25,7 +25,7 @@ STATUS_AMPLIFIER, STATUS_ENCODER, STATUS_REFUSED = 16, 32, 64
 HAS_MOTORS, HAS_WATCHDOG, HAS_TEMPERATURE, HAS_GIMBAL = 1, 2, 4, 8
 NO_TEMPERATURE = -(2**15)
 
-_CRC_AT = REPORT_SIZE - 4
+_CRC_OFFSET = REPORT_SIZE - 4
 
 INPUT_REPORT = np.dtype([
     ("report", "u1"), ("flags", "u1"), ("status", "<u2"), ("sequence", "<u4"), ("time_us", "<u8"),
@@ -53,20 +53,20 @@ TORQUE_UNIT, PEAK_UNIT, TEMPERATURE_UNIT, COUNT_UNIT, TURN_UNIT = 1e-6, 1e-5, 0.
 
 def blank(report: int) -> npt.NDArray[Any]:
     """A report with the given number, all else zero: a record, shape ()."""
-    made = np.zeros((), LAYOUTS[report])
-    made["report"] = report
-    return made
+    record = np.zeros((), LAYOUTS[report])
+    record["report"] = report
+    return record
 
 
 def sealed(report: npt.NDArray[Any]) -> bytes:
     """A report's 64 bytes, including its checksum."""
-    head = report.tobytes()[:_CRC_AT]
-    return head + zlib.crc32(head).to_bytes(4, "little")
+    body = report.tobytes()[:_CRC_OFFSET]
+    return body + zlib.crc32(body).to_bytes(4, "little")
 
 
 def is_sound(report: bytes) -> bool:
     """Whether the checksum of a report's 64 bytes is right."""
-    return zlib.crc32(report[:_CRC_AT]) == int.from_bytes(report[_CRC_AT:], "little")
+    return zlib.crc32(report[:_CRC_OFFSET]) == int.from_bytes(report[_CRC_OFFSET:], "little")
 
 
 def unsealed(report: bytes, number: int) -> npt.NDArray[Any]:

@@ -23,9 +23,9 @@ WATCHDOG = 0.01
 a command becomes invalid on the host, so that the firmware acts only where the host failed to."""
 HOTTEST = 100.0
 """Motor temperature that is a fault [°C]: 25 below what Maxon allows an RE 25's winding."""
-_BAD_IN_ROW = 3  # wrong checksums in a row that are a fault: a disturbance spoils one or two, a broken cable goes on
-_SENT = 256  # commands for which the time of sending is kept, to measure the round trip
-_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
+_BAD_CHECKSUM_LIMIT = 3  # consecutive wrong checksums that are a fault; a disturbance spoils one or two
+_SEND_TIME_COUNT = 256  # commands whose time of sending is stored, to measure the round trip
+_STATUS_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
 
 N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_AGAIN, N_BOOT, N_WATCHDOG, N_SIZE = range(9)
 """Places in `HidMemory.numbers`: number of the last input report (−1: none); readings handed out; reports in a row with
@@ -38,47 +38,47 @@ IO_ASKED, IO_ASKED_MADE, IO_LENGTH = 7, 8, 9
 the report [bytes]; time by the host's clock; time of the last reading handed out by the device's clock [s]; 1 if the
 motors are to be on; both times when the motors were last commanded on."""
 
-_PLACES = {
+_OFFSETS = {
     record: {name: field[1] for name, field in (layout.fields or {}).items()}
     for record, layout in ((protocol.INPUT, protocol.INPUT_REPORT), (protocol.OUTPUT, protocol.OUTPUT_REPORT))
 }
-_STATUS, _BOOT = _PLACES[protocol.INPUT]["status"] // 2, _PLACES[protocol.INPUT]["boot"] // 2
-_SEQUENCE, _TIME = _PLACES[protocol.INPUT]["sequence"] // 4, _PLACES[protocol.INPUT]["time_us"] // 8
-_ENCODER, _CELSIUS = _PLACES[protocol.INPUT]["encoder"] // 4, _PLACES[protocol.INPUT]["temperature"] // 2
-_ANSWERED, _HELD = _PLACES[protocol.INPUT]["answered"] // 4, _PLACES[protocol.INPUT]["held_us"] // 4
-_CRC, _CRC_BYTES = _PLACES[protocol.INPUT]["crc"] // 4, _PLACES[protocol.INPUT]["crc"]
-_OUT_BOOT, _OUT_SEQUENCE = _PLACES[protocol.OUTPUT]["boot"] // 2, _PLACES[protocol.OUTPUT]["sequence"] // 4
-_OUT_WATCHDOG, _OUT_TORQUE = _PLACES[protocol.OUTPUT]["watchdog_us"] // 4, _PLACES[protocol.OUTPUT]["torque"] // 4
-_OUT_ANSWERS = _PLACES[protocol.OUTPUT]["answers"] // 4
+_STATUS, _BOOT = _OFFSETS[protocol.INPUT]["status"] // 2, _OFFSETS[protocol.INPUT]["boot"] // 2
+_SEQUENCE, _TIME = _OFFSETS[protocol.INPUT]["sequence"] // 4, _OFFSETS[protocol.INPUT]["time_us"] // 8
+_ENCODER, _CELSIUS = _OFFSETS[protocol.INPUT]["encoder"] // 4, _OFFSETS[protocol.INPUT]["temperature"] // 2
+_ANSWERED, _HELD_TIME = _OFFSETS[protocol.INPUT]["answered"] // 4, _OFFSETS[protocol.INPUT]["held_us"] // 4
+_CRC_WORD, _CRC_OFFSET = _OFFSETS[protocol.INPUT]["crc"] // 4, _OFFSETS[protocol.INPUT]["crc"]
+_OUT_BOOT, _OUT_SEQUENCE = _OFFSETS[protocol.OUTPUT]["boot"] // 2, _OFFSETS[protocol.OUTPUT]["sequence"] // 4
+_OUT_WATCHDOG, _OUT_TORQUE = _OFFSETS[protocol.OUTPUT]["watchdog_us"] // 4, _OFFSETS[protocol.OUTPUT]["torque"] // 4
+_OUT_ANSWERS = _OFFSETS[protocol.OUTPUT]["answers"] // 4
 _SIZE, _INPUT, _OUTPUT, _ENABLE, _SWITCH = protocol.REPORT_SIZE, protocol.INPUT, protocol.OUTPUT, 1, protocol.SWITCH
 _STATUS_WATCHDOG, _STATUS_HOT, _STATUS_ENABLED = protocol.STATUS_WATCHDOG, protocol.STATUS_HOT, protocol.STATUS_ENABLED
 _NO_CELSIUS = protocol.NO_TEMPERATURE
 _CELSIUS_UNIT, _TORQUE_UNIT = protocol.TEMPERATURE_UNIT, protocol.TORQUE_UNIT
 
-_MALFORMED, _CHECKSUM = int(Fault.REPORT_MALFORMED), int(Fault.CHECKSUM_WRONG)
-_RESET, _BACK, _HOT = int(Fault.DEVICE_RESET), int(Fault.SEQUENCE_BACK), int(Fault.OVER_TEMPERATURE)
-_REPORTED, _NOT_FINITE = int(Fault.DEVICE_REPORTED), int(Fault.FORCE_NOT_FINITE)
+_REPORT_MALFORMED, _CHECKSUM_WRONG = int(Fault.REPORT_MALFORMED), int(Fault.CHECKSUM_WRONG)
+_DEVICE_RESET, _SEQUENCE_BACK, _TOO_HOT = int(Fault.DEVICE_RESET), int(Fault.SEQUENCE_BACK), int(Fault.OVER_TEMPERATURE)
+_DEVICE_REPORTED, _FORCE_NOT_FINITE = int(Fault.DEVICE_REPORTED), int(Fault.FORCE_NOT_FINITE)
 _MOTORS_OFF = int(Fault.MOTORS_OFF)
 
 
-def _remainders() -> IntArray:
+def _crc_table() -> IntArray:
     """Table of CRC-32/ISO-HDLC: remainder of each byte by the reflected polynomial 0xEDB88320."""
-    rest = np.arange(256, dtype=np.int64)
+    remainder = np.arange(256, dtype=np.int64)
     for _ in range(8):
-        rest = np.where(rest & 1, (rest >> 1) ^ 0xEDB88320, rest >> 1)
-    return rest
+        remainder = np.where(remainder & 1, (remainder >> 1) ^ 0xEDB88320, remainder >> 1)
+    return remainder
 
 
-_REMAINDERS = _remainders()
+_CRC_TABLE = _crc_table()
 
 
 @njit
 def checksum(report: npt.NDArray[np.uint8]) -> int:
     """CRC-32 of all bytes of a report before its checksum field."""
-    rest = 0xFFFFFFFF
-    for k in range(_CRC_BYTES):
-        rest = (rest >> 8) ^ _REMAINDERS[(rest ^ np.int64(report[k])) & 0xFF]
-    return rest ^ 0xFFFFFFFF
+    remainder = 0xFFFFFFFF
+    for k in range(_CRC_OFFSET):
+        remainder = (remainder >> 8) ^ _CRC_TABLE[(remainder ^ np.int64(report[k])) & 0xFF]
+    return remainder ^ 0xFFFFFFFF
 
 
 class Words(NamedTuple):
@@ -145,12 +145,12 @@ class HidMemory(NamedTuple):
         numbers[[N_LAST, N_ENABLED]], io[IO_GIVEN] = -1, math.nan
         return cls(
             Words.fresh(), Words.fresh(), numbers, io, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
-            np.zeros(3), np.full(_SENT, np.nan), np.zeros(READING_SIZE), telemetry, np.full(3, np.nan),
+            np.zeros(3), np.full(_SEND_TIME_COUNT, np.nan), np.zeros(READING_SIZE), telemetry, np.full(3, np.nan),
         )  # fmt: skip
 
 
 @njit
-def _fault(io: Array, code: int, value: float) -> None:
+def _set_fault(io: Array, code: int, value: float) -> None:
     if io[IO_FAULT] == 0.0:
         io[IO_FAULT], io[IO_VALUE] = code, value
 
@@ -162,21 +162,21 @@ def judge_report(hid: HidMemory) -> None:
     io[IO_FAULT] = io[IO_NEW] = 0.0
     if io[IO_SIZE] != _SIZE or words.u8[0] != _INPUT:
         telemetry[BAD] += 1.0
-        _fault(io, _MALFORMED, io[IO_SIZE])
+        _set_fault(io, _REPORT_MALFORMED, io[IO_SIZE])
         return
-    if checksum(words.u8) != np.int64(words.u32[_CRC]):
+    if checksum(words.u8) != np.int64(words.u32[_CRC_WORD]):
         telemetry[BAD] += 1.0
         numbers[N_BAD] += 1
-        if numbers[N_BAD] >= _BAD_IN_ROW:
-            _fault(io, _CHECKSUM, numbers[N_BAD])
+        if numbers[N_BAD] >= _BAD_CHECKSUM_LIMIT:
+            _set_fault(io, _CHECKSUM_WRONG, numbers[N_BAD])
         return
     numbers[N_BAD] = 0
     if np.int64(words.u16[_BOOT]) != numbers[N_BOOT]:
-        _fault(io, _RESET, 0.0)
+        _set_fault(io, _DEVICE_RESET, 0.0)
         return
     answered, status = np.int64(words.u32[_ANSWERED]), np.int64(words.u16[_STATUS])
     if numbers[N_LAST] < 0:
-        # A device that another program left goes on with that program's numbers; its watchdog may have acted since.
+        # A device last used by another program continues that program's numbers; its watchdog may have acted since.
         if answered > numbers[N_SENT]:
             numbers[N_SENT] = answered
         numbers[N_AGAIN] = 1 if status & _STATUS_WATCHDOG else 0
@@ -189,30 +189,30 @@ def judge_report(hid: HidMemory) -> None:
     hid.reading[READING_CLOCK] = made
     numbers[N_TAKEN] += 1
     hid.reading[READING_SEQUENCE] = numbers[N_TAKEN]
-    _measure(hid, made, answered)
+    _update_telemetry(hid, made, answered)
     _judge_temperature(hid, status)
-    if status & _ERRORS:
-        _fault(io, _REPORTED, float(status & _ERRORS))
+    if status & _STATUS_ERRORS:
+        _set_fault(io, _DEVICE_REPORTED, float(status & _STATUS_ERRORS))
     if io[IO_FAULT] == 0.0:
         _judge_motors(hid, made, answered, status)
     io[IO_NEW] = 1.0 if io[IO_FAULT] == 0.0 else 0.0
 
 
 @njit
-def _ahead(number: np.int64, of: np.int64) -> np.int64:
+def _sequence_difference(number: np.int64, reference: np.int64) -> np.int64:
     """Signed difference of two 32-bit sequence numbers, which wrap around."""
-    return (number - of + 2**31) % 2**32 - 2**31
+    return (number - reference + 2**31) % 2**32 - 2**31
 
 
 @njit
 def _is_next(hid: HidMemory, number: np.int64) -> bool:
-    """Whether a report's number is ahead of the last one's; the same number is refused, an older one is a fault."""
+    """Whether a report's number is ahead of the last one's; a repeated number is refused, an older one is a fault."""
     last, telemetry = hid.numbers[N_LAST], hid.telemetry
-    ahead = 1 if last < 0 else _ahead(number, last)
+    ahead = 1 if last < 0 else _sequence_difference(number, last)
     if ahead <= 0:
         telemetry[BAD] += 1.0
         if ahead < 0:
-            _fault(hid.io, _BACK, float(-ahead))
+            _set_fault(hid.io, _SEQUENCE_BACK, float(-ahead))
         return False
     telemetry[LOST] += ahead - 1.0
     telemetry[READ] += 1.0
@@ -221,15 +221,15 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
 
 
 @njit
-def _measure(hid: HidMemory, made: float, answered: np.int64) -> None:
+def _update_telemetry(hid: HidMemory, made: float, answered: np.int64) -> None:
     """Update the telemetry: temperatures, round trip, jitter and staleness."""
     telemetry, now = hid.telemetry, hid.io[IO_NOW]
     for i in range(3):
         celsius = np.int64(hid.incoming.i16[_CELSIUS + i])
         telemetry[TEMPERATURE + i] = np.nan if celsius == _NO_CELSIUS else celsius * _CELSIUS_UNIT
-    if 0 <= _ahead(hid.numbers[N_SENT], answered) < _SENT:
-        held = np.int64(hid.incoming.u32[_HELD])
-        telemetry[ROUND_TRIP] = now - hid.sent_at[answered % _SENT] - held * 1e-6
+    if 0 <= _sequence_difference(hid.numbers[N_SENT], answered) < _SEND_TIME_COUNT:
+        held = np.int64(hid.incoming.u32[_HELD_TIME])
+        telemetry[ROUND_TRIP] = now - hid.sent_at[answered % _SEND_TIME_COUNT] - held * 1e-6
     note_arrival(telemetry, hid.clocks, now, made)
 
 
@@ -241,30 +241,30 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
         if celsius > hottest:  # false for NaN, a motor without a sensor
             hottest = celsius
     if status & _STATUS_HOT or hottest >= HOTTEST:
-        _fault(hid.io, _HOT, hottest)
+        _set_fault(hid.io, _TOO_HOT, hottest)
 
 
 @njit
 def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
     """Check motors that are off although they were commanded on.
 
-    Either the firmware's watchdog switched them off: after a gap in the readings themselves they may be switched on
-    again, since the servo ramps the force in after a gap; without one, commands did not arrive, which is a fault. Or
-    they never came on: a fault once the waiting time has passed by both clocks, since either side may have been
+    Either the firmware's watchdog switched them off: after a gap in the readings they may be switched on again, since
+    the servo ramps the force in after a gap; without a gap, commands did not arrive, which is a fault. Or they were
+    never switched on: a fault once the waiting time has passed by both clocks, since either side may have been
     suspended between a reading and its command.
     """
-    io, since = hid.io, hid.numbers[N_ENABLED]
-    if since < 0 or status & _STATUS_ENABLED:
+    io, enable_command = hid.io, hid.numbers[N_ENABLED]
+    if enable_command < 0 or status & _STATUS_ENABLED:
         return
-    if status & _STATUS_WATCHDOG and _ahead(answered, since) >= 0:
+    if status & _STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
         if made - io[IO_GIVEN] > 0.5 * WATCHDOG:
             hid.numbers[N_AGAIN] = 1
         else:
-            _fault(io, _REPORTED, _STATUS_WATCHDOG)
+            _set_fault(io, _DEVICE_REPORTED, _STATUS_WATCHDOG)
         return
     waited = min(io[IO_NOW] - io[IO_ASKED], made - io[IO_ASKED_MADE])
     if waited > WATCHDOG:
-        _fault(io, _MOTORS_OFF, waited)
+        _set_fault(io, _MOTORS_OFF, waited)
 
 
 @entry_point
@@ -272,9 +272,9 @@ def make_command(hid: HidMemory) -> None:
     """Write the next output report, with torques limited to the motors' peak; none if a torque is not finite."""
     io, numbers, words = hid.io, hid.numbers, hid.outgoing
     io[IO_FAULT] = 0.0
-    wrong = first_not_finite(hid.torque)
-    if wrong != 0.0:
-        _fault(io, _NOT_FINITE, wrong)
+    bad_value = first_not_finite(hid.torque)
+    if bad_value != 0.0:
+        _set_fault(io, _FORCE_NOT_FINITE, bad_value)
         return
     numbers[N_SENT] += 1
     enable = io[IO_ENABLE] > 0.0 and numbers[N_AGAIN] == 0
@@ -288,7 +288,7 @@ def make_command(hid: HidMemory) -> None:
     words.u16[_OUT_BOOT], words.u32[_OUT_SEQUENCE] = numbers[N_BOOT], numbers[N_SENT] % 2**32
     words.u32[_OUT_WATCHDOG], words.u32[_OUT_ANSWERS] = numbers[N_WATCHDOG], max(0, numbers[N_LAST])
     for i in range(3):
-        shaft = min(max(hid.torque[i] / hid.turns[i], -hid.peak[i]), hid.peak[i]) if enable else 0.0
-        words.i32[_OUT_TORQUE + i] = int(np.rint(shaft / _TORQUE_UNIT))
-    words.u32[_CRC] = checksum(words.u8)
-    hid.sent_at[numbers[N_SENT] % _SENT] = io[IO_NOW]
+        motor_torque = min(max(hid.torque[i] / hid.turns[i], -hid.peak[i]), hid.peak[i]) if enable else 0.0
+        words.i32[_OUT_TORQUE + i] = int(np.rint(motor_torque / _TORQUE_UNIT))
+    words.u32[_CRC_WORD] = checksum(words.u8)
+    hid.sent_at[numbers[N_SENT] % _SEND_TIME_COUNT] = io[IO_NOW]

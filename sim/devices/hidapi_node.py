@@ -17,24 +17,24 @@ from sim.compilation.kept_call import KeptCall
 from sim.compilation.memory_access import items
 
 Bytes = npt.NDArray[np.uint8]
-_ADDRESS, _SIZE = ctypes.c_void_p, ctypes.c_size_t
+_POINTER, _SIZE_T = ctypes.c_void_p, ctypes.c_size_t
 _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "hid_init": (ctypes.c_int, []),
-    "hid_open_path": (_ADDRESS, [ctypes.c_char_p]),
-    "hid_set_nonblocking": (ctypes.c_int, [_ADDRESS, ctypes.c_int]),
-    "hid_get_feature_report": (ctypes.c_int, [_ADDRESS, ctypes.c_char_p, _SIZE]),
-    "hid_send_feature_report": (ctypes.c_int, [_ADDRESS, ctypes.c_char_p, _SIZE]),
-    "hid_read_timeout": (ctypes.c_int, [_ADDRESS, _ADDRESS, _SIZE, ctypes.c_int]),
-    "hid_write": (ctypes.c_int, [_ADDRESS, _ADDRESS, _SIZE]),
-    "hid_close": (None, [_ADDRESS]),
+    "hid_open_path": (_POINTER, [ctypes.c_char_p]),
+    "hid_set_nonblocking": (ctypes.c_int, [_POINTER, ctypes.c_int]),
+    "hid_get_feature_report": (ctypes.c_int, [_POINTER, ctypes.c_char_p, _SIZE_T]),
+    "hid_send_feature_report": (ctypes.c_int, [_POINTER, ctypes.c_char_p, _SIZE_T]),
+    "hid_read_timeout": (ctypes.c_int, [_POINTER, _POINTER, _SIZE_T, ctypes.c_int]),
+    "hid_write": (ctypes.c_int, [_POINTER, _POINTER, _SIZE_T]),
+    "hid_close": (None, [_POINTER]),
 }  # hidapi.h
 
 
 @entry_point
 def read_report(places: IntArray, incoming: Bytes, io: Array) -> None:
     """Call hid_read_timeout: `places` are its address and the device handle, `io` (2,) timeout [ms] and result."""
-    room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(io[0])
-    io[1] = call_int(places[0], (places[1], room, size, timeout))
+    address, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(io[0])
+    io[1] = call_int(places[0], (places[1], address, size, timeout))
 
 
 @entry_point
@@ -71,7 +71,7 @@ class HidapiNode:
         if not self._device:
             raise OSError(f"hidapi cannot open {path}")
 
-    def _places(self, name: str) -> IntArray:
+    def _call_target(self, name: str) -> IntArray:
         return np.array([address_of(getattr(self._library, name)), self._device], np.int64)
 
     def transfers(self, incoming: Bytes, outgoing: Bytes) -> tuple[Callable[[int], int], Callable[[], int]]:
@@ -79,34 +79,34 @@ class HidapiNode:
 
         Each returns the number of bytes; sending returns −1 on an error, receiving raises OSError.
         """
-        asked, answered = np.zeros(2), np.zeros(1)
-        reads = KeptCall(read_report, (self._places("hid_read_timeout"), incoming, asked))
-        writes = KeptCall(write_report, (self._places("hid_write"), outgoing, answered))
-        read, written = items(asked), items(answered)
+        read_io, write_io = np.zeros(2), np.zeros(1)
+        call_read = KeptCall(read_report, (self._call_target("hid_read_timeout"), incoming, read_io))
+        call_write = KeptCall(write_report, (self._call_target("hid_write"), outgoing, write_io))
+        read_items, write_items = items(read_io), items(write_io)
 
         def receive(timeout_ms: int) -> int:
-            read[0], read[1] = timeout_ms, -1.0
+            read_items[0], read_items[1] = timeout_ms, -1.0
             if self._device:
-                reads()
-            if read[1] < 0.0:
+                call_read()
+            if read_items[1] < 0.0:
                 raise OSError("read error")
-            return int(read[1])
+            return int(read_items[1])
 
         def send() -> int:
-            written[0] = -1.0
+            write_items[0] = -1.0
             if self._device:
-                writes()
-            return int(written[0])
+                call_write()
+            return int(write_items[0])
 
         return receive, send
 
     def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
         """As hidapi's binding."""
-        room = ctypes.create_string_buffer(bytes([report_num]), max_length)
-        size = self._library.hid_get_feature_report(self._device, room, max_length) if self._device else -1
+        buffer = ctypes.create_string_buffer(bytes([report_num]), max_length)
+        size = self._library.hid_get_feature_report(self._device, buffer, max_length) if self._device else -1
         if size < 0:
             raise OSError("read error")
-        return list(room.raw[:size])
+        return list(buffer.raw[:size])
 
     def send_feature_report(self, buff: bytes) -> int:
         """As hidapi's binding."""

@@ -75,20 +75,20 @@ def replayed_hand(rows: Array, world: World, period: float | None = None) -> Rep
     SimError
         If there are no rows, they are not hand vectors of finite numbers, or `period` is not the servo period.
     """
-    wanted = world.config.servo_period
+    servo_period = world.config.servo_period
     if rows.ndim != 2 or rows.shape[1] != HAND_SIZE or len(rows) == 0:
         raise SimError(f"a recorded hand has shape {rows.shape}; expected (n, {HAND_SIZE}) with n ≥ 1")
     if not np.all(np.isfinite(rows)):
         raise SimError(f"the recorded hand is not finite in row {int(np.argmin(np.isfinite(rows).all(axis=1)))}")
-    if period is not None and abs(period - wanted) > 1e-9:
+    if period is not None and abs(period - servo_period) > 1e-9:
         raise SimError(
-            f"the hand was recorded every {period:g} s, the servo runs every {wanted:g} s; expected the same"
+            f"the hand was recorded every {period:g} s, the servo runs every {servo_period:g} s; expected the same"
         )
     hand = np.zeros(HAND_SIZE)
     hand[HAND_QUATERNION] = 1.0
     return ReplayedHand(
-        np.ascontiguousarray(rows), wanted, shown_phantom(world.model, world.data), hand, np.zeros(3),
-        plausibility(wanted).fresh(), np.zeros(3),
+        np.ascontiguousarray(rows), servo_period, shown_phantom(world.model, world.data), hand, np.zeros(3),
+        plausibility(servo_period).fresh(), np.zeros(3),
     )  # fmt: skip
 
 

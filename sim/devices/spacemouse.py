@@ -28,8 +28,8 @@ TOP_SPEED, TOP_TURN = 0.15, 1.5
 FULL = 350.0
 """Axis value at full deflection."""
 DEAD_ZONE = 0.03
-"""Share of the full deflection below which it is taken as zero: a cap at rest may report so much."""
-_TRANSLATION, _TURN, _BUTTONS = 1, 2, 3
+"""Share of the full deflection below which it is taken as zero: a cap at rest may report this much."""
+_TRANSLATION, _ROTATION, _BUTTONS = 1, 2, 3
 # From the cap's axes to H: right is −y, towards the user −x, down −z.
 _R_HC = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
@@ -61,11 +61,11 @@ class SpaceMouse:
         handle.set_nonblocking(True)
         self.identity = DeviceIdentity(name, transport, "", "", False, False, True)
         self.telemetry = fresh_telemetry()
-        self._push, self._buttons = np.zeros(6), 0
+        self._deflection, self._buttons = np.zeros(6), 0
         self._p_H = np.zeros(3) if start is None else start.copy()
         self._r_HS = np.eye(3)
-        self._last: float | None = None
-        self._taken = 0
+        self._last_time: float | None = None
+        self._reading_count = 0
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; a cap at rest sends no reports, so every call gives a new reading.
@@ -80,26 +80,26 @@ class SpaceMouse:
             for _ in range(64):
                 if not raw:
                     break
-                self._take(bytes(raw))
+                self._decode_report(bytes(raw))
                 raw = self._handle.read(64)
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         now = self._clock()
-        self._move(0.0 if self._last is None else min(now - self._last, LONGEST_STEP))
-        self._last = now
-        fresh = np.zeros(READING_SIZE)
-        write_pose(fresh, np.array(R_HP).T @ self._p_H, self._r_HS)
-        reading[:] = fresh
-        self._taken += 1
+        self._move_tip(0.0 if self._last_time is None else min(now - self._last_time, LONGEST_STEP))
+        self._last_time = now
+        pose = np.zeros(READING_SIZE)
+        write_pose(pose, np.array(R_HP).T @ self._p_H, self._r_HS)
+        reading[:] = pose
+        self._reading_count += 1
         reading[READING_SWITCH] = float(self._buttons & 1)
         reading[READING_CLOCK] = now
-        reading[READING_SEQUENCE] = self._taken
+        reading[READING_SEQUENCE] = self._reading_count
         return True
 
     @property
     def pushed(self) -> bool:
         """Whether the cap is deflected beyond the dead zone, or its first button pressed."""
-        return bool(np.any(self._push != 0.0) or self._buttons & 1)
+        return bool(np.any(self._deflection != 0.0) or self._buttons & 1)
 
     @property
     def tip(self) -> Array:
@@ -110,38 +110,38 @@ class SpaceMouse:
         """Set the position of the tip in H [m], shape (3,)."""
         self._p_H = p_H.copy()
 
-    def _take(self, raw: bytes) -> None:
-        """Take one report; other kinds, such as the battery's, are ignored, and one that is too short is refused."""
+    def _decode_report(self, raw: bytes) -> None:
+        """Decode a report; other kinds, such as the battery's, are ignored, and one that is too short is refused."""
         number, axes = raw[0], np.frombuffer(raw[1 : 1 + 2 * ((len(raw) - 1) // 2)], "<i2")
         if number == _TRANSLATION and len(axes) >= 6:
-            self._push = _shares(axes[:6])
+            self._deflection = _scaled_deflections(axes[:6])
         elif number == _TRANSLATION and len(axes) >= 3:
-            self._push[:3] = _shares(axes[:3])
-        elif number == _TURN and len(axes) >= 3:
-            self._push[3:] = _shares(axes[:3])
+            self._deflection[:3] = _scaled_deflections(axes[:3])
+        elif number == _ROTATION and len(axes) >= 3:
+            self._deflection[3:] = _scaled_deflections(axes[:3])
         elif number == _BUTTONS and len(raw) >= 2:
             self._buttons = raw[1]
         else:
-            self.telemetry[BAD] += number in (_TRANSLATION, _TURN, _BUTTONS)
+            self.telemetry[BAD] += number in (_TRANSLATION, _ROTATION, _BUTTONS)
             return
         self.telemetry[READ] += 1.0
 
-    def _move(self, seconds: float) -> None:
-        step = TOP_SPEED * seconds * (_R_HC @ self._push[:3])
+    def _move_tip(self, seconds: float) -> None:
+        step = TOP_SPEED * seconds * (_R_HC @ self._deflection[:3])
         for i in range(3):
-            there = self._p_H.copy()
-            there[i] += step[i]
-            p_P = np.array(R_HP).T @ there
+            moved_tip = self._p_H.copy()
+            moved_tip[i] += step[i]
+            p_P = np.array(R_HP).T @ moved_tip
             if inside_workspace((p_P[0], p_P[1], p_P[2])):
-                self._p_H = there
-        turned = Rotation.from_rotvec(TOP_TURN * seconds * (_R_HC @ self._push[3:])).as_matrix() @ self._r_HS
-        if self._gimbal_can(turned):
+                self._p_H = moved_tip
+        turned = Rotation.from_rotvec(TOP_TURN * seconds * (_R_HC @ self._deflection[3:])).as_matrix() @ self._r_HS
+        if self._is_within_gimbal_limits(turned):
             self._r_HS = turned
 
-    def _gimbal_can(self, r_HS: Array) -> bool:
+    def _is_within_gimbal_limits(self, r_HS: Array) -> bool:
         reading = np.zeros(READING_SIZE)
         write_pose(reading, np.array(R_HP).T @ self._p_H, r_HS)
-        # Gimbal lock near a pitch of 90°: a small step there would make the gimbal's angles jump.
+        # Near the gimbal lock at a pitch of 90°, a small step would make the gimbal's angles jump.
         return abs(reading[READING_GIMBAL + 1]) < 1.4 and all(
             low <= angle <= high
             for angle, (low, high) in zip(reading[READING_GIMBAL:], PREMIUM_1_5.gimbal_limit, strict=True)
@@ -158,7 +158,7 @@ class SpaceMouse:
         self._handle.close()
 
 
-def _shares(axes: npt.NDArray[np.int16]) -> Array:
-    """Deflections as shares of the full one, −1 … 1, and 0 within the dead zone."""
-    share = np.clip(axes / FULL, -1.0, 1.0)
-    return np.where(np.abs(share) < DEAD_ZONE, 0.0, share)
+def _scaled_deflections(axes: npt.NDArray[np.int16]) -> Array:
+    """Deflections relative to the full one, −1 … 1, and 0 within the dead zone."""
+    deflection = np.clip(axes / FULL, -1.0, 1.0)
+    return np.where(np.abs(deflection) < DEAD_ZONE, 0.0, deflection)

@@ -33,8 +33,8 @@ class VendorLibrary:
 
     def find(self) -> str | None:
         """Path of the library; None if it is not installed."""
-        ours = [name for name in self.names if name.endswith(".dll") == (sys.platform == "win32")]
-        return next((found for name in ours if (found := ctypes.util.find_library(name))), None)
+        candidates = [name for name in self.names if name.endswith(".dll") == (sys.platform == "win32")]
+        return next((found for name in candidates if (found := ctypes.util.find_library(name))), None)
 
     def path(self) -> str:
         """Path of the library.

@@ -149,10 +149,10 @@ def pose_fault(fault: float, value: float) -> DriverFault:
 def least_gain(theta: Vec3) -> float:
     """Least singular value of J(θ) [m/rad]."""
     reach = L1 * np.cos(theta[1]) + L2 * np.sin(theta[2])
-    bend = theta[2] - theta[1]
-    mean, half, cross = 0.5 * (L1 * L1 + L2 * L2), 0.5 * (L1 * L1 - L2 * L2), L1 * L2 * np.sin(bend)
+    elbow_angle = theta[2] - theta[1]
+    mean, half, cross = 0.5 * (L1 * L1 + L2 * L2), 0.5 * (L1 * L1 - L2 * L2), L1 * L2 * np.sin(elbow_angle)
     largest = math.sqrt(mean + math.sqrt(half * half + cross * cross))
-    return min(abs(reach), abs(L1 * L2 * np.cos(bend)) / largest)
+    return min(abs(reach), abs(L1 * L2 * np.cos(elbow_angle)) / largest)
 
 
 @njit
@@ -166,17 +166,17 @@ def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
     s1, c1 = np.sin(theta[0]), np.cos(theta[0])
     s2, c2 = np.sin(theta[1]), np.cos(theta[1])
     s3, c3 = np.sin(theta[2]), np.cos(theta[2])
-    weight = gravity_torques(theta)
-    upper, fore = (torque[1] - weight[1]) / L1, (torque[2] - weight[2]) / L2
-    sideways = (torque[0] - weight[0]) / (L1 * c2 + L2 * s3)
-    bent = np.cos(theta[2] - theta[1])
-    up, outwards = (c3 * upper + s2 * fore) / bent, (c2 * fore - s3 * upper) / bent
+    gravity = gravity_torques(theta)
+    upper, fore = (torque[1] - gravity[1]) / L1, (torque[2] - gravity[2]) / L2
+    sideways = (torque[0] - gravity[0]) / (L1 * c2 + L2 * s3)
+    cos_bend = np.cos(theta[2] - theta[1])
+    up, outwards = (c3 * upper + s2 * fore) / cos_bend, (c2 * fore - s3 * upper) / cos_bend
     x, y, z = c1 * sideways + s1 * outwards, up, c1 * outwards - s1 * sideways
-    size = math.sqrt(x * x + y * y + z * z)
-    if not math.isfinite(size):
+    magnitude = math.sqrt(x * x + y * y + z * z)
+    if not math.isfinite(magnitude):
         return 0.0, 0.0, 0.0
-    share = largest / size if size > largest else 1.0
-    return share * x, share * y, share * z
+    scale = largest / magnitude if magnitude > largest else 1.0
+    return scale * x, scale * y, scale * z
 
 
 @entry_point

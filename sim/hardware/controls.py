@@ -1,6 +1,6 @@
 """The control side of a hardware run: it starts the servo and recorder processes, arms, monitors and stops them.
 
-Each `poll` sends a heartbeat; a servo that misses it switches the motors off. In turn, `poll` checks that the servo
+Each `poll` sends a heartbeat; without it, the servo switches the motors off. In turn, `poll` checks that the servo
 ticks.
 """
 
@@ -48,7 +48,7 @@ from sim.hardware.undisturbed import start_undisturbed
 
 SILENT = 0.2
 """Time without a tick after which the servo counts as dead [s]."""
-_START, _END = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
+_START_TIMEOUT, _END_TIMEOUT = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
 
 
 class RecorderStatus(NamedTuple):
@@ -135,24 +135,24 @@ class HardwareRun:
         context = multiprocessing.get_context("spawn")
         self._orders, self.status = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE)
         self._rows = Ring(round(RING_SECONDS / period), ROW_SIZE)
-        self._until, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
-        self._said, reports = context.Pipe(duplex=False)
-        self._order, self._row, self._heard = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
-        channels = Channels(self._orders, self.status, self._rows, reports)
+        self._stop_recording, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
+        self._reports, report_sender = context.Pipe(duplex=False)
+        self._order, self._row, self._last_tick = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
+        channels = Channels(self._orders, self.status, self._rows, report_sender)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
         self.recorder: BaseProcess | None = None
         if job is not None:
-            arguments = job, self._rows, self._until, self.recorder_status
+            arguments = job, self._rows, self._stop_recording, self.recorder_status
             self.recorder = context.Process(target=record_rows, args=arguments, name="recorder", daemon=True)
-        self._their_end: Connection = reports
-        self._ended: Ended | None = None
+        self._report_sender: Connection = report_sender
+        self._final_report: Ended | None = None
 
     def __enter__(self) -> "HardwareRun":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        for shared in (self._orders, self.status, self._rows, self._until, self.recorder_status):
+        for shared in (self._orders, self.status, self._rows, self._stop_recording, self.recorder_status):
             shared.close()
 
     def start(self) -> Ready:
@@ -165,25 +165,25 @@ class HardwareRun:
         """
         if self.recorder is not None:
             start_undisturbed(self.recorder)
-            self._wait_for(self.recorder)
+            self._wait_for_recorder(self.recorder)
         start_undisturbed(self.servo)
-        self._their_end.close()
-        said = self._hear(_START)
-        if isinstance(said, Ready):
+        self._report_sender.close()
+        report = self._receive_report(_START_TIMEOUT)
+        if isinstance(report, Ready):
             self.poll()
-            return said
-        raise SimError(said.why if isinstance(said, Refused) else "the servo's process ended before it began")
+            return report
+        raise SimError(report.why if isinstance(report, Refused) else "the servo's process ended before it began")
 
-    def _wait_for(self, recorder: BaseProcess) -> None:
+    def _wait_for_recorder(self, recorder: BaseProcess) -> None:
         """Wait until the recorder is ready or has ended; `poll` then shows whether it could start."""
-        status, end = np.zeros(RECORDER_SIZE), time.monotonic() + _START
-        while recorder.is_alive() and status[RECORDER_READY] == 0.0 and time.monotonic() < end:
+        status, deadline = np.zeros(RECORDER_SIZE), time.monotonic() + _START_TIMEOUT
+        while recorder.is_alive() and status[RECORDER_READY] == 0.0 and time.monotonic() < deadline:
             time.sleep(0.01)
             self.recorder_status.read(status)
 
-    def _hear(self, timeout: float) -> Ready | Refused | Ended | None:
+    def _receive_report(self, timeout: float) -> Ready | Refused | Ended | None:
         try:
-            return self._said.recv() if self._said.poll(timeout) else None
+            return self._reports.recv() if self._reports.poll(timeout) else None
         except EOFError:
             return None
 
@@ -200,13 +200,13 @@ class HardwareRun:
         self.status.read(self._row)
         row, now = {name: channel[0] for name, channel in columns(self._row[None].copy()).items()}, time.monotonic()
         tick = float(row["tick"])
-        if tick != self._heard[0]:
-            self._heard = tick, now
-        alive = self.servo.is_alive() and now - self._heard[1] < SILENT
+        if tick != self._last_tick[0]:
+            self._last_tick = tick, now
+        alive = self.servo.is_alive() and now - self._last_tick[1] < SILENT
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
-        return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._recorded())
+        return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._read_recorder_status())
 
-    def _recorded(self) -> RecorderStatus | None:
+    def _read_recorder_status(self) -> RecorderStatus | None:
         if self.recorder is None:
             return None
         status = np.zeros(RECORDER_SIZE)
@@ -225,20 +225,20 @@ class HardwareRun:
 
     def stop(self) -> Ended | None:
         """End the servo, then the recorder once it has written all rows; returns the servo's final report, if any."""
-        if self._ended is None and self.servo.pid is not None:
+        if self._final_report is None and self.servo.pid is not None:
             self._order[ORDER_STOP], self._order[ORDER_REQUEST] = 1.0, NO_REQUEST
             self._orders.write(self._order)
-            said = self._hear(_END)
-            self._ended = said if isinstance(said, Ended) else None
-            _end(self.servo)
+            report = self._receive_report(_END_TIMEOUT)
+            self._final_report = report if isinstance(report, Ended) else None
+            _end_process(self.servo)
         if self.recorder is not None and self.recorder.pid is not None:
-            self._until.write(np.ones(1))
-            _end(self.recorder)
-        return self._ended
+            self._stop_recording.write(np.ones(1))
+            _end_process(self.recorder)
+        return self._final_report
 
 
-def _end(process: BaseProcess) -> None:
-    process.join(_END)
+def _end_process(process: BaseProcess) -> None:
+    process.join(_END_TIMEOUT)
     if process.is_alive():
         process.kill()
         process.join()

@@ -8,7 +8,7 @@ from numba import njit
 from controllers.state import Array, IntArray
 
 BIN = 1e-6  # [s] width of a bin
-_BINS = 100_000  # up to 0.1 s; longer times are counted in the last bin
+_N_BINS = 100_000  # up to 0.1 s; longer times are counted in the last bin
 
 
 class Quantiles(NamedTuple):
@@ -22,7 +22,7 @@ class Quantiles(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """A histogram of durations: samples in each bin, shape (`_BINS`,), and the longest duration [s], shape (1,)."""
+    """A histogram of durations: samples in each bin, shape (`_N_BINS`,), and the longest duration [s], shape (1,)."""
 
     counts: IntArray
     longest: Array
@@ -30,13 +30,13 @@ class Spread(NamedTuple):
     @classmethod
     def empty(cls) -> "Spread":
         """An empty histogram."""
-        return cls(np.zeros(_BINS, np.int64), np.zeros(1))
+        return cls(np.zeros(_N_BINS, np.int64), np.zeros(1))
 
     def quantiles(self) -> Quantiles:
         """Quantiles of the samples; zeros if there are none."""
-        total = np.cumsum(self.counts)
-        count = int(total[-1])
-        p50, p99, p999 = (float(np.searchsorted(total, share * count) + 1) * BIN for share in (0.5, 0.99, 0.999))
+        cumulative = np.cumsum(self.counts)
+        count = int(cumulative[-1])
+        p50, p99, p999 = (float(np.searchsorted(cumulative, share * count) + 1) * BIN for share in (0.5, 0.99, 0.999))
         longest = float(self.longest[0])
         return Quantiles(min(p50, longest), min(p99, longest), min(p999, longest), longest, count)
 
@@ -44,5 +44,5 @@ class Spread(NamedTuple):
 @njit
 def count_time(spread: Spread, seconds: float) -> None:
     """Add a duration [s] to the histogram."""
-    spread.counts[min(_BINS - 1, int(seconds / BIN))] += 1
+    spread.counts[min(_N_BINS - 1, int(seconds / BIN))] += 1
     spread.longest[0] = max(spread.longest[0], seconds)

@@ -1,7 +1,7 @@
 """An emulated device: the MuJoCo linkage behind a driver, with friction, added inertia, delay and encoder offsets.
 
 Its clock advances by one servo period per command, so a run with it is reproducible. A simulated hand holds the stylus
-in place, with a tremor, until the motors have been on for a while, and then lets go.
+in place, with a tremor, until the motors have been on for some time, and then lets go.
 """
 
 import math
@@ -45,7 +45,7 @@ def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
 
 
 def steps_late(scene: SceneConfig, delay: float) -> float:
-    """Number of physics steps from the start of a period until a torque with a given delay [s] acts.
+    """Number of physics steps from the start of a period until a torque that is delayed by `delay` [s] acts.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class EmulatedPhantom:
     arm : Arm, optional
         The user once the holding hand has let go; relaxed by default.
     holds : float
-        How long the hand still holds the stylus after the motors came on [s].
+        Time for which the hand still holds the stylus after the motors were switched on [s].
 
     Raises
     ------
@@ -93,18 +93,18 @@ class EmulatedPhantom:
         linkage.into(self.world)
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
         self._plant, self._offset = make_plant(self.world), np.array(linkage.offset)
-        steps, late = self._plant.substeps, steps_late(scene, linkage.delay)
-        self._skips = late > steps  # the torque then begins to act in the period after its own
-        late -= steps * self._skips
-        whole, part = int(late), late % 1.0
-        spans = (whole, 0.0), (1 if part > 0.0 else 0, 1.0 - part), (steps - math.ceil(late), 1.0)
+        steps, delay_steps = self._plant.substeps, steps_late(scene, linkage.delay)
+        self._acts_next_period = delay_steps > steps  # the torque begins to act only in the next period
+        delay_steps -= steps * self._acts_next_period
+        whole_steps, fraction = int(delay_steps), delay_steps % 1.0
+        spans = (whole_steps, 0.0), (1 if fraction > 0.0 else 0, 1.0 - fraction), (steps - math.ceil(delay_steps), 1.0)
         self._spans = [(n, new) for n, new in spans if n > 0]
         self._tremor = tremor(600.0, 2e-3)
-        self._holding = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
-        self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
-        self._applied, self._motors = np.zeros((steps, 3)), list(self.port.motor)
-        self._last, self._before = np.zeros(3), np.zeros(3)
-        self._steps, self._sequence = 0, 0
+        self._holding_hand = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
+        self._free_hand, self._hold_time, self._on_time = make_hand(arm or Arm()), holds, 0.0
+        self._applied, self._motor_indices = np.zeros((steps, 3)), list(self.port.motor)
+        self._last_torque, self._torque_before_last = np.zeros(3), np.zeros(3)
+        self._command_count, self._sequence = 0, 0
         self.torque = np.zeros(3)
         self.telemetry = fresh_telemetry()
         self.identity = emulated_identity("MuJoCo", not any(linkage.offset))
@@ -112,49 +112,49 @@ class EmulatedPhantom:
     @property
     def clock(self) -> float:
         """The device's own time [s]."""
-        return self._steps * self._plant.period
+        return self._command_count * self._plant.period
 
     def read(self, reading: Array, timeout: float) -> bool:
-        """As `sim.devices.driver.Driver`; there is a new reading after each command."""
-        q, port, new = self.port.qpos, self.port, self._steps + 1 > self._sequence
+        """See `sim.devices.driver.Driver`; there is a new reading after each command."""
+        q, port, is_new = self.port.qpos, self.port, self._command_count + 1 > self._sequence
         theta = q[list(port.arm_q)] + self._offset
         reading[READING_THETA : READING_THETA + 3] = encoder_reading((theta[0], theta[1], theta[2]))
         g = port.gimbal_q
         reading[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
         reading[READING_SWITCH], reading[READING_CLOCK] = 1.0, self.clock
-        reading[READING_SEQUENCE] = self._sequence = self._steps + 1
-        self.telemetry[READ] += new
-        return new
+        reading[READING_SEQUENCE] = self._sequence = self._command_count + 1
+        self.telemetry[READ] += is_new
+        return is_new
 
     def write(self, torque: Array, enable: bool) -> None:
-        """As `sim.devices.driver.Driver`; advances the device by a servo period."""
+        """See `sim.devices.driver.Driver`; advances the device by a servo period."""
         self.torque[:] = torque if enable else 0.0
-        if self._on > 0.0 and not enable:
+        if self._on_time > 0.0 and not enable:
             self._take_hold()
-        self._on = self._on + self._plant.period if enable else 0.0
-        user = self._relaxed if self._holding is None or self._on > self._holds else self._holding
-        t, (new_torque, old_torque) = self.clock, (self.torque, self._last)
-        if self._skips:
-            new_torque, old_torque = self._last, self._before
+        self._on_time = self._on_time + self._plant.period if enable else 0.0
+        user = self._free_hand if self._holding_hand is None or self._on_time > self._hold_time else self._holding_hand
+        t, (new_torque, old_torque) = self.clock, (self.torque, self._last_torque)
+        if self._acts_next_period:
+            new_torque, old_torque = self._last_torque, self._torque_before_last
         for steps, new in self._spans:
             span = steps / self._plant.substeps * self._plant.period
             plant = self._plant._replace(substeps=steps, period=span)
-            self.world.data.ctrl[self._motors] = new * new_torque + (1.0 - new) * old_torque
+            self.world.data.ctrl[self._motor_indices] = new * new_torque + (1.0 - new) * old_torque
             pass_time(plant, self.port, user, t, self._applied[:steps])
             t += span
-        self._before[:], self._last[:] = self._last, self.torque
-        self._steps += 1
+        self._torque_before_last[:], self._last_torque[:] = self._last_torque, self.torque
+        self._command_count += 1
 
     def _take_hold(self) -> None:
         """Let the hand hold the stylus at its present position, so that it does not fall."""
-        if self._holding is not None:
+        if self._holding_hand is not None:
             a, b, c = (float(self.port.qpos[place]) for place in self.port.arm_q)
-            self._holding.arm.path[:] = vector_to_hand_frame(forward_kinematics((a, b, c))) + self._tremor
+            self._holding_hand.arm.path[:] = vector_to_hand_frame(forward_kinematics((a, b, c))) + self._tremor
 
     def let_go(self) -> None:
-        """As `sim.devices.driver.Driver`; no time passes."""
-        self.torque[:] = self._last[:] = self._before[:] = 0.0
+        """See `sim.devices.driver.Driver`; no time passes."""
+        self.torque[:] = self._last_torque[:] = self._torque_before_last[:] = 0.0
 
     def close(self) -> None:
-        """As `sim.devices.driver.Driver`."""
+        """See `sim.devices.driver.Driver`."""
         self.let_go()

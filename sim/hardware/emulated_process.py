@@ -3,7 +3,7 @@
 Packets carry eight-byte numbers: one whole reading with the time at which it was sent, or one command, as reports of
 USB HID do. Each command advances the device by a servo period and is answered by a reading. If no command comes for the
 watchdog's time, the device is advanced by that time under the last command; then its motors are switched off, and it
-goes on by itself.
+continues to run without commands.
 """
 
 import os
@@ -31,8 +31,8 @@ from sim.hardware.undisturbed import parent_id
 
 WATCHDOG = 0.02
 """Time without a command after which the device switches its motors off [s]: twenty periods at 1 kHz."""
-_OFF = bytes(32)  # a command of zero torques with the motors off
-_SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # of a reading's packet: place of the sending time, and size
+_MOTORS_OFF_COMMAND = bytes(32)  # a command of zero torques with the motors off
+_SENDING_TIME, _PACKET_SIZE = READING_SIZE, READING_SIZE + 1  # in a reading's packet: index of the sending time; size
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
 """Places in the device's published status: motor torques (3) [N m], number of times its watchdog tripped, its clock
 [s]."""
@@ -47,31 +47,31 @@ class EmulatedEnd(NamedTuple):
 
 
 def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime: bool) -> None:
-    """Run the device until the parent process is gone; the target of a process."""
+    """Run the device until the parent process has ended; the target of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     device, parent = make(), parent_id()
     device.write(np.zeros(3), False)
     if realtime:
         become_realtime()
-    packet, shown, trips, quiet = np.zeros(_PACKET), np.zeros(SHOWN_SIZE), 0, True
-    off, last = np.zeros(3), np.zeros(4)
+    packet, shown, trip_count, is_silent = np.zeros(_PACKET_SIZE), np.zeros(SHOWN_SIZE), 0, True
+    no_torque, last_command = np.zeros(3), np.zeros(4)
     while os.getppid() == parent:
-        command = _command(end.packets, end.period if quiet else WATCHDOG)
+        command = _receive_command(end.packets, end.period if is_silent else WATCHDOG)
         if command is None:
-            if not quiet:
-                trips += 1
+            if not is_silent:
+                trip_count += 1
                 for _ in range(round(WATCHDOG / end.period)):
-                    device.write(last[:3], last[3] > 0.0)
-            quiet = True
-            device.write(off, False)
+                    device.write(last_command[:3], last_command[3] > 0.0)
+            is_silent = True
+            device.write(no_torque, False)
         else:
-            quiet, last = False, command
+            is_silent, last_command = False, command
             device.write(command[:3], command[3] > 0.0)
         device.read(packet[:READING_SIZE], 0.0)
         shown[SHOWN_TORQUE : SHOWN_TORQUE + 3] = device.torque
-        shown[SHOWN_TRIPS], shown[SHOWN_CLOCK] = trips, device.clock
+        shown[SHOWN_TRIPS], shown[SHOWN_CLOCK] = trip_count, device.clock
         end.shown.write(shown)
-        packet[_SENT_AT] = time.monotonic()
+        packet[_SENDING_TIME] = time.monotonic()
         try:
             end.packets.send(packet.data, socket.MSG_DONTWAIT)
         except OSError:
@@ -79,7 +79,7 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
                 time.sleep(end.period)  # the servo takes no readings, or is gone
 
 
-def _command(packets: socket.socket, timeout: float) -> Array | None:
+def _receive_command(packets: socket.socket, timeout: float) -> Array | None:
     """The next command; None if there was none within the timeout [s]."""
     if not select.select([packets], [], [], timeout)[0]:
         return None
@@ -117,8 +117,8 @@ class Link(NamedTuple):
 
 
 IO_NEW, IO_SIZE, IO_WENT, IO_SENT, IO_SEQUENCE, IO_WAIT, IO_LENGTH = range(7)
-"""Places in `Link.io`: readings taken; size of a wrong packet that ended the taking, or `NOTHING` or `BROKEN`; result
-of sending the last command, and when it was sent [s]; number of the last reading; timeout of a reading [s]."""
+"""Places in `Link.io`: number of readings taken; size of a malformed packet, or `NOTHING` or `BROKEN`; result of
+sending the last command, and when it was sent [s]; number of the last reading; timeout of a reading [s]."""
 
 
 @entry_point
@@ -133,7 +133,7 @@ def take_readings(link: Link) -> None:
             wait_for_packet(link.descriptor, io[IO_WAIT])
             waited = True
             continue
-        if size != 8 * _PACKET:
+        if size != 8 * _PACKET_SIZE:
             io[IO_SIZE] = size
             break
         for i in range(READING_SIZE):
@@ -145,7 +145,7 @@ def take_readings(link: Link) -> None:
     telemetry[ROUND_TRIP] = now - io[IO_SENT]
     telemetry[READ] += 1
     telemetry[LOST] += max(0.0, number - io[IO_SEQUENCE] - 1.0) if io[IO_SEQUENCE] > 0.0 else 0.0
-    note_arrival(telemetry, link.clocks, now, link.packet[_SENT_AT])
+    note_arrival(telemetry, link.clocks, now, link.packet[_SENDING_TIME])
     io[IO_SEQUENCE] = number
 
 
@@ -172,19 +172,19 @@ class EmulatedDriver:
         self._packets, self.telemetry, io = packets, fresh_telemetry(), np.zeros(IO_LENGTH)
         self._reading, self._command = np.zeros(READING_SIZE), np.zeros(4)
         link = Link(
-            packets.fileno(), np.zeros(_PACKET + 1), self._reading, self._command, self.telemetry, np.full(3, np.nan),
-            io,
+            packets.fileno(), np.zeros(_PACKET_SIZE + 1), self._reading, self._command, self.telemetry,
+            np.full(3, np.nan), io,
         )  # fmt: skip
         io[IO_SENT] = time.monotonic()
         self._torque, self._io = self._command[:3], items(io)
-        self._take, self._send = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
+        self._take_readings, self._send_command = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`."""
         io = self._io
         io[IO_WAIT] = timeout
-        self._take()
+        self._take_readings()
         if io[IO_SIZE] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
         if io[IO_SIZE] != NOTHING:
@@ -196,15 +196,15 @@ class EmulatedDriver:
         """As `sim.devices.driver.Driver`."""
         np.copyto(self._torque, torque)
         self._command[3] = enable
-        self._send()
+        self._send_command()
         if self._io[IO_WENT] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
-        # If there was no room for the packet, the device does not keep up; its readings will then become stale.
+        # If there was no room for the packet, the device is too slow; its readings will then become stale.
 
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`."""
         try:
-            self._packets.send(_OFF)
+            self._packets.send(_MOTORS_OFF_COMMAND)
         except OSError:
             return
 

@@ -32,18 +32,18 @@ CHANNELS: dict[str, tuple[int, ...]] = {
 """Channels of a tick's row: of the loop, the gate (`asked` is the force before it, `force` after it), the clock and the
 device."""
 
-_PLACES: dict[str, slice] = {}
+_ROW_SLICES: dict[str, slice] = {}
 for _name, _shape in CHANNELS.items():
-    _at = max((s.stop for s in _PLACES.values()), default=0)
-    _PLACES[_name] = slice(_at, _at + (_shape[0] if _shape else 1))
-ROW_SIZE = _PLACES["temperature"].stop
-MISSED, LATENESS, COMPUTE = (_PLACES[_name].start for _name in ("missed", "lateness", "compute"))
+    _start = max((s.stop for s in _ROW_SLICES.values()), default=0)
+    _ROW_SLICES[_name] = slice(_start, _start + (_shape[0] if _shape else 1))
+ROW_SIZE = _ROW_SLICES["temperature"].stop
+MISSED, LATENESS, COMPUTE = (_ROW_SLICES[_name].start for _name in ("missed", "lateness", "compute"))
 """Places in a row that are filled by the servo's clock (`Ticker.note_time`)."""
 
 
 def columns(rows: Array) -> dict[str, Array]:
     """Rows of ticks by channel, shape (n, …) each."""
-    return {name: rows[:, place].reshape(len(rows), *CHANNELS[name]) for name, place in _PLACES.items()}
+    return {name: rows[:, place].reshape(len(rows), *CHANNELS[name]) for name, place in _ROW_SLICES.items()}
 
 
 class GatedServo(NamedTuple):
@@ -98,20 +98,20 @@ class Ticker:
         field = parts.servo.field
         # All that a tick needs is in preallocated arrays, reached by views made here, so a tick allocates nothing.
         self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
-        self._number, self._request = np.zeros(1), np.zeros(1)
+        self._tick_number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
         self._motors, self._faults = items(self.gated.motors), items(self._device.faults)
-        self._block = KeptCall(run_block, (parts.servo,), self._number, (1, False, self._ticks, frames))
-        gate = self._device, self.gated, field.limiter, field.tank, field.force
-        self._gate = KeptCall(gated_tick, gate, self._request)
+        self._run_block = KeptCall(run_block, (parts.servo,), self._tick_number, (1, False, self._ticks, frames))
+        gate_arguments = self._device, self.gated, field.limiter, field.tank, field.force
+        self._run_gate = KeptCall(gated_tick, gate_arguments, self._request)
         self._sources = self._row_sources()
-        self._keep_row = KeptCall(gather, (addresses_of(self._sources), self.row))
+        self._gather_row = KeptCall(gather, (addresses_of(self._sources), self.row))
 
     def _row_sources(self) -> list[Array]:
         """Views of the arrays from which a row is gathered, in the order of `CHANNELS`."""
         device, gated, telemetry = self._device, self.gated, self.parts.driver.telemetry
-        one = {
-            "tick": (self._number, 0), "fault": (device.faults, FAULT_CODE),
+        single = {
+            "tick": (self._tick_number, 0), "fault": (device.faults, FAULT_CODE),
             "fault_value": (device.faults, FAULT_VALUE), "gaps": (device.faults, FAULT_GAPS),
             "state": (gated.gate, GATE_STATE), "gain": (gated.gate, GATE_GAIN),
             "share": (gated.gate, GATE_SHARE), "heat": (gated.motors, MOTOR_HEAT),
@@ -120,14 +120,14 @@ class Ticker:
             "staleness": (telemetry, STALENESS), "lost": (telemetry, LOST), "refused": (telemetry, BAD),
         }  # fmt: skip
         sources = {name: channel.reshape(-1) for name, channel in tick_channels(self._ticks, 1).items()}
-        sources |= {name: array[place : place + 1] for name, (array, place) in one.items()}
+        sources |= {name: array[place : place + 1] for name, (array, place) in single.items()}
         sources |= {
             "asked": self.parts.servo.field.force, "force": gated.force, "torque": gated.torque,
             "theta": device.reading[READING_THETA : READING_THETA + 3],
             "gimbal": device.reading[READING_GIMBAL : READING_GIMBAL + 3],
             "temperature": telemetry[TEMPERATURE : TEMPERATURE + 3],
         }  # fmt: skip
-        return [sources.get(name, self.row[_PLACES[name]]) for name in CHANNELS]  # those of the clock stay as they are
+        return [sources.get(name, self.row[_ROW_SLICES[name]]) for name in CHANNELS]  # the clock's channels: unchanged
 
     @property
     def state(self) -> State:
@@ -153,21 +153,21 @@ class Ticker:
         try:
             if parts.driver.read(device.reading, self._timeout):
                 np.subtract(self._theta, parts.offset, out=self._theta)
-        except DriverFault as found:
-            self.fail(found.fault, found.value)
+        except DriverFault as error:
+            self.fail(error.fault, error.value)
         if request == CLEAR:
             rearm_servo(parts.servo)
-        self._number[0], self._request[0] = number, request
-        self._block()
-        self._gate()
-        pushes = self._motors[MOTORS_ON] > 0.0
+        self._tick_number[0], self._request[0] = number, request
+        self._run_block()
+        self._run_gate()
+        motors_on = self._motors[MOTORS_ON] > 0.0
         try:
-            parts.driver.write(self.gated.torque, pushes)
-        except DriverFault as found:
-            self.fail(found.fault, found.value)
-        if not pushes and self._faults[FAULT_CODE] != 0.0:
+            parts.driver.write(self.gated.torque, motors_on)
+        except DriverFault as error:
+            self.fail(error.fault, error.value)
+        if not motors_on and self._faults[FAULT_CODE] != 0.0:
             parts.driver.let_go()
-        self._keep_row()
+        self._gather_row()
 
     def note_time(self, missed: float, lateness: float, compute: float) -> None:
         """Add the clock's channels to the row: deadlines missed so far, lateness and computing time of the tick [s]."""

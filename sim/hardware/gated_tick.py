@@ -69,9 +69,9 @@ class GateMemory(NamedTuple):
 def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array, asked: Array, request: int) -> None:
     """Compute the motor torques for the force that the loop commands; zero in every gate state without force.
 
-    Limiter and tank are updated with the force that the hand really gets. Gravity compensation is ramped in together
-    with the force. If the device compensates for its own weight, the Phantom's gravity torques are added only at the
-    end, outside of all limits, because the driver subtracts them again.
+    Limiter and tank are updated with the force that is actually exerted on the hand. Gravity compensation is ramped in
+    together with the force. If the device compensates for its own weight, the Phantom's gravity torques are added only
+    at the end, outside of all limits, because the driver subtracts them again.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     force, torque, faults = gated.force, gated.torque, device.faults
     force[:] = asked
     pass_gate(gated.params, gated.shaking, gated.gate, gated.shaken, faults, device.hand, request, force)
-    memory, held_back = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
+    memory, withheld = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
     motor_torques(faults, memory, device.hand[HAND_TIME], force, torque)
     # J(θ)ᵀF is already ramped in with F, the gravity torques are not yet.
     weight = gravity_torques((memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2]))
     for i in range(3):
-        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
+        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - withheld * weight[i]))
     gated.motors[MOTOR_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
     if gated.own_weight:
         for i in range(3):

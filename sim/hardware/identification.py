@@ -26,7 +26,7 @@ Confidence intervals are the sum of two parts. The first covers noise, from the 
 1967; Newey & West, Econometrica 55, 1987, for windows that overlap), simultaneously for all parameters (Bonferroni).
 The second covers unmodelled torques, such as torque ripple or position-dependent friction, which repeat in every lap
 and thus do not average out: the residual beyond the encoders' noise is taken as a torque with the time course that
-moves a parameter most. The encoders' noise is estimated from sixth differences of the readings, to which motion within
+alters a parameter most. The encoders' noise is estimated from sixth differences of the readings, to which motion within
 the bandwidth of a hand or a device does not contribute.
 """
 
@@ -56,16 +56,16 @@ WINDOW = 0.2
 """Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below that of the encoders' noise. With 0.12 s
 the noise of the rates, which are regressors, moves Coulomb and viscous friction by two standard errors towards each
 other."""
-_HOP = 0.25  # offset of successive windows, as a share of their length
-_SMOOTH = 4  # readings on either side over which the rate that gives the direction of friction is averaged
-_SLOWEST = 0.1  # [rad/s] rate below which that direction is uncertain
-_STEPS = 12  # Gauss–Newton steps
-_LONGEST = 1.999  # longest delay, in periods, for which the equations hold torques
-_LAGS = round(1.0 / _HOP)  # number of following windows that share noise with one: those that begin before it ends
+_HOP_FRACTION = 0.25  # offset between successive windows, as a share of their length
+_HALF_WIDTH = 4  # readings on either side over which the rate that gives the direction of friction is averaged
+_MIN_RATE = 0.1  # [rad/s] rate below which that direction is uncertain
+_ITERATION_COUNT = 12  # Gauss–Newton steps
+_MAX_DELAY = 1.999  # longest delay, in periods, for which the equations contain torques
+_LAGS = round(1.0 / _HOP_FRACTION)  # following windows that share noise with one: those that begin before it ends
 CONFIDENCE = 0.95
 """Joint confidence level of all intervals."""
-_DIFFERENCES, _GAIN = 6, 924  # order of the differences, and their gain on the variance of white noise: 12 over 6
-_SURE = 1.5  # factor on the variance explained by the encoders, up to which a residual counts as noise
+_DIFFERENCE_ORDER, _DIFFERENCE_GAIN = 6, 924  # order; gain on the variance of white noise: 12 over 6
+_NOISE_FACTOR = 1.5  # factor on the variance explained by the encoders up to which a residual counts as noise
 
 
 class Motion(NamedTuple):
@@ -128,18 +128,18 @@ def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: Mas
 
 
 class _Equations(NamedTuple):
-    """Data of the windows of all motions, from which the residuals are computed for given parameters."""
+    """Data of the windows of all motions, from which residuals are computed for given parameters."""
 
     weights: Array  # ψ at the midpoints of the intervals, times the interval's length, shape (length,)
     slopes: Array  # ψ̇, likewise
     rates: Array  # joint rates of the intervals [rad/s], shape (windows, length, 3)
-    smooth: Array  # the same averaged over 2 _SMOOTH + 1 intervals, for terms that are not linear in the rates
-    middles: Array  # θ as read at the midpoints [rad], shape (windows, length, 3)
+    smooth_rates: Array  # the same averaged over 2 _HALF_WIDTH + 1 intervals, for terms not linear in the rates
+    midpoints: Array  # θ as read at the midpoints [rad], shape (windows, length, 3)
     torque: Array  # torques of the intervals at shifts of −2 … 1 periods [N m], shape (windows, length, 4, 3)
     period: float  # [s]
-    grain: Array  # standard deviation of the readings' noise [rad], shape (3,)
+    noise: Array  # standard deviation of the readings' noise [rad], shape (3,)
     usable: Mask  # whether a joint moved throughout a window, shape (windows, 3)
-    breaks: Mask  # whether a window is the first of a motion, shape (windows,)
+    is_first: Mask  # whether a window is the first of a motion, shape (windows,)
 
 
 def identify_linkage(motions: Sequence[Motion]) -> Identified:
@@ -157,75 +157,75 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
     """
     if not motions:
         raise SimError(f"no motion of {3.0 * WINDOW:g} s or more under force and without a gap; expected a longer run")
-    equations = _equations(motions)
+    equations = _make_equations(motions)
     counts = equations.usable.sum(axis=0)
     if counts.min() < 4 * len(NAMES):
         raise SimError(
             f"the joints turn steadily in {counts[0]}, {counts[1]} and {counts[2]} windows of {WINDOW} s; expected "
             f"{4 * len(NAMES)} of each: a longer, a larger or a faster motion"
         )
-    values = _first_guess()
+    values = _initial_values()
     scale = np.ones(3)
-    for _ in range(_STEPS):
-        left, sensitivity = _residuals(equations, values)
-        scale = np.array([float(np.std(left[equations.usable[:, i], i])) for i in range(3)])
-        rows, targets = _stacked(equations, sensitivity, left, scale)
+    for _ in range(_ITERATION_COUNT):
+        residuals, sensitivity = _residuals(equations, values)
+        scale = np.array([float(np.std(residuals[equations.usable[:, i], i])) for i in range(3)])
+        rows, targets = _stack_usable(equations, sensitivity, residuals, scale)
         step = np.linalg.lstsq(rows, -targets, rcond=None)[0]
         values = values + step
-        values[_DELAY] = np.clip(values[_DELAY], -equations.period, _LONGEST * equations.period)
-    if not -equations.period < values[_DELAY] < _LONGEST * equations.period:
+        values[_DELAY] = np.clip(values[_DELAY], -equations.period, _MAX_DELAY * equations.period)
+    if not -equations.period < values[_DELAY] < _MAX_DELAY * equations.period:
         raise SimError(
             f"the delay found is {values[_DELAY]:.2g} s, the end of what is looked for, {-equations.period:g} to "
-            f"{_LONGEST * equations.period:.2g} s; expected motions that are faster, or a device that answers sooner"
+            f"{_MAX_DELAY * equations.period:.2g} s; expected motions that are faster, or a device that answers sooner"
         )
-    left, sensitivity = _residuals(equations, values)
+    residuals, sensitivity = _residuals(equations, values)
     quantile = float(ndtri(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
-    noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, left, scale)))
-    margins = noise + _moved_most(equations, sensitivity, scale, _left_out(equations, left, values[6:9]))
-    sizes = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
-    unexplained = [np.mean(left[equations.usable[:, i], i] ** 2) / sizes[i] ** 2 for i in range(3)]
+    noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, residuals, scale)))
+    margins = noise + _max_change(equations, sensitivity, scale, _unmodelled_torque(equations, residuals, values[6:9]))
+    torque_rms = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
+    unexplained = [np.mean(residuals[equations.usable[:, i], i] ** 2) / torque_rms[i] ** 2 for i in range(3)]
     return Identified(values, margins, int(counts.sum()), float(np.sqrt(np.mean(unexplained))))
 
 
-def _left_out(equations: _Equations, left: Array, inertia: Array) -> Array:
+def _unmodelled_torque(equations: _Equations, residuals: Array, inertia: Array) -> Array:
     """RMS of the residual torque beyond what the encoders' noise explains [N m], shape (3,).
 
     Noise n of the readings enters a window as Σ (ψ̇ₖ₋₁ − ψ̇ₖ) M nₖ, since momentum is M times a difference of readings.
     """
-    angles = tuple(np.moveaxis(equations.middles[:, len(equations.weights) // 2], -1, 0))
+    angles = tuple(np.moveaxis(equations.midpoints[:, len(equations.weights) // 2], -1, 0))
     rows = mass_matrix.py_func(angles)
     gain = np.linalg.norm(np.diff(equations.slopes, prepend=0.0, append=0.0)) / equations.period
-    found = np.zeros(3)
+    rms = np.zeros(3)
     for i in range(3):
-        used = equations.usable[:, i]
-        by_joint = [(rows[i][j] + (inertia[i] if i == j else 0.0)) * gain * equations.grain[j] for j in range(3)]
-        explained = np.sum([np.broadcast_to(part, used.shape)[used] ** 2 for part in by_joint], axis=0)
-        found[i] = np.sqrt(max(0.0, float(np.mean(left[used, i] ** 2) - _SURE * np.mean(explained))))
-    return found
+        usable = equations.usable[:, i]
+        by_joint = [(rows[i][j] + (inertia[i] if i == j else 0.0)) * gain * equations.noise[j] for j in range(3)]
+        explained = np.sum([np.broadcast_to(part, usable.shape)[usable] ** 2 for part in by_joint], axis=0)
+        rms[i] = np.sqrt(max(0.0, float(np.mean(residuals[usable, i] ** 2) - _NOISE_FACTOR * np.mean(explained))))
+    return rms
 
 
-def _moved_most(equations: _Equations, sensitivity: Array, scale: Array, torque: Array) -> Array:
+def _max_change(equations: _Equations, sensitivity: Array, scale: Array, torque: Array) -> Array:
     """Largest change of each parameter by torques of a given RMS [N m], shape (3,), with the worst time course.
 
     By the Cauchy–Schwarz inequality it is the norm of the parameter's row of the pseudo-inverse, times √n.
     """
-    rows, sizes = _stacked(equations, sensitivity, np.broadcast_to(torque, equations.usable.shape), scale)
-    return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows) * sizes, axis=1)
+    rows, torques = _stack_usable(equations, sensitivity, np.broadcast_to(torque, equations.usable.shape), scale)
+    return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows) * torques, axis=1)
 
 
-def _first_guess() -> Array:
+def _initial_values() -> Array:
     values = np.zeros(len(NAMES))
     values[:3], values[3:6] = PREMIUM_1_5.coulomb_friction, PREMIUM_1_5.viscous_friction
     values[_WEIGHT:] = WEIGHT_2, WEIGHT_3
     return values
 
 
-def _equations(motions: Sequence[Motion]) -> _Equations:
+def _make_equations(motions: Sequence[Motion]) -> _Equations:
     """Cut all motions into windows; the period is the median difference of the clock."""
     period = float(np.median(np.concatenate([np.diff(motion.clock) for motion in motions])))
-    length, hop = round(WINDOW / period), max(1, round(_HOP * WINDOW / period))
-    wiggles = np.concatenate([np.diff(motion.theta, _DIFFERENCES, axis=0) for motion in motions])
-    grain = np.sqrt(np.mean(wiggles**2, axis=0) / _GAIN)
+    length, hop = round(WINDOW / period), max(1, round(_HOP_FRACTION * WINDOW / period))
+    differences = np.concatenate([np.diff(motion.theta, _DIFFERENCE_ORDER, axis=0) for motion in motions])
+    noise = np.sqrt(np.mean(differences**2, axis=0) / _DIFFERENCE_GAIN)
     s = (np.arange(length) + 0.5) / length
     # ψ = (8/3) sin⁴(π s)/W has a mean of 1/W, and ψ and three derivatives are zero at both ends.
     weights = 8.0 / 3.0 * np.sin(np.pi * s) ** 4 / length
@@ -234,19 +234,19 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
     for motion in motions:
         n = len(motion.clock) - 1
         rates = np.diff(motion.theta, axis=0) / period
-        middles = 0.5 * (motion.theta[1:] + motion.theta[:-1])
-        box = np.ones(2 * _SMOOTH + 1) / (2 * _SMOOTH + 1)
-        smooth = np.stack([np.convolve(rate, box, mode="same") for rate in rates.T], axis=1)
-        starts = np.arange(_SMOOTH + 2, n - length - _SMOOTH, hop)
-        at = starts[:, None] + np.arange(length)
+        midpoints = 0.5 * (motion.theta[1:] + motion.theta[:-1])
+        kernel = np.ones(2 * _HALF_WIDTH + 1) / (2 * _HALF_WIDTH + 1)
+        smooth = np.stack([np.convolve(rate, kernel, mode="same") for rate in rates.T], axis=1)
+        starts = np.arange(_HALF_WIDTH + 2, n - length - _HALF_WIDTH, hop)
+        indices = starts[:, None] + np.arange(length)
         # The torque of the interval and of its neighbours, for delays from −1 to 2 periods.
-        commands = np.stack([motion.torque[at + shift] for shift in (-2, -1, 0, 1)], axis=2)
-        usable = np.min(np.abs(smooth[at]), axis=1) > _SLOWEST
-        new = np.zeros(len(starts), dtype=bool)
-        new[:1] = True
-        found.append((rates[at], smooth[at], middles[at], commands, usable, new))
-    rates, smooth, middles, commands, usable, new = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return _Equations(weights, slopes, rates, smooth, middles, commands, period, grain, usable, new)
+        commands = np.stack([motion.torque[indices + shift] for shift in (-2, -1, 0, 1)], axis=2)
+        usable = np.min(np.abs(smooth[indices]), axis=1) > _MIN_RATE
+        is_first = np.zeros(len(starts), dtype=bool)
+        is_first[:1] = True
+        found.append((rates[indices], smooth[indices], midpoints[indices], commands, usable, is_first))
+    rates, smooth, midpoints, commands, usable, is_first = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return _Equations(weights, slopes, rates, smooth, midpoints, commands, period, noise, usable, is_first)
 
 
 def _mean_torque(equations: _Equations, delay: float) -> Array:
@@ -260,19 +260,19 @@ def _mean_torque(equations: _Equations, delay: float) -> Array:
     return np.stack([w @ blended, w @ ((old - new) / equations.period)], axis=1)
 
 
-def _mechanics(equations: _Equations, values: Array) -> Array:
+def _model_torque(equations: _Equations, values: Array) -> Array:
     """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) with the offsets and gravity amplitudes of `values`, shape (windows, 3)."""
     offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
-    theta1, theta2, theta3 = angles = tuple(np.moveaxis(equations.middles - offset, -1, 0))
-    smooth = tuple(np.moveaxis(equations.smooth, -1, 0))
-    momentum = _times(mass_matrix.py_func(angles), np.moveaxis(equations.rates, -1, 0))
-    turned = _times(zip(*coriolis_matrix.py_func(angles, smooth), strict=True), smooth)
-    weight = np.zeros_like(theta1), values[_WEIGHT] * np.cos(theta2), values[_WEIGHT + 1] * np.sin(theta3)
+    theta1, theta2, theta3 = angles = tuple(np.moveaxis(equations.midpoints - offset, -1, 0))
+    smooth_rates = tuple(np.moveaxis(equations.smooth_rates, -1, 0))
+    momentum = _multiply(mass_matrix.py_func(angles), np.moveaxis(equations.rates, -1, 0))
+    coriolis = _multiply(zip(*coriolis_matrix.py_func(angles, smooth_rates), strict=True), smooth_rates)
+    gravity = np.zeros_like(theta1), values[_WEIGHT] * np.cos(theta2), values[_WEIGHT + 1] * np.sin(theta3)
     w, v = equations.weights, equations.slopes
-    return np.stack([p @ v + (c - n) @ w for p, c, n in zip(momentum, turned, weight, strict=True)], axis=1)
+    return np.stack([p @ v + (c - n) @ w for p, c, n in zip(momentum, coriolis, gravity, strict=True)], axis=1)
 
 
-def _times(rows: Iterable[Any], vector: Sequence[Array] | Array) -> list[Array]:
+def _multiply(rows: Iterable[Any], vector: Sequence[Array] | Array) -> list[Array]:
     return [row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in rows]
 
 
@@ -280,40 +280,40 @@ def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
     """Residuals of the equations, shape (windows, 3), and their derivatives, shape (windows, 3, 14)."""
     coulomb, viscous, inertia = values[:3], values[3:6], values[6:9]
     torque = _mean_torque(equations, float(values[_DELAY]))
-    base, step = _mechanics(equations, values), 1e-5
-    turning = np.einsum("k,wki->wi", equations.weights, equations.rates)
-    sign = np.einsum("k,wki->wi", equations.weights, np.sign(equations.smooth))
-    swing = np.einsum("k,wki->wi", equations.slopes, equations.rates)
-    left = torque[:, 0] + base + inertia * swing - viscous * turning - coulomb * sign
-    sensitivity = np.zeros((*left.shape, len(NAMES)))
+    model, step = _model_torque(equations, values), 1e-5
+    viscous_term = np.einsum("k,wki->wi", equations.weights, equations.rates)
+    coulomb_term = np.einsum("k,wki->wi", equations.weights, np.sign(equations.smooth_rates))
+    inertia_term = np.einsum("k,wki->wi", equations.slopes, equations.rates)
+    residuals = torque[:, 0] + model + inertia * inertia_term - viscous * viscous_term - coulomb * coulomb_term
+    sensitivity = np.zeros((*residuals.shape, len(NAMES)))
     for i in range(3):
-        sensitivity[:, i, i], sensitivity[:, i, 3 + i] = -sign[:, i], -turning[:, i]
-        sensitivity[:, i, 6 + i] = swing[:, i]
+        sensitivity[:, i, i], sensitivity[:, i, 3 + i] = -coulomb_term[:, i], -viscous_term[:, i]
+        sensitivity[:, i, 6 + i] = inertia_term[:, i]
     sensitivity[:, :, _DELAY] = torque[:, 1]
     for k in range(_OFFSET, len(NAMES)):
-        moved = values.copy()
-        moved[k] += step
-        sensitivity[:, :, k] = (_mechanics(equations, moved) - base) / step
-    return left, sensitivity
+        shifted = values.copy()
+        shifted[k] += step
+        sensitivity[:, :, k] = (_model_torque(equations, shifted) - model) / step
+    return residuals, sensitivity
 
 
-def _stacked(equations: _Equations, sensitivity: Array, left: Array, scale: Array) -> tuple[Array, Array]:
+def _stack_usable(equations: _Equations, sensitivity: Array, residuals: Array, scale: Array) -> tuple[Array, Array]:
     """Derivatives and residuals of the usable equations, in units of each joint's noise `scale`."""
     rows = (sensitivity / scale[:, None])[equations.usable]
-    return rows, (left / scale)[equations.usable]
+    return rows, (residuals / scale)[equations.usable]
 
 
-def _covariance(equations: _Equations, sensitivity: Array, left: Array, scale: Array) -> Array:
+def _covariance(equations: _Equations, sensitivity: Array, residuals: Array, scale: Array) -> Array:
     """Sandwich covariance H⁻¹ S H⁻¹, S the long-run covariance of the scores by Bartlett weights over `_LAGS` lags."""
     usable = equations.usable
-    scores = np.einsum("wi,wip->wp", np.where(usable, left / scale, 0.0), sensitivity / scale[:, None])
-    rows, _ = _stacked(equations, sensitivity, left, scale)
-    spread = scores.T @ scores
-    motion = np.cumsum(equations.breaks)
+    scores = np.einsum("wi,wip->wp", np.where(usable, residuals / scale, 0.0), sensitivity / scale[:, None])
+    rows, _ = _stack_usable(equations, sensitivity, residuals, scale)
+    score_covariance = scores.T @ scores
+    motion = np.cumsum(equations.is_first)
     for lag in range(1, _LAGS + 1):
         same = (motion[lag:] == motion[:-lag])[:, None]
         product = (scores[lag:] * same).T @ scores[:-lag]
-        spread += (1.0 - lag / (_LAGS + 1.0)) * (product + product.T)
+        score_covariance += (1.0 - lag / (_LAGS + 1.0)) * (product + product.T)
     inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
     n, p = len(rows), len(NAMES)
-    return inverse @ spread @ inverse * n / (n - p)
+    return inverse @ score_covariance @ inverse * n / (n - p)

@@ -24,23 +24,23 @@ def become_realtime() -> list[str]:
     gc.collect()
     gc.freeze()
     gc.disable()
-    said: list[str] = []
+    log: list[str] = []
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-        said.append(f"The servo runs before other processes (SCHED_FIFO, priority {PRIORITY}).")
+        log.append(f"The servo runs before other processes (SCHED_FIFO, priority {PRIORITY}).")
     except (OSError, AttributeError) as error:
-        said.append(
+        log.append(
             f"The servo runs like any process, and will be late now and then: SCHED_FIFO was refused "
             f"({error}); expected CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf."
         )
     libc = ctypes.CDLL(None, use_errno=True)
     # Both flags in one call: if only future pages were locked, later allocations would fail at the memlock limit.
     if hasattr(libc, "mlockall") and libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0:
-        said.append("Its memory stays in RAM (mlockall).")
+        log.append("Its memory stays in RAM (mlockall).")
     else:
         reason = os.strerror(ctypes.get_errno())
-        said.append(f"Its memory may be swapped out: mlockall was refused ({reason}); expected a higher memlock limit.")
-    return said
+        log.append(f"Its memory may be swapped out: mlockall was refused ({reason}); expected a higher memlock limit.")
+    return log
 
 
 def wait_until(deadline: float) -> float:

@@ -1,6 +1,6 @@
 """The recorder's process: takes the servo's rows from a ring, runs the twin on them, and writes them.
 
-It may die or freeze without effect on the servo. Rows that it does not take in time are lost, which the recording
+It may end or hang without effect on the servo. Rows that it does not take in time are lost, which the recording
 shows: the channel `tick` jumps, and `dropped` counts them.
 """
 
@@ -30,9 +30,9 @@ RECORDER_READY, RECORDER_SIZE = 7, 8
 rows, so the servo starts only then."""
 
 RING_SECONDS = 5.0
-"""Time for which the ring holds rows, so that a recorder may stall for so long without loss [s]."""
+"""Time for which the ring holds rows [s]: the recorder may stall for this long without loss."""
 
-_REST = 0.02  # [s] polling interval of the ring
+_POLL_INTERVAL = 0.02  # [s] polling interval of the ring
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def hardware_groups(period: float) -> dict[str, Group]:
 
 
 def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: SharedNumbers) -> None:
-    """Record until `orders` holds a 1, or the parent process is gone, and no row is left; the target of a process.
+    """Record until `orders` holds a 1, or the parent process has ended, and no row is left; target of a process.
 
     A full disk, or any other error of writing, ends the recording and is in `report`; the servo is not affected.
     """
@@ -78,26 +78,26 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: Sh
             report.write(status)
             while True:
                 orders.read(order)
-                last = order[0] > 0.0 or os.getppid() != parent
+                is_ending = order[0] > 0.0 or os.getppid() != parent
                 taken, lost = rows.take()
                 status[RECORDER_DROPPED] += lost
                 if len(taken):
-                    found = columns(taken)
-                    found |= {"dropped": np.full(len(taken), status[RECORDER_DROPPED])} | twin.follow(found)
-                    recorder.append("ticks", found)
+                    channels = columns(taken)
+                    channels |= {"dropped": np.full(len(taken), status[RECORDER_DROPPED])} | twin.follow(channels)
+                    recorder.append("ticks", channels)
                     status[RECORDER_ROWS] += len(taken)
-                    status[RECORDER_FORCE : RECORDER_FORCE + 3] = found["hand_force"][-1]
-                    status[RECORDER_APART] = found["apart"][-1]
+                    status[RECORDER_FORCE : RECORDER_FORCE + 3] = channels["hand_force"][-1]
+                    status[RECORDER_APART] = channels["apart"][-1]
                 report.write(status)
-                if last and not len(taken):
+                if is_ending and not len(taken):
                     break
-                time.sleep(_REST)
+                time.sleep(_POLL_INTERVAL)
             recorder.flush()
             recorder.close({"rows": int(status[RECORDER_ROWS]), "dropped": int(status[RECORDER_DROPPED])})
         if os.getppid() != parent and not status[RECORDER_ROWS]:
-            job.path.unlink(missing_ok=True)  # nobody else is left to do it, and it would be taken for a run
+            job.path.unlink(missing_ok=True)  # no other process is left to remove it, and it would look like a run
     except (OSError, RuntimeError, RecordingError) as error:
-        full = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
-        status[RECORDER_ERROR] = float(getattr(error, "errno", None) or full)
+        error_number = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
+        status[RECORDER_ERROR] = float(getattr(error, "errno", None) or error_number)
         report.write(status)
         os._exit(1)  # a normal exit would let HDF5 write again

@@ -49,10 +49,10 @@ class ServoClock:
     Parameters
     ----------
     late : float
-        Lateness of a tick from which it is a fault [s]; below, missed deadlines are counted, and if the firmware's
-        watchdog switched the motors off meanwhile, the force is ramped in again.
+        Lateness of a tick above which a fault is latched [s]; below it, missed deadlines are only counted, and if the
+        firmware's watchdog switched the motors off meanwhile, the force is ramped in again.
     heartbeat : float
-        Time without a heartbeat of the controls from which it is a fault [s].
+        Time without a heartbeat of the controls above which a fault is latched [s].
     realtime : bool
         Whether to request real-time scheduling.
 
@@ -113,7 +113,7 @@ class Ended(NamedTuple):
 
 
 class Channels(NamedTuple):
-    """Connections of the servo's process: orders in; out the last row, a ring of rows, and its reports."""
+    """Connections of the servo's process. In: orders. Out: the last row, a ring of rows, and reports."""
 
     orders: SharedNumbers
     status: SharedNumbers
@@ -122,7 +122,7 @@ class Channels(NamedTuple):
 
 
 def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock) -> None:
-    """Run a servo until it is ordered to end or its parent process is gone; the target of a process.
+    """Run a servo until it is ordered to end or its parent process has ended; the target of a process.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         Timing limits.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the controls
-    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGTERM, _exit_on_signal)
     try:
         parts = make()
     except (SimError, ControllerError, ModelError, OSError) as error:
@@ -155,13 +155,13 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         parts.driver.close()
 
 
-def _leave(number: int, frame: object) -> None:
+def _exit_on_signal(number: int, frame: object) -> None:
     raise SystemExit(0)
 
 
 @entry_point
 def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
-    """Read the controls' order (as `read_whole`), and the id of the parent process, shape (1,)."""
+    """Read the controls' order (see `read_whole`), and the id of the parent process, shape (1,)."""
     read_whole(count, shared, whole, order)
     parent[0] = _getppid()
 
@@ -198,28 +198,28 @@ class ServoProcess:
         self._order, self._parent = items(order), items(parent)
         self._compute, self._lateness = Spread.empty(), Spread.empty()
         orders, status, rows = channels.orders, channels.status, channels.rows
-        self._hear = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
+        self._read_orders = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
         self._rows, shown = rows.numbers, (status.count, status.numbers, rows.count, rows.numbers)
-        self._leave = KeptCall(leave_row, (ticker.row, *shown, self._compute, self._lateness))
+        self._publish_row = KeptCall(leave_row, (ticker.row, *shown, self._compute, self._lateness))
         self._ticks = self._missed = 0.0
-        self._heard, self._beat, self._done = time.monotonic(), -1.0, 0.0
-        self._resources = _resources()
+        self._last_beat_time, self._last_beat, self._last_request = time.monotonic(), -1.0, 0.0
+        self._initial_resources = _resource_use()
 
     def begin(self) -> None:
         """Compile and warm up with the motors off, then request real-time scheduling and report `Ready`."""
         for _ in range(3):
             self._ticker.tick(0)
-        said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
+        report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._ticker.tick(0)
         self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
         self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # losses before the start do not count
-        self._resources = _resources()
-        self._reports.send(Ready(self._ticker.parts.driver.identity, self._period, said))
+        self._initial_resources = _resource_use()
+        self._reports.send(Ready(self._ticker.parts.driver.identity, self._period, report))
 
     def run(self) -> None:
         """Tick at absolute deadlines, until there is an order to end or the parent process is gone."""
         period, parent = self._period, float(parent_id())
-        begin = self._heard = time.monotonic()
+        begin = self._last_beat_time = time.monotonic()
         number = 1.0
         while True:
             late = wait_until(begin + number * period)
@@ -233,36 +233,36 @@ class ServoProcess:
     def turn(self, number: float, late: float) -> bool:
         """Run tick `number`, `late` [s] after its deadline; returns False, without running it, on an order to end."""
         now, order, ticker = time.monotonic(), self._order, self._ticker
-        self._hear()
+        self._read_orders()
         if order[ORDER_STOP] > 0.0:
             return False
         if late > self._clock.late:
             ticker.fail(Fault.SERVO_LATE, late)
-        if order[ORDER_BEAT] != self._beat:
-            self._beat, self._heard = order[ORDER_BEAT], now
-        elif now - self._heard > self._clock.heartbeat:
-            ticker.fail(Fault.CONTROL_LOST, now - self._heard)
-        new, self._done = order[ORDER_NUMBER] != self._done, order[ORDER_NUMBER]
-        ticker.tick(number, int(order[ORDER_REQUEST]) if new else NO_REQUEST)
+        if order[ORDER_BEAT] != self._last_beat:
+            self._last_beat, self._last_beat_time = order[ORDER_BEAT], now
+        elif now - self._last_beat_time > self._clock.heartbeat:
+            ticker.fail(Fault.CONTROL_LOST, now - self._last_beat_time)
+        is_new_request, self._last_request = order[ORDER_NUMBER] != self._last_request, order[ORDER_NUMBER]
+        ticker.tick(number, int(order[ORDER_REQUEST]) if is_new_request else NO_REQUEST)
         ticker.note_time(self._missed, late, time.monotonic() - now)
-        self._leave()
+        self._publish_row()
         self._ticks += 1.0
         return True
 
     def close(self) -> None:
         """Drop all views of the shared memory, so that it can be closed."""
-        del self._hear, self._leave, self._rows
+        del self._read_orders, self._publish_row, self._rows
 
     def ended(self, broken: str) -> Ended:
         """The final report."""
-        memory, descriptors = (now - then for now, then in zip(_resources(), self._resources, strict=True))
+        memory, descriptors = (now - then for now, then in zip(_resource_use(), self._initial_resources, strict=True))
         return Ended(
             int(self._ticks), int(self._missed), self._compute.quantiles(), self._lateness.quantiles(), memory,
             int(descriptors), broken,
         )  # fmt: skip
 
 
-def _resources() -> tuple[float, int]:
+def _resource_use() -> tuple[float, int]:
     """Resident memory [MB] and number of open files of this process; zeros where ``/proc`` is missing."""
     status = Path("/proc/self/statm")
     if not status.exists():

@@ -14,14 +14,14 @@ from sim.compilation.sequence_lock import barrier, read_whole, write_whole
 @entry_point
 def append_row(count: IntArray, rows: Array, row: Array) -> None:
     """Compiled `Ring.append`."""
-    place = count[0] % len(rows)
+    index = count[0] % len(rows)
     for i in range(len(row)):
-        rows[place, i] = row[i]
+        rows[index, i] = row[i]
     barrier()
     count[0] += 1
 
 
-class _Shared:
+class _SharedArray:
     """Shared memory of an integer, `count`, and an array, `numbers`; a process may end without closing it.
 
     Other references to `count` and `numbers` must be dropped before the memory is closed.
@@ -36,17 +36,17 @@ class _Shared:
 
     def __init__(self, shape: tuple[int, ...], name: str | None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (math.prod(shape) + 1))
-        self._owner = name is None
+        self._is_owner = name is None
         self.count: IntArray = np.ndarray(1, np.int64, self._memory.buf)
         self.numbers: Array = np.ndarray(shape, np.float64, self._memory.buf, 8)
-        if self._owner:
+        if self._is_owner:
             self.count[0] = 0
             self.numbers[:] = 0.0
 
     def close(self) -> None:
         """Unmap the memory; the object that created it also removes it."""
         self._unmap()
-        if self._owner:
+        if self._is_owner:
             self._memory.unlink()
 
     def __del__(self) -> None:
@@ -59,7 +59,7 @@ class _Shared:
         self._memory.close()
 
 
-class SharedNumbers(_Shared):
+class SharedNumbers(_SharedArray):
     """Numbers that one process writes and others read, always consistently.
 
     By a sequence lock: the writer increments the count to an odd number, writes, and increments it to an even one; a
@@ -90,7 +90,7 @@ class SharedNumbers(_Shared):
         return read_whole(self.count, self.numbers, self.whole, into)
 
 
-class Ring(_Shared):
+class Ring(_SharedArray):
     """A ring buffer of rows that one process appends and another takes; a slow reader loses the oldest rows.
 
     Parameters
@@ -103,7 +103,7 @@ class Ring(_Shared):
 
     def __init__(self, rows: int, width: int, name: str | None = None):
         super().__init__((rows, width), name)
-        self._shape, self._taken = (rows, width), 0
+        self._shape, self._taken_count = (rows, width), 0
 
     def __reduce__(self) -> tuple[type[Self], tuple[int, int, str]]:
         return type(self), (*self._shape, self._memory.name)
@@ -122,10 +122,10 @@ class Ring(_Shared):
         lost : int
             Number of rows before them that were overwritten.
         """
-        rows, first, count = self._shape[0], self._taken, int(self.count[0])
-        begin = max(first, count - rows + 1)
+        rows, taken_count, count = self._shape[0], self._taken_count, int(self.count[0])
+        begin = max(taken_count, count - rows + 1)
         taken = self.numbers[np.arange(begin, count) % rows]
         # Drop rows overwritten during the copy, including the one being written now.
-        sound = max(begin, int(self.count[0]) - rows + 1)
-        self._taken = count
-        return taken[min(sound, count) - begin :], min(sound, count) - first
+        first_valid = max(begin, int(self.count[0]) - rows + 1)
+        self._taken_count = count
+        return taken[min(first_valid, count) - begin :], min(first_valid, count) - taken_count

@@ -73,9 +73,9 @@ def momentum_residual(
         if memory[_STARTED] == 0.0:
             memory[_INTEGRAL + i] = momentum
             continue
-        turned = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
+        coriolis = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
         friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / SLOW)
-        memory[_INTEGRAL + i] += period * (torque[i] + turned - n[i] - friction)
+        memory[_INTEGRAL + i] += period * (torque[i] + coriolis - n[i] - friction)
         memory[i] = gain * (momentum - memory[_INTEGRAL + i]) / (1.0 + gain * period)
         memory[_INTEGRAL + i] += period * memory[i]
     memory[_STARTED] = 1.0
@@ -120,7 +120,7 @@ class TwinMemory(NamedTuple):
 
 @njit
 def _predict(twin: TwinMemory, predicted: Array) -> None:
-    """Write the joint angles after a period of the model to `predicted` (3,), and the rates to the twin's state."""
+    """Advance the model by a period; writes the joint angles to `predicted` (3,), and the rates to the twin's state."""
     q, w, plant = twin.theta, twin.rate, twin.plant
     angles = (q[0], q[1], q[2], q[2] - q[1], q[1] - q[2])
     speeds = (w[0], w[1], w[2], w[2] - w[1], w[1] - w[2])
@@ -147,12 +147,12 @@ def tip_force(theta: tuple[float, float, float], torque: Array, force: Array) ->
     cx = j[0][1] * j[1][2] - j[0][2] * j[1][1]
     cy = j[0][2] * j[1][0] - j[0][0] * j[1][2]
     cz = j[0][0] * j[1][1] - j[0][1] * j[1][0]
-    size = j[0][0] * ax + j[0][1] * ay + j[0][2] * az
-    share = 1.0 / size if abs(size) > 1e-6 else 0.0
+    determinant = j[0][0] * ax + j[0][1] * ay + j[0][2] * az
+    scale = 1.0 / determinant if abs(determinant) > 1e-6 else 0.0
     force_P = (
-        share * (ax * torque[0] + ay * torque[1] + az * torque[2]),
-        share * (bx * torque[0] + by * torque[1] + bz * torque[2]),
-        share * (cx * torque[0] + cy * torque[1] + cz * torque[2]),
+        scale * (ax * torque[0] + ay * torque[1] + az * torque[2]),
+        scale * (bx * torque[0] + by * torque[1] + bz * torque[2]),
+        scale * (cx * torque[0] + cy * torque[1] + cz * torque[2]),
     )
     force[0], force[1], force[2] = vector_to_hand_frame(force_P)
 
@@ -162,22 +162,22 @@ def follow_rows(
     twin: TwinMemory, numbers: Array, theta: Array, torque: Array, predicted: Array, apart: Array, force: Array
 ) -> None:
     """Advance the twin by n ticks; writes `predicted` (n, 3), `apart` (n,) and `force` (n, 3) (`TWIN_CHANNELS`)."""
-    ahead = np.zeros(3)
+    prediction = np.zeros(3)
     for k in range(len(numbers)):
         if numbers[k] == twin.last[0] + 1.0:
-            _predict(twin, ahead)
+            _predict(twin, prediction)
         else:
-            ahead[:] = theta[k]
+            prediction[:] = theta[k]
             twin.rate[:] = 0.0
             twin.residual[:] = 0.0
         for i in range(3):
-            error = theta[k, i] - ahead[i]
-            twin.theta[i] = ahead[i] + twin.of_angle * error
+            error = theta[k, i] - prediction[i]
+            twin.theta[i] = prediction[i] + twin.of_angle * error
             twin.rate[i] += twin.of_rate * error
         q = (twin.theta[0], twin.theta[1], twin.theta[2])
         w = (twin.rate[0], twin.rate[1], twin.rate[2])
         momentum_residual(twin.residual, q, w, twin.torque, twin.plant.period, RESIDUAL_GAIN)
-        a = vector_to_hand_frame(forward_kinematics((ahead[0], ahead[1], ahead[2])))
+        a = vector_to_hand_frame(forward_kinematics((prediction[0], prediction[1], prediction[2])))
         b = vector_to_hand_frame(forward_kinematics((theta[k, 0], theta[k, 1], theta[k, 2])))
         apart[k] = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
         predicted[k, 0], predicted[k, 1], predicted[k, 2] = a
@@ -187,7 +187,7 @@ def follow_rows(
 
 
 class Twin:
-    """A simulated Phantom that runs in parallel to a device.
+    """A simulated Phantom that runs in parallel with a device.
 
     Parameters
     ----------

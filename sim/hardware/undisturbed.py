@@ -1,4 +1,4 @@
-"""Start of processes that Ctrl-C does not end, and how they see that whoever started them is gone."""
+"""Starting processes that Ctrl-C does not end, and finding the parent of a process, also after it has ended."""
 
 import multiprocessing
 import os
@@ -8,16 +8,16 @@ from multiprocessing.process import BaseProcess
 
 
 def start_undisturbed(process: BaseProcess) -> None:
-    """Start a process with SIGINT blocked, also while it imports: whoever started it tells it when to end."""
-    resource_tracker.ensure_running()  # now, since the first process that is spawned starts it, which unblocks SIGINT
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    """Start a process with SIGINT blocked, also during its imports: only its parent ends it."""
+    resource_tracker.ensure_running()  # otherwise spawning the first process would start it, and unblock SIGINT
+    old_mask = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
     try:
         process.start()
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, old_mask)
 
 
 def parent_id() -> int:
-    """Id of the process that started this one, as it said itself; `os.getppid` is another once that one is gone."""
+    """Id of the process that started this one, as passed by it; `os.getppid` differs once that process has ended."""
     parent = multiprocessing.parent_process()
     return os.getppid() if parent is None or parent.pid is None else parent.pid

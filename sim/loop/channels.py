@@ -1,4 +1,4 @@
-"""Recorded channels of a run, by the body that follows the hand, and the observer of a `Loop` that appends them."""
+"""Recorded channels of a run, depending on the body that follows the hand, and the observer that records them."""
 
 from collections.abc import Callable
 
@@ -77,34 +77,34 @@ def channels(servo: Servo, world: World) -> Channels:
     body, root, names = servo.figure, world.pose_at, groups(servo)
     arm = mujoco.MjData(world.body) if isinstance(body, RobotState) else None
 
-    def of_block(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
+    def block_channels(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
         m = -(-n // servo.figure_ticks)
-        of_ticks = tick_channels(ticks, n)
+        tick_arrays = tick_channels(ticks, n)
         if isinstance(body, FigureState):
-            of_frames = frame_channels(frames, m, root)
+            frame_arrays = frame_channels(frames, m, root)
         else:
-            of_frames = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
+            frame_arrays = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
         if arm is not None:
             joints = frames.qpos[:m, root : root + len(world.body.qpos0)]
-            of_frames |= {
+            frame_arrays |= {
                 "joints": joints, "tool": tool_positions(world.body, arm, joints),
                 "led": tool_positions(world.body, arm, frames.reference[:m]),
                 "saturated": frames.report[:m, REPORT_SATURATED],
             }  # fmt: skip
         return {
-            "ticks": {name: of_ticks[name] for name in names["ticks"].channels},
-            "frames": {name: of_frames[name] for name in names["frames"].channels},
+            "ticks": {name: tick_arrays[name] for name in names["ticks"].channels},
+            "frames": {name: frame_arrays[name] for name in names["frames"].channels},
         }
 
-    return of_block
+    return block_channels
 
 
 def record_into(recorder: Recorder, servo: Servo, world: World) -> Callable[[TickLog, FrameLog, int], None]:
     """An observer that appends every block to a recorder made with `groups`."""
-    of_block = channels(servo, world)
+    block_channels = channels(servo, world)
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
-        for group, block in of_block(ticks, frames, n).items():
+        for group, block in block_channels(ticks, frames, n).items():
             recorder.append(group, block)
 
     return observe

@@ -1,4 +1,4 @@
-"""Real-time pacing: simulated time held to the wall clock, for a person who watches."""
+"""Real-time pacing: simulated time kept in step with the wall clock, for a person who watches."""
 
 import time
 

@@ -21,7 +21,7 @@ BLOCK_SECONDS = 0.2  # simulated time of a block [s]: the clock and the recorder
 
 
 class RunTimes(NamedTuple):
-    """How fast a run was.
+    """Speed of a run.
 
     Attributes
     ----------
@@ -105,16 +105,16 @@ class Loop:
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
-        self._block = every * max(1, round(block_seconds / servo.plant.period / every))
+        self._block_ticks = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
-        self._one: tuple[TickLog, FrameLog] | None = None
-        self._slots: list[int] = servo.field.slots.tolist()
+        self._step_logs: tuple[TickLog, FrameLog] | None = None
+        self._law_slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
         self._before_tick = before_tick
         self._ask, self._ask_ticks = ask, every * max(1, -int(-ask_seconds / servo.plant.period // every))
-        if len(self._laws) != len(self._slots):
+        if len(self._laws) != len(self._law_slots):
             raise SimError(
-                f"the field has {len(self._slots)} slots for laws in Python, {len(self._laws)} are given; "
+                f"the field has {len(self._law_slots)} slots for laws in Python, {len(self._laws)} are given; "
                 "expected the program's python_laws"
             )
 
@@ -136,52 +136,52 @@ class Loop:
         Raises
         ------
         SimError
-            If the device cannot deliver that many ticks: a replayed hand ends.
+            If the device cannot deliver that many ticks, because a replayed hand ends.
         """
         plant, every = self.servo.plant, self.servo.figure_ticks
-        wanted = every * round(seconds / (plant.period * every))
-        left, first = ticks_of(self.servo.device), self._tick
-        if left is not None and first + wanted > left:
-            end, rest = (first + wanted) * plant.period, (left - first) * plant.period
+        requested = every * round(seconds / (plant.period * every))
+        limit, first = ticks_of(self.servo.device), self._tick
+        if limit is not None and first + requested > limit:
+            end, rest = (first + requested) * plant.period, (limit - first) * plant.period
             raise SimError(
-                f"the replayed hand ends after {left} ticks ({left * plant.period:g} s), the run would end after "
+                f"the replayed hand ends after {limit} ticks ({limit * plant.period:g} s), the run would end after "
                 f"{end:g} s; ask for {rest:g} s or less"
             )
-        ticks, frames = make_logs(self.servo, self._block)
+        ticks, frames = make_logs(self.servo, self._block_ticks)
         begin = time.perf_counter()
-        while self._tick < first + wanted:
-            n = min(self._block, first + wanted - self._tick)
+        while self._tick < first + requested:
+            n = min(self._block_ticks, first + requested - self._tick)
             if self._ask is not None:
                 n = min(n, self._ask_ticks - self._tick % self._ask_ticks)
-                self._asked()
+                self._ask_if_due()
             self._run_block(n, ticks, frames)
             self._tick += n
             self._observe(ticks, frames, n)
             progress(self.time)
-        return RunTimes(wanted * plant.period, time.perf_counter() - begin)
+        return RunTimes(requested * plant.period, time.perf_counter() - begin)
 
     def step(self) -> tuple[TickLog, FrameLog]:
         """Run one tick; its logs have one row each: this tick, and the figure's last update."""
-        if self._one is None:
-            self._one = make_logs(self.servo, 1)
-        ticks, frames = self._one
-        self._asked()
+        if self._step_logs is None:
+            self._step_logs = make_logs(self.servo, 1)
+        ticks, frames = self._step_logs
+        self._ask_if_due()
         self._run_block(1, ticks, frames)
         self._tick += 1
         return ticks, frames
 
-    def _asked(self) -> None:
+    def _ask_if_due(self) -> None:
         if self._ask is not None and self._tick % self._ask_ticks == 0:
             self._ask(self.time)
 
     def _run_block(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
-        with _raising_lost_interrupts():
+        with _reraise_lost_interrupts():
             if self._laws or self._before_tick is not None:
-                self._run_with_laws(n, ticks, frames)
+                self._run_tick_by_tick(n, ticks, frames)
             else:
                 run_block(self.servo, self._tick, n, False, ticks, frames)
 
-    def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
+    def _run_tick_by_tick(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
         servo, every = self.servo, self.servo.figure_ticks
         for k in range(n):
             tick, row = self._tick + k, k // every
@@ -189,7 +189,7 @@ class Loop:
                 self._before_tick(tick)
             read_device(servo.device, tick * servo.plant.period)
             hand = HandState.of(servo.device.hand)
-            for slot, law in zip(self._slots, self._laws, strict=True):
+            for slot, law in zip(self._law_slots, self._laws, strict=True):
                 servo.field.memory[slot : slot + 6] = law(hand)
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
@@ -197,27 +197,27 @@ class Loop:
 
 
 @contextmanager
-def _raising_lost_interrupts() -> Generator[None]:
-    """Raise, at the end of the block, a KeyboardInterrupt that left a C callback of the tick, as a map in Python has.
+def _reraise_lost_interrupts() -> Generator[None]:
+    """Raise a KeyboardInterrupt that ctypes dropped in a callback of a tick, such as a map in Python, after the block.
 
-    One that came while compiled code ran is raised where the callback begins, before it can catch anything; ctypes
-    then ignores it, and tells `sys.unraisablehook`.
+    An interrupt during compiled code is raised where the next callback begins, before its code can catch anything;
+    ctypes then drops it and only reports it to `sys.unraisablehook`.
     """
-    if threading.current_thread() is not threading.main_thread():  # others get no signals
+    if threading.current_thread() is not threading.main_thread():  # other threads get no signals
         yield
         return
-    before, lost = sys.unraisablehook, list[BaseException]()
+    old_hook, lost = sys.unraisablehook, list[BaseException]()
 
-    def noted(told: Any) -> None:
-        if isinstance(told.exc_value, KeyboardInterrupt):
-            lost.append(told.exc_value)
+    def keep_interrupts(unraisable: Any) -> None:
+        if isinstance(unraisable.exc_value, KeyboardInterrupt):
+            lost.append(unraisable.exc_value)
         else:
-            before(told)
+            old_hook(unraisable)
 
-    sys.unraisablehook = noted
+    sys.unraisablehook = keep_interrupts
     try:
         yield
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = old_hook
     if lost:
         raise lost[0]

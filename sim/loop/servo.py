@@ -45,9 +45,9 @@ class Field(NamedTuple):
     """A compiled field, its limiter and its energy tank: program, parameters, memory, and the last wrench and force.
 
     `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), empty until they are linked.
-    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` are the haptic
-    maps whose values laws are given (see `controllers.fields.algebra.map_feed`), `walkers` the state of figures that
-    are led, which laws and the map read.
+    `slots` are the places in `memory` where laws in Python put their wrenches. `maps` are the haptic maps whose values
+    are passed to laws (see `controllers.fields.algebra.map_feed`), `walkers` the state of led figures, which laws and
+    the map read.
     """
 
     units: IntArray
@@ -84,10 +84,10 @@ def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) ->
 
 def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, Maps, Walkers]:
     """The first seven attributes of a `Field`, those that depend on the program."""
-    slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
+    slots, no_units = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
     memory, maps = program.fresh_memory(), unlinked_maps(program.map_feeds)
     walkers = fresh_walkers(program.walker_feeds)
-    return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps, walkers
+    return no_units, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps, walkers
 
 
 class Servo(NamedTuple):
@@ -195,8 +195,8 @@ def field_force(servo: Servo) -> None:
 
 
 @njit
-def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
-    """`run_block` on a servo and logs that are lent."""
+def _run_ticks(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """`run_block` on a lent servo and lent logs (`controllers.lent`)."""
     plant, device, every, trace = servo.plant, servo.device, servo.figure_ticks, servo.field.memory[:TRACE_SIZE]
     for k in range(n):
         t = (first + k) * plant.period
@@ -249,7 +249,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     ticks, frames : TickLog, FrameLog
         Written (or read, see `replay`) row by row.
     """
-    _run(lend(servo), first, n, replay, lend(ticks), lend(frames))
+    _run_ticks(lend(servo), first, n, replay, lend(ticks), lend(frames))
 
 
 def rearm_servo(servo: Servo) -> None:

@@ -12,7 +12,7 @@ from sim.world.world import World
 
 Array = npt.NDArray[Any]
 
-_NOT_STATE = {"params", "ops", "units", "maps", "feeds", "slots", "limits", "budget"}
+_CONSTANT_FIELDS = {"params", "ops", "units", "maps", "feeds", "slots", "limits", "budget"}
 """Fields of a servo's parts that are constant during a run."""
 
 
@@ -40,7 +40,7 @@ def state_arrays(part: object) -> Iterator[Array]:
         return
     names = getattr(part, "_fields", ("",) * len(cast(tuple[object, ...], part)))
     for name, value in zip(names, cast(tuple[object, ...], part), strict=True):
-        if name in _NOT_STATE:
+        if name in _CONSTANT_FIELDS:
             continue
         if isinstance(value, np.ndarray):
             yield cast(Array, value)
@@ -57,6 +57,6 @@ def kept_state(servo: Servo, world: World, tick: int) -> KeptState:
 
 def put_back(servo: Servo, world: World, state: KeptState) -> None:
     """Restore a saved state of servo and world."""
-    for array, kept in zip(state_arrays(servo), state.arrays, strict=True):
-        array[...] = kept
+    for array, saved in zip(state_arrays(servo), state.arrays, strict=True):
+        array[...] = saved
     mujoco.mj_copyData(world.data, world.model, state.data)

@@ -28,11 +28,11 @@ from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_
 from sim.recording.unclosed import held
 
 CHUNK_SECONDS = 0.5  # [s] of rows that a killed run can lose, besides rows not yet appended
-# A write is copied page by page, and a kill between two pages tears whatever crosses them. With this page size HDF5's
-# own structures stay within a page (up to 8176 chunks, more than an hour); rows need not.
+# A write is copied page by page, and a kill between two pages corrupts what crosses their boundary. With this page size
+# HDF5's own structures stay within a page (up to 8176 chunks, more than an hour); rows need not.
 PAGE = 4096
 DISK_RESERVE = 4_000_000  # [bytes] kept free on the disk, for structures and summary of the file
-_KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
+_PARTIAL_KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
 
 
@@ -76,7 +76,7 @@ def _check_room(path: Path, size: int) -> None:
     """Check that after writing `size` [bytes] the disk has room to close the file; raises `DiskFull` otherwise."""
     free = shutil.disk_usage(path.parent).free
     if free < size + DISK_RESERVE:
-        raise DiskFull(f"{path}: the disk is full ({free / 1e6:.0f} MB free); {_KEPT}")
+        raise DiskFull(f"{path}: the disk is full ({free / 1e6:.0f} MB free); {_PARTIAL_KEPT}")
 
 
 class _Stream:
@@ -88,7 +88,7 @@ class _Stream:
         self._rows = dataset_of(node, "rows")
         self._buffers = {name: np.empty((group.chunk, *shape)) for name, shape in group.channels.items()}
         self._chunk = group.chunk
-        self._filled = 0
+        self._buffered = 0
         self._written = 0
 
     def append(self, blocks: Mapping[str, Array]) -> None:
@@ -101,58 +101,58 @@ class _Stream:
                 raise RecordingError(f"{self._name}/{name}: shape is {np.shape(block)}; expected {expected}")
         start = 0
         while start < n:
-            stop = min(n, start + self._chunk - self._filled)
-            filled = self._filled + stop - start
+            stop = min(n, start + self._chunk - self._buffered)
+            filled = self._buffered + stop - start
             for name, block in blocks.items():
-                self._buffers[name][self._filled : filled] = block[start:stop]
-            self._filled, start = filled, stop
+                self._buffers[name][self._buffered : filled] = block[start:stop]
+            self._buffered, start = filled, stop
             if filled == self._chunk:
                 self.flush()
 
     def flush(self) -> None:
         """Write the buffered rows, and then raise the row count."""
-        if self._filled == 0:
+        if self._buffered == 0:
             return
         _check_room(self._path, sum(buffer.nbytes for buffer in self._buffers.values()))
         try:
             self._write()
-        except (OSError, RuntimeError) as error:  # such as a quota, which `_check_room` cannot see
-            said = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error).split("\n")[0]
-            raise DiskFull(f"{self._path}: cannot be written any further ({said}); {_KEPT}") from None
+        except (OSError, RuntimeError) as error:  # such as an exceeded quota, which `_check_room` cannot see
+            why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error).split("\n")[0]
+            raise DiskFull(f"{self._path}: cannot be written any further ({why}); {_PARTIAL_KEPT}") from None
 
     def _write(self) -> None:
-        total = self._written + self._filled
+        total = self._written + self._buffered
         for name, buffer in self._buffers.items():
             dataset = self._datasets[name]
             dataset.id.set_extent((total, *buffer.shape[1:]))
             # Whole chunks are written directly: five times faster, and HDF5's cache does not grow.
-            if self._filled == self._chunk and self._written % self._chunk == 0:
+            if self._buffered == self._chunk and self._written % self._chunk == 0:
                 dataset.id.write_direct_chunk((self._written, *[0] * (buffer.ndim - 1)), buffer)
             else:
-                dataset[self._written : total] = buffer[: self._filled]
+                dataset[self._written : total] = buffer[: self._buffered]
             dataset.flush()
         self._rows[0] = total
         self._rows.flush()
-        self._written, self._filled = total, 0
+        self._written, self._buffered = total, 0
 
 
-def _spelled(value: object) -> object:
-    """Plain data in which an infinite number, which JSON lacks, is the text "Infinity", with its sign."""
+def _to_json(value: object) -> object:
+    """Plain data with infinite numbers, which JSON lacks, replaced by the text "Infinity" with its sign."""
     if isinstance(value, float) and math.isinf(value):
         return "Infinity" if value > 0.0 else "-Infinity"
     if isinstance(value, Mapping):
-        return {key: _spelled(inner) for key, inner in cast(Mapping[object, object], value).items()}
+        return {key: _to_json(item) for key, item in cast(Mapping[object, object], value).items()}
     if isinstance(value, list | tuple):
-        return [_spelled(inner) for inner in cast(Sequence[object], value)]
+        return [_to_json(item) for item in cast(Sequence[object], value)]
     return value
 
 
 def _write_header(
     file: h5py.File, config: Mapping[str, object], seed: int, static: Mapping[str, npt.ArrayLike | str]
 ) -> None:
-    file["config"] = json.dumps(_spelled(config), allow_nan=False)
-    made_by = {"python": platform.python_version(), "processor": get_host_cpu_name()}
-    file["versions"] = json.dumps(made_by | {p: version(p) for p in _PACKAGES})
+    file["config"] = json.dumps(_to_json(config), allow_nan=False)
+    versions = {"python": platform.python_version(), "processor": get_host_cpu_name()}
+    file["versions"] = json.dumps(versions | {p: version(p) for p in _PACKAGES})
     file["seed"] = seed
     node = file.create_group("static")
     for name, value in static.items():
@@ -207,22 +207,22 @@ class Recorder:
     ):
         if path.exists():
             raise RecordingError(f"{path}: exists; a recording is never overwritten, choose another name")
-        draft = path.with_name(f".{path.name}.{os.getpid()}")
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")
         try:
-            with h5py.File(draft, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE) as file:
+            with h5py.File(temporary, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE) as file:
                 _write_header(file, config, seed, static)
                 for name, group in groups.items():
                     _write_group(file.create_group(name), group)
-            draft.rename(path)
+            temporary.rename(path)
         finally:
-            draft.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         # Opened in single-writer mode directly: if it were opened first and switched then, a kill in between would
         # leave the file marked as unreadable.
         access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
         self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
-        self._held = held(path)
+        self._lock = held(path)
         self._streams = {name: _Stream(group, group_of(self._file, name), path) for name, group in groups.items()}
 
     def append(self, group: str, blocks: Mapping[str, Array]) -> None:
@@ -262,19 +262,19 @@ class Recorder:
             dataset.flush()
             count[0] = len(text)
         self._file.close()
-        os.close(self._held)
+        os.close(self._lock)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         if isinstance(error, DiskFull):
-            self._end()
+            self._close_unflushed()
         else:
             self.close()
 
-    def _end(self) -> None:
+    def _close_unflushed(self) -> None:
         """Close the file without writing the buffers, as far as a full disk permits."""
         with suppress(OSError, RuntimeError):
             self._file.close()
-        os.close(self._held)
+        os.close(self._lock)

@@ -49,11 +49,11 @@ def _first_line(error: Exception) -> str:
     return str(error).split("\n")[0]
 
 
-def _names(node: h5py.Group) -> list[str]:
+def _members(node: h5py.Group) -> list[str]:
     return [str(name) for name in node]
 
 
-def _opened(path: Path) -> h5py.File:
+def _open_file(path: Path) -> h5py.File:
     """Open the file: in SWMR mode while its writer lives, else as the writer left it (`sim.recording.unclosed`)."""
     head = superblock(path)
     if head is None:
@@ -65,7 +65,7 @@ def _opened(path: Path) -> h5py.File:
     return h5py.File(path if head.whole else AsClosed(path, head.closed), "r")
 
 
-def _missing(path: Path) -> str:
+def _truncation(path: Path) -> str:
     """Text for a message that says how many bytes a file lacks at its end; empty if it is complete."""
     head = superblock(path)
     return "" if head is None or head.size >= head.end else f", cut short: {head.size} bytes of {head.end}"
@@ -97,12 +97,12 @@ class Channel:
         try:
             return self._dataset[rows]
         except (OSError, RuntimeError) as error:
-            where, said = f"{self._path}{_missing(self._path)}", _first_line(error)
-            raise RecordingError(f"{where}: {self._dataset.name} is damaged ({said})") from None
+            source, reason = f"{self._path}{_truncation(self._path)}", _first_line(error)
+            raise RecordingError(f"{source}: {self._dataset.name} is damaged ({reason})") from None
 
 
 class _Contents(dict[str, _T]):
-    """Contents of a recording by name; one that is missing is an error that names the file."""
+    """Contents of a recording by name; a missing name raises an error that names the file."""
 
     def __init__(self, path: Path, kind: str):
         super().__init__()
@@ -137,7 +137,7 @@ class Recording:
     static : dict
         Both.
     groups : dict
-        For each group its channels by name. What is missing of these is a `RecordingError`.
+        For each group its channels by name. A missing name raises a `RecordingError`.
     rates : dict
         For each group its rate [Hz].
 
@@ -150,16 +150,16 @@ class Recording:
     def __init__(self, path: Path):
         self.path = path
         try:
-            self._file = _opened(path)
+            self._file = _open_file(path)
         except OSError as error:
-            said = (error.strerror or _first_line(error)) if path.exists() else "there is no such file"
-            raise RecordingError(f"{path}: cannot be opened ({said}); expected the run.h5 of a run") from None
+            reason = (error.strerror or _first_line(error)) if path.exists() else "there is no such file"
+            raise RecordingError(f"{path}: cannot be opened ({reason}); expected the run.h5 of a run") from None
         try:
             self._read()
         except (KeyError, OSError, RuntimeError, TypeError, ValueError, IndexError) as error:
             self._file.close()
-            said = _missing(path) or f", or damaged ({_first_line(error)})"
-            raise RecordingError(f"{path}: not a recording{said}; expected the run.h5 of a run") from None
+            reason = _truncation(path) or f", or damaged ({_first_line(error)})"
+            raise RecordingError(f"{path}: not a recording{reason}; expected the run.h5 of a run") from None
 
     def _read(self) -> None:
         file = self._file
@@ -172,7 +172,7 @@ class Recording:
         self.texts: dict[str, str] = _Contents(self.path, "text ")
         self.static: dict[str, Array | str] = _Contents(self.path, "array or text ")
         static = group_of(file, "static")
-        for name in _names(static):
+        for name in _members(static):
             value = dataset_of(static, name)[()]
             if isinstance(value, bytes):
                 self.texts[name] = value.decode()
@@ -180,21 +180,21 @@ class Recording:
                 self.arrays[name] = np.asarray(value, dtype=np.float64)
         self.static.update({**self.arrays, **self.texts})
         self.groups: dict[str, dict[str, Channel]] = _Contents(self.path, "group ")
-        nodes = {name: node for name in _names(file) if isinstance(node := file[name], h5py.Group) and "rate" in node}
+        nodes = {name: node for name in _members(file) if isinstance(node := file[name], h5py.Group) and "rate" in node}
         self.rates = {name: float(dataset_of(node, "rate")[()]) for name, node in nodes.items()}
         rows = {name: int(dataset_of(node, "rows")[0]) for name, node in nodes.items()}
         if summary:
-            last = np.inf
+            end_time = np.inf
         else:  # a run stopped between the writing of two groups is cut to the shorter one
-            last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
+            end_time = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
         for name, node in nodes.items():
-            n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
+            n = int(min(rows[name], np.ceil(end_time * self.rates[name] - 1e-6)))
             self.groups[name] = _Contents(self.path, f"channel {name}/")
-            for key in (key for key in _names(node) if key not in RESERVED):
+            for key in (key for key in _members(node) if key not in RESERVED):
                 channel = dataset_of(node, key)
-                has = channel.shape[0]
-                if has < rows[name] or (summary and has > rows[name]):  # a kill leaves rows that are not counted
-                    raise ValueError(f"{name}/{key} has {has} rows, {name}/rows says {rows[name]}")
+                count = channel.shape[0]
+                if count < rows[name] or (summary and count > rows[name]):  # a kill leaves rows that are not counted
+                    raise ValueError(f"{name}/{key} has {count} rows, {name}/rows says {rows[name]}")
                 self.groups[name][key] = Channel(channel, n, self.path)
 
     def channel(self, group: str, name: str) -> Channel:

@@ -1,7 +1,7 @@
 """HDF5 files that were not closed by their writer: distinguished from damaged ones, and read without waiting.
 
 HDF5 reads a file that is marked as being written with up to 100 attempts at every structure, with a waiting time that
-doubles each time: on a torn structure it waits for ever. So a file is opened in that mode only while its writer lives,
+doubles each time: on a torn structure it waits for ever. So a file is opened in that mode only while its writer runs,
 which holds a shared lock on it. A file whose writer is gone, or that is shorter than its header says, is read as if it
 had been closed at its present end: missing data then gives a read error at once.
 
@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_SIZE, _WRITING, _CHECKED = 48, 0b101, 44  # _WRITING: flags for opened for writing (bit 0) and in SWMR mode (bit 2)
-_END = 28
+_SUPERBLOCK_SIZE, _WRITING_FLAGS, _CHECKSUM_OFFSET = 48, 0b101, 44  # opened for writing (bit 0), in SWMR mode (bit 2)
+_END_OFFSET = 28
 
 
 class Superblock(NamedTuple):
@@ -43,7 +43,7 @@ class Superblock(NamedTuple):
     @property
     def being_written(self) -> bool:
         """Whether its writer has not closed it."""
-        return bool(self.head[11] & _WRITING)
+        return bool(self.head[11] & _WRITING_FLAGS)
 
     @property
     def whole(self) -> bool:
@@ -53,24 +53,24 @@ class Superblock(NamedTuple):
     @property
     def sound(self) -> bool:
         """Whether the superblock's checksum is right."""
-        return lookup3(self.head[:_CHECKED]) == int.from_bytes(self.head[_CHECKED:], "little")
+        return lookup3(self.head[:_CHECKSUM_OFFSET]) == int.from_bytes(self.head[_CHECKSUM_OFFSET:], "little")
 
     @property
     def closed(self) -> bytes:
         """The superblock that the file would have if it had been closed at its true size."""
         head = bytearray(self.head)
-        head[11] &= ~_WRITING
-        struct.pack_into("<Q", head, _END, self.size)
-        return bytes(head[:_CHECKED]) + lookup3(bytes(head[:_CHECKED])).to_bytes(4, "little")
+        head[11] &= ~_WRITING_FLAGS
+        struct.pack_into("<Q", head, _END_OFFSET, self.size)
+        return bytes(head[:_CHECKSUM_OFFSET]) + lookup3(bytes(head[:_CHECKSUM_OFFSET])).to_bytes(4, "little")
 
 
 def superblock(path: Path) -> Superblock | None:
     """Read the superblock of a file; None if it is no HDF5 file of these versions. OSError if it cannot be read."""
     with path.open("rb") as file:
-        head, size = file.read(_SIZE), os.fstat(file.fileno()).st_size
-    if len(head) < _SIZE or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):
+        head, size = file.read(_SUPERBLOCK_SIZE), os.fstat(file.fileno()).st_size
+    if len(head) < _SUPERBLOCK_SIZE or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):
         return None
-    return Superblock(head, struct.unpack_from("<Q", head, _END)[0], size)
+    return Superblock(head, struct.unpack_from("<Q", head, _END_OFFSET)[0], size)
 
 
 def held(path: Path) -> int:
@@ -116,10 +116,10 @@ class AsClosed(io.RawIOBase):
 
     def readinto(self, buffer: bytearray) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
         """See `io.RawIOBase`; the first 48 bytes are those of the given superblock."""
-        at = self._file.tell()
+        offset = self._file.tell()
         n = self._file.readinto(buffer)
-        if at < _SIZE:
-            part = self._head[at : at + n]
+        if offset < _SUPERBLOCK_SIZE:
+            part = self._head[offset : offset + n]
             memoryview(buffer).cast("B")[: len(part)] = part
         return n
 
@@ -132,26 +132,26 @@ class AsClosed(io.RawIOBase):
 def lookup3(data: bytes) -> int:
     """Bob Jenkins' hash lookup3 (``hashlittle``, 2006, public domain) with initial value 0, as used by HDF5."""
 
-    def rotated(x: int, k: int) -> int:
-        return ((x << k) | (x >> (32 - k))) & _WORD
+    def rotate(x: int, k: int) -> int:
+        return ((x << k) | (x >> (32 - k))) & _UINT32_MASK
 
-    a = b = c = (0xDEADBEEF + len(data)) & _WORD
+    a = b = c = (0xDEADBEEF + len(data)) & _UINT32_MASK
     blocks = max(0, -(-len(data) // 12) - 1)
     for i in range(blocks):
         x, y, z = struct.unpack_from("<III", data, 12 * i)
-        a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
+        a, b, c = (a + x) & _UINT32_MASK, (b + y) & _UINT32_MASK, (c + z) & _UINT32_MASK
         for k in (4, 6, 8, 16, 19, 4):
-            a = ((a - c) & _WORD) ^ rotated(c, k)
-            c = (c + b) & _WORD
+            a = ((a - c) & _UINT32_MASK) ^ rotate(c, k)
+            c = (c + b) & _UINT32_MASK
             a, b, c = b, c, a
     if not data:
         return c
     x, y, z = struct.unpack("<III", data[12 * blocks :].ljust(12, b"\0"))
-    a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
+    a, b, c = (a + x) & _UINT32_MASK, (b + y) & _UINT32_MASK, (c + z) & _UINT32_MASK
     for k in (14, 11, 25, 16, 4, 14, 24):
-        c = ((c ^ b) - rotated(b, k)) & _WORD
+        c = ((c ^ b) - rotate(b, k)) & _UINT32_MASK
         a, b, c = b, c, a
     return b
 
 
-_WORD = 0xFFFFFFFF
+_UINT32_MASK = 0xFFFFFFFF

@@ -58,12 +58,12 @@ def top_rates() -> Angles:
     a hand, for which they would mean 10 m/s and more at the tip.
     """
     ranges = PREMIUM_1_5.limit
-    of_arrays: Any = mass_matrix.py_func
-    inertia = of_arrays((0.0, *np.meshgrid(*(np.linspace(*ranges[i], 61) for i in (1, 2)))))
-    least = [np.min(inertia[i][i]) for i in range(3)]
+    mass_matrix_of: Any = mass_matrix.py_func
+    inertia = mass_matrix_of((0.0, *np.meshgrid(*(np.linspace(*ranges[i], 61) for i in (1, 2)))))
+    min_inertia = [np.min(inertia[i][i]) for i in range(3)]
     first, second, third = (
-        math.sqrt(2.0 * peak * (high - low) / lightest)
-        for peak, (low, high), lightest in zip(PEAK_TORQUE, ranges, least, strict=True)
+        math.sqrt(2.0 * peak * (high - low) / inertia_i)
+        for peak, (low, high), inertia_i in zip(PEAK_TORQUE, ranges, min_inertia, strict=True)
     )
     return first, second, third
 
@@ -130,7 +130,7 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
             j[2][0] * rate[0] + j[2][1] * rate[1] + j[2][2] * rate[2],
         )
     )
-    _turn_rate(hand, orientation, keep, period)
+    _update_angular_velocity(hand, orientation, keep, period)
     hand[HAND_TIME] = t
     for i in range(3):
         hand[HAND_POSITION + i] = p_H[i]
@@ -141,7 +141,7 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
 
 
 @njit
-def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
+def _update_angular_velocity(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
     """Low-pass the angular velocity in H, 2 vec(q q̄_last) / T for the small rotation of one period."""
     last = HAND_QUATERNION
     w, x, y, z = hand[last], -hand[last + 1], -hand[last + 2], -hand[last + 3]
@@ -177,15 +177,15 @@ def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: 
         Written [N m], shape (3,).
     """
     theta = (memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2])
-    wanted = joint_torques(theta, vector_to_device_frame((force[0], force[1], force[2])))
-    weight = gravity_torques(theta)
-    total = wanted[0] + wanted[1] + wanted[2]
+    force_torque = joint_torques(theta, vector_to_device_frame((force[0], force[1], force[2])))
+    gravity = gravity_torques(theta)
+    total = force_torque[0] + force_torque[1] + force_torque[2]
     if not np.isfinite(total):
         latch(faults, FORCE_NOT_FINITE, t, force[0] + force[1] + force[2])
     load = 0.0
     for i in range(3):
-        load = max(load, abs(wanted[i]) / COULOMB_FRICTION[i])
-        # For NaN, min(P, max(−P, τ)) would be −P, so after a fault the torque is set to zero explicitly.
-        trusted = faults[FAULT_CODE] == 0.0
-        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], wanted[i] + weight[i])) if trusted else 0.0
+        load = max(load, abs(force_torque[i]) / COULOMB_FRICTION[i])
+        # For NaN, min(P, max(−P, τ)) would be −P, so after a fault the torque is explicitly set to zero.
+        is_trusted = faults[FAULT_CODE] == 0.0
+        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], force_torque[i] + gravity[i])) if is_trusted else 0.0
     note_command(faults, t, load)

@@ -72,7 +72,7 @@ class World:
     def __post_init__(self) -> None:
         if self.kind not in get_args(BodyKind):
             raise SimError(f"kind is {self.kind!r}; expected one of {', '.join(get_args(BodyKind))}")
-        model, body = (copy(compiled) for compiled in _models(self.config, self.kind))
+        model, body = (copy(compiled) for compiled in _compiled_models(self.config, self.kind))
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "data", mujoco.MjData(model))
         object.__setattr__(self, "body", body)
@@ -187,7 +187,7 @@ def place_stylus(
 
 
 @lru_cache(maxsize=8)
-def _models(config: SceneConfig, kind: BodyKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
+def _compiled_models(config: SceneConfig, kind: BodyKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
     """The compiled models of world and body, cached; every world takes a copy of them."""
     if kind == "robot":
         return robot_world_model(config), arm_model()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.bench.prepare_cost import _CLIPS, _captured
+from experiments.bench.prepare_cost import _CLIPS, _add_capture_errors
 from experiments.flights.ballistics import clip_flights
 from models.mocap.library import embedded
 from models.mocap.preparation.prepare import prepared
@@ -13,7 +13,7 @@ from models.mocap.readers.own_bvh import write_bvh
 
 @pytest.mark.parametrize("name", _CLIPS)
 def test_a_clip_with_errors_has_the_faults_of_a_capture(name):
-    clip = _captured(embedded(name), np.random.default_rng(0))
+    clip = _add_capture_errors(embedded(name), np.random.default_rng(0))
     measures = well_formed(clip, clip_flights(clip))
     assert measures.skate > 0.015
     assert measures.residual > 0.12
@@ -22,7 +22,7 @@ def test_a_clip_with_errors_has_the_faults_of_a_capture(name):
 
 @pytest.mark.slow
 def test_what_the_bench_prepares_is_found_feasible(tmp_path):
-    write_bvh(_captured(embedded("walk"), np.random.default_rng(0)), tmp_path / "walk.bvh")
+    write_bvh(_add_capture_errors(embedded("walk"), np.random.default_rng(0)), tmp_path / "walk.bvh")
     made = prepared(tmp_path / "walk.bvh")
     assert made.near
     assert made.seconds > 0.0
