@@ -6,8 +6,8 @@ push wrenches on a stack (postfix notation), so that sums and blends of fields a
 
 The first `TRACE_SIZE` numbers of the memory are the trace of the last evaluation, which is recorded: ``[t*, c (3), d,
 row, attractor, river]``: phase, point and distance of the nearest curve, the row of its law, the phase of the
-attracting point (t* itself, or the bunny's), and the number of the active river of a higher-order field (−1 for none, or
-without such a field). With no curve near, d is infinite.
+attracting point (t* itself, or the bunny's), and the number of the active river of a higher-order field (−1 for none,
+or without such a field). With no curve near, d is infinite.
 """
 
 from collections.abc import Callable
