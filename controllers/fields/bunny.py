@@ -27,9 +27,7 @@ def _squared_distance(params: Array, curve: int, phase: float, p: Array) -> floa
     return (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
 
 
-_NEAREST_PHASE, _BUNNY_PHASE, _LAST_TIME, _MEMORY_SIZE = range(
-    4
-)  # t*, phase t_b of the bunny, time of the last tick [s]
+_NEAREST_PHASE, _BUNNY_PHASE, _LAST_TIME, _MEMORY_SIZE = range(4)  # t*, t_b, time of the last tick [s]
 
 
 class BunnyGains(NamedTuple):

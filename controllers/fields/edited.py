@@ -22,7 +22,9 @@ from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
 from controllers.work_array import work_array
 
 _NEAREST, _PERFORMANCE_TIME, _LAST_TIME, _MEMORY_SIZE = range(4)  # t* of φ', s, time of the last tick [s]
-_SAMPLE_INTERVAL = 0.01  # [s] of a performance: short compared with hand motion, long enough for encoder quantisation
+_SAMPLE_INTERVAL = (
+    0.01  # [s] of a performance: short compared with hand motion, long enough to limit quantisation noise
+)
 
 
 @njit

@@ -37,17 +37,7 @@ CLICK_TIME = 0.4  # [s] a shorter click undoes the last edit, a longer one redoe
 NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
 # Memory: phase t*, mode, time and position (3) of the last press, largest distance of the stylus from there, normal (3)
 # of a push, FOLLOW's gains (4), largest distance of a held point from the stylus, then the record of the curve.
-_PHASE, _MODE, _PRESS_TIME, _PRESS_POINT, _TRAVEL, _NORMAL, _GAINS, _OFFSET, _RECORD = (
-    0,
-    1,
-    2,
-    3,
-    6,
-    7,
-    10,
-    14,
-    15,
-)
+_PHASE, _MODE, _PRESS_TIME, _PRESS_POINT, _TRAVEL, _NORMAL, _GAINS, _OFFSET, _RECORD = 0, 1, 2, 3, 6, 7, 10, 14, 15
 
 
 class StretchyGains(NamedTuple):

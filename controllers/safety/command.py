@@ -26,7 +26,7 @@ from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 def command_force(
     limits: Array, limiter: Array, budget: Array, tank: Array, faults: Array, hand: Array, wrench: Array, force: Array
 ) -> None:
-    """Force commanded to a device at this tick; zero after a fault.
+    """Force commanded to a device at this tick; zero from a fault on.
 
     Parameters
     ----------

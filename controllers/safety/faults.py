@@ -99,25 +99,14 @@ CLOCK_BACK = int(Fault.CLOCK_BACK)
 # Layout of a device's `faults`: public values, internal state, limits.
 FAULT_CODE, FAULT_TIME, FAULT_VALUE, FAULT_GAPS, FAULT_LAST_GAP, FAULT_RAMP = range(6)
 _STARTED, _LAST_CLOCK, _ELAPSED, _SEQUENCE, _FRESH_TIME, _STILL_SINCE, _LOAD, _COMMAND_TIME = range(6, 14)
-_PERIOD, _MAX_RATE, _ENCODER_STEP, _SILENCE, _RAMP_TIME, _STILL_TIME, _STILL_LOAD, FAULT_SIZE = (
-    14,
-    15,
-    18,
-    21,
-    22,
-    23,
-    24,
-    25,
-)
+_PERIOD, _MAX_RATE, _COUNT, _SILENCE, _RAMP_TIME, _STILL_TIME, _STILL_LOAD, FAULT_SIZE = 14, 15, 18, 21, 22, 23, 24, 25
 
 NO_SEQUENCE = -1.0
 """Sequence number of readings of a device that does not number them."""
 HELD, TAKEN, RESTARTED = 0, 1, 2
 """What to do with a reading: keep the last one, use it, or use it and reset the velocity estimate."""
 
-_LATE_PERIODS = (
-    1.5  # [periods] interval between two readings from which their true time difference is used for the speed
-)
+_LATE_PERIODS = 1.5  # [periods] between two readings, from which their true time difference is used for the speed
 
 
 @njit
@@ -208,7 +197,7 @@ def judge_reading(  # noqa: C901 - one branch per kind of fault, the most seriou
     for i in range(3):
         turn = abs(theta[i] - last[i])
         moved = moved or turn > 0.0
-        if started and turn > faults[_MAX_RATE + i] * faults[_ELAPSED] + 2.0 * faults[_ENCODER_STEP + i]:
+        if started and turn > faults[_MAX_RATE + i] * faults[_ELAPSED] + 2.0 * faults[_COUNT + i]:
             latch(faults, RATE_IMPOSSIBLE, t, turn / faults[_ELAPSED])
             verdict = RESTARTED
     if moved or held or faults[_LOAD] <= faults[_STILL_LOAD]:
@@ -303,7 +292,7 @@ class Plausibility:
         faults = np.zeros(FAULT_SIZE)
         faults[FAULT_RAMP] = ramp
         faults[_FRESH_TIME] = faults[_COMMAND_TIME] = np.nan
-        faults[_PERIOD], faults[_MAX_RATE:_ENCODER_STEP], faults[_ENCODER_STEP:_SILENCE] = (
+        faults[_PERIOD], faults[_MAX_RATE:_COUNT], faults[_COUNT:_SILENCE] = (
             self.period,
             self.rates,
             self.steps,

@@ -77,7 +77,7 @@ class Law(ABC):
         """Sum of two fields."""
         of_kind("the other field", other, Law)
         first, second = self.program(), other.program()
-        if second.depth == STACK > first.depth:  # below it another wrench would be pending: it goes first
+        if second.depth == STACK > first.depth:  # evaluated second, it would overflow the stack
             first, second = second, first
         return first.joined(second, Join.ADD)
 
