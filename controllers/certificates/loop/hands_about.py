@@ -26,11 +26,15 @@ def states_about(curve: Trajectory, n: int = HANDS) -> States:
     rng = np.random.default_rng(_SEED)
     # Away from the ends of an open curve, where it may stand still.
     phases = curve.start + curve.duration * rng.uniform(0.01, 0.99, size=n)
-    away, drift = (rng.normal(size=(n, 3)) for _ in range(2))
-    away *= np.geomspace(NEAREST, FURTHEST, n)[rng.permutation(n), None] / np.linalg.norm(away, axis=1, keepdims=True)
-    drift *= np.geomspace(SLOWEST, FASTEST, n)[rng.permutation(n), None] / np.linalg.norm(drift, axis=1, keepdims=True)
+    offset, relative_velocity = (rng.normal(size=(n, 3)) for _ in range(2))
+    offset *= np.geomspace(NEAREST, FURTHEST, n)[rng.permutation(n), None] / np.linalg.norm(
+        offset, axis=1, keepdims=True
+    )
+    relative_velocity *= np.geomspace(SLOWEST, FASTEST, n)[rng.permutation(n), None] / np.linalg.norm(
+        relative_velocity, axis=1, keepdims=True
+    )
     pace = rng.choice([0.0, 0.5, 1.0, 1.5], size=(n, 1))
-    return States(phases, curve.point(phases) + away, pace * curve.velocity(phases) + drift)
+    return States(phases, curve.point(phases) + offset, pace * curve.velocity(phases) + relative_velocity)
 
 
 def hands_about(curve: Trajectory) -> list[HandState]:

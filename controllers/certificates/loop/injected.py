@@ -26,11 +26,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.state import Array
 
-BANDS = (
-    30.0,
-    100.0,
-    300.0,
-)  # [Hz] upper ends: hand motion and tremor; a tool on a table; what the skin feels
+BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; what the skin feels
 
 
 class Injection(NamedTuple):

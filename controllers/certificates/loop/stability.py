@@ -198,8 +198,8 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     Certified if, with every hand, three conditions hold. At every phase of a grid, k_r is below the critical value by
     more than the change of that value to the neighbouring phase; or, where the critical value jumps, the spectral
     radius is below 1 by more than its own change. Where the hand is carried round a closed curve, the Floquet
-    multipliers of the lap lie inside the unit circle. The loop is also
-    stable with all gains reduced by the same factor, as by the limiter. The margin is (critical k_r)/k_r − 1.
+    multipliers of the lap lie inside the unit circle. The loop is also stable with all gains reduced by the same
+    factor, as by the limiter. The margin is (critical k_r)/k_r − 1.
     """
     found = _evaluate_hands(river, hands)
     least, hand, at = found.worst(hands)

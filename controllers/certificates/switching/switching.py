@@ -191,14 +191,14 @@ class Keeping:
         score = math.sqrt(speed_error**2 + sharing.cost(distance, river.width))
         return Bounds(distance, speed, score, self._keeping_margin(distance, speed_error, score))
 
-    def _keeping_margin(self, distance: float, seen: float, score: float) -> float:
+    def _keeping_margin(self, distance: float, speed_error: float, score: float) -> float:
         """Distance of S from the values at which the river would lose the hand [m/s], for an error of at most E_s."""
         least = self.sharing.admission + self.sharing.hysteresis - score
         for other in self.rivals:
             inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
             inside_tube = inside > 0.0
             distance_cost = -6.0 * self.sharing.sigma**2 * np.log(inside[inside_tube])
-            rival_score = np.sqrt(np.maximum(0.0, other.least[inside_tube] - seen) ** 2 + distance_cost)
+            rival_score = np.sqrt(np.maximum(0.0, other.least[inside_tube] - speed_error) ** 2 + distance_cost)
             least = min(least, float(np.min(self.sharing.hysteresis + rival_score - score, initial=math.inf)))
         return least
 
