@@ -73,16 +73,16 @@ def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING, size: float
     verdicts: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(
-            ((name, of[kind]) for name, of in found), key=lambda pair: _SEVERITY_ORDER.index(pair[1].verdict)
+            ((name, by_kind[kind]) for name, by_kind in found), key=lambda pair: _SEVERITY_ORDER.index(pair[1].verdict)
         )
-        each = {name: of[kind].verdict for name, of in found}
-        listed = ", ".join(f"{clip} {outcome}" for clip, outcome in each.items())
+        outcomes = {name: by_kind[kind].verdict for name, by_kind in found}
+        listed = ", ".join(f"{clip} {outcome}" for clip, outcome in outcomes.items())
         figure_text = "" if size == 1.0 else f" by a figure of {size * DEFAULT_STATURE:g} m, times over {size**0.5:.2f}"
-        reason = f"{name}{figure_text}: {worst.reason}" + (f"; each: {listed}" if len(each) > 1 else "")
+        reason = f"{name}{figure_text}: {worst.reason}" + (f"; each: {listed}" if len(outcomes) > 1 else "")
         assumptions = (
-            (*worst.assumptions, _PACE_ASSUMPTION) if PLAYED not in each or len(each) > 1 else worst.assumptions
+            (*worst.assumptions, _PACE_ASSUMPTION) if PLAYED not in outcomes or len(outcomes) > 1 else worst.assumptions
         )
         verdicts[kind] = replace(
-            worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": each}
+            worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": outcomes}
         )
     return verdicts

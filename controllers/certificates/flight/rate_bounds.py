@@ -56,7 +56,7 @@ class RateBounds(NamedTuple):
         Returns
         -------
         low, high : array, shape (m,)
-            Least and greatest speed [m/s].
+            Smallest and largest speed [m/s].
 
         Raises
         ------

@@ -161,7 +161,7 @@ def _worst_state(program: Program, river: River, states: Sequence[States], hands
         law, smooth = differenced(plants[0][1], program, river, States(phases, p, v))
         fresh = program.fresh_memory()
         sizes = np.linalg.norm(
-            [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)], axis=1
+            [force_at(program, fresh, *state) for state in zip(p, v, phases.tolist(), strict=True)], axis=1
         )
         strongest = max(strongest, float(sizes[reachable].max(initial=0.0)))
         reachable &= np.logical_not(sizes >= _LIMIT_FRACTION * limit)

@@ -72,15 +72,18 @@ class Way:
         gap, true = casadi.SX(left - right), _TRUE_SIGNS[kind]
         if gap.is_constant():
             return (float(gap) > 0.0) - (float(gap) < 0.0) in true and float(gap) == float(gap)
-        signs = next((left for of, left in reversed(self._possible_signs) if identical(of, gap)), frozenset((-1, 0, 1)))
+        signs = next(
+            (left for known_gap, left in reversed(self._possible_signs) if identical(known_gap, gap)),
+            frozenset((-1, 0, 1)),
+        )
         if signs <= true or not signs & true:
             return signs <= true
         at = len(self.conditions)
         if at >= MOST_CONDITIONS:
             self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
         holds = self.given[at] if at < len(self.given) else True
-        left_over = signs & true if holds else signs - true
-        self._possible_signs += ((gap, left_over), (casadi.SX(right - left), frozenset(-sign for sign in left_over)))
+        remaining = signs & true if holds else signs - true
+        self._possible_signs += ((gap, remaining), (casadi.SX(right - left), frozenset(-sign for sign in remaining)))
         self.conditions.append(Condition(gap, kind, holds))
         return holds
 

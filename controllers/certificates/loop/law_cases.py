@@ -73,13 +73,13 @@ class Cases:
     @cached_property
     def chosen(self) -> Any:
         """CasADi function (p, v) → force (3,), NaN where no case holds, and the number of the case."""
-        force, which = casadi.SX(np.full(3, np.nan)), casadi.SX(-1.0)
+        force, case_number = casadi.SX(np.full(3, np.nan)), casadi.SX(-1.0)
         for number, case in enumerate(self.cases):
             holds = casadi.SX(1.0)
             for condition in case.conditions:
                 holds = casadi.logic_and(holds, condition.symbol())
-            force, which = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, which)
-        return casadi.Function("chosen", [self.p, self.v], [force, which])
+            force, case_number = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, case_number)
+        return casadi.Function("chosen", [self.p, self.v], [force, case_number])
 
     def scaled(self, factor: float) -> "Cases":
         """The law times a number, under the same conditions."""

@@ -179,8 +179,8 @@ class Keeping:
             if not (math.isfinite(distance + speed) and distance < river.width):
                 return unbounded
             share = float(window((distance / river.width) ** 2))
-            own_law = river.k_r * distance + river.b_d * speed
-            force = push + own + own_law * (1.0 - share)
+            law_force = river.k_r * distance + river.b_d * speed
+            force = push + own + law_force * (1.0 - share)
             updated = by_force * force, by_speed * force + self.noise
             if abs(updated[0] - distance) < 1e-12 and abs(updated[1] - speed) < 1e-12:
                 break
