@@ -1,4 +1,4 @@
-"""Ctrl-C while CasADi works."""
+"""Ctrl-C while CasADi computes."""
 
 import signal
 import threading
@@ -9,30 +9,30 @@ from types import FrameType
 
 @contextmanager
 def heeding_interrupts() -> Generator[None]:
-    """Raise, at the end of the block, a KeyboardInterrupt that has been lost within it.
+    """Raise, at the end of the block, a KeyboardInterrupt that was lost within it.
 
-    CasADi looks for signals while it evaluates and throws, which stops IPOPT; but IPOPT reports it as one more way not
-    to find a solution, and the making of derivatives tries another way: Python has forgotten the signal by then.
+    CasADi checks for signals while it evaluates, and throws. IPOPT stops then, but reports an ordinary failure to find
+    a solution; and code that generates derivatives tries another method. By then Python has lost the signal.
 
     Raises
     ------
     KeyboardInterrupt
-        If SIGINT came and is handled by Python, in the main thread.
+        If SIGINT arrived in the main thread and Python handles it.
     """
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
+    previous_handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(previous_handler):
         yield
         return
-    came = threading.Event()
+    interrupted = threading.Event()
 
-    def noted(number: int, frame: FrameType | None) -> None:
-        came.set()
-        before(number, frame)
+    def record_interrupt(number: int, frame: FrameType | None) -> None:
+        interrupted.set()
+        previous_handler(number, frame)
 
-    signal.signal(signal.SIGINT, noted)
+    signal.signal(signal.SIGINT, record_interrupt)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-        if came.is_set():
+        signal.signal(signal.SIGINT, previous_handler)
+        if interrupted.is_set():
             raise KeyboardInterrupt

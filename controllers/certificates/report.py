@@ -29,23 +29,23 @@ class Verdict:
     Parameters
     ----------
     verdict : {"certified", "refuted", "unknown"}
-        Proved under the assumptions; violated, as the counterexample shows; or neither.
+        Proved under the assumptions; disproved by the counterexample; or neither.
     reason : str
         Explanation in one sentence with numbers.
     margin : float, optional
-        Distance from losing the property, in the unit that `reason` names; negative when refuted. None if there is no
+        Distance to the loss of the property, in the unit that `reason` names; negative if refuted. None if there is no
         such number.
     assumptions : tuple of str
-        Conditions of the verdict.
+        Conditions under which the verdict holds.
     counterexample : mapping
-        Initial state and whatever else a simulation needs to show the failure; only for a refuted property.
+        Initial state and anything else that a simulation needs to show the failure; only for a refuted property.
     figures : mapping
         Additional numbers and arrays: boundaries, spectra, bounds per phase.
 
     Raises
     ------
     CertificateError
-        If the verdict is not one of the three, or if it is refuted without a counterexample or has one otherwise.
+        If the verdict is not one of the three, if it is refuted without a counterexample, or if it has one otherwise.
     """
 
     verdict: Outcome
@@ -63,7 +63,7 @@ class Verdict:
 
 
 def leaving_out(verdict: Verdict, laws: Sequence[str]) -> Verdict:
-    """Verdict on a whole program from that on a part without some `laws`: certified becomes unknown.
+    """Verdict on a whole program, from the verdict on the program without some `laws`: certified becomes unknown.
 
     Refuted stays refuted, under the assumption that the omitted laws give no force there.
     """
@@ -92,9 +92,9 @@ class Certificate:
     parts: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def to_json(self) -> dict[str, Json]:
-        """The certificate for JSON: ``inputs``, ``parts`` and one entry per verdict. Non-finite numbers become null."""
+        """The certificate for JSON: ``inputs``, ``parts`` and one entry per verdict; non-finite numbers become null."""
         hashes: dict[str, Json] = {"inputs": self.inputs, "parts": {**self.parts}}
-        return hashes | {name: _json(verdict) for name, verdict in self.verdicts.items()}
+        return hashes | {name: _to_json(verdict) for name, verdict in self.verdicts.items()}
 
     @staticmethod
     def from_json(values: object) -> "Certificate":
@@ -134,8 +134,8 @@ class Certificate:
             return
         now = hashes_of(cast(Mapping[str, object], inputs)) if self.parts and isinstance(inputs, Mapping) else {}
         changed = [name for name in (*self.parts, *now) if self.parts.get(name) != now.get(name)]
-        told = f"; changed: {', '.join(dict.fromkeys(changed))}" if now else ""
-        raise ChangedInputs(f"the certificate is of inputs {self.inputs}, these are {found}{told}; certify again")
+        changes = f"; changed: {', '.join(dict.fromkeys(changed))}" if now else ""
+        raise ChangedInputs(f"the certificate is of inputs {self.inputs}, these are {found}{changes}; certify again")
 
 
 def hash_of(inputs: object) -> str:
@@ -151,52 +151,52 @@ def hash_of(inputs: object) -> str:
     CertificateError
         If there is a value of another type.
     """
-    return hashlib.sha256(_canonical(inputs)).hexdigest()[:16]
+    return hashlib.sha256(_encode(inputs)).hexdigest()[:16]
 
 
 def hashes_of(inputs: Mapping[str, object]) -> dict[str, str]:
-    """`hash_of` each of some inputs, by their names."""
+    """`hash_of` each input, by name."""
     return {name: hash_of(value) for name, value in inputs.items()}
 
 
-def _canonical(value: object) -> bytes:
-    """Bytes that are different for different values: every part is preceded by its kind and length."""
+def _encode(value: object) -> bytes:
+    """Unambiguous bytes of a value: every part is preceded by its kind and length."""
     if isinstance(value, np.ndarray):
         array = np.ascontiguousarray(value)
         if array.dtype.hasobject:
             raise CertificateError("an array of objects cannot be hashed")
         parts, kind = [str(array.dtype).encode(), str(array.shape).encode(), array.tobytes()], "array"
     elif isinstance(value, np.generic):
-        return _canonical(value.item())
+        return _encode(value.item())
     elif value is None or isinstance(value, bool | int | float | str):
         parts, kind = [repr(value).encode()], type(value).__name__
     elif isinstance(value, bytes):
         parts, kind = [value], "bytes"
     elif is_dataclass(value) and not isinstance(value, type):
         named = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
-        parts, kind = [type(value).__name__.encode(), _canonical(named)], "dataclass"
+        parts, kind = [type(value).__name__.encode(), _encode(named)], "dataclass"
     elif isinstance(value, Mapping):
         entries = cast(Mapping[object, object], value)
-        parts = [part for pair in sorted((_canonical(k), _canonical(v)) for k, v in entries.items()) for part in pair]
+        parts = [part for pair in sorted((_encode(k), _encode(v)) for k, v in entries.items()) for part in pair]
         kind = "mapping"
     elif isinstance(value, Sequence):
-        parts, kind = [_canonical(item) for item in cast(Sequence[object], value)], "sequence"
+        parts, kind = [_encode(item) for item in cast(Sequence[object], value)], "sequence"
     else:
         raise CertificateError(f"an input of type {type(value).__name__} cannot be hashed: {value!r}")
     return b"".join([f"{kind}{len(parts)}:".encode(), *(f"{len(part)}:".encode() + part for part in parts)])
 
 
-def _json(value: object) -> Json:
+def _to_json(value: object) -> Json:
     if isinstance(value, np.ndarray | np.generic):
-        return _json(value.tolist())
+        return _to_json(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, Mapping):
-        return {str(key): _json(item) for key, item in cast(Mapping[object, object], value).items()}
+        return {str(key): _to_json(item) for key, item in cast(Mapping[object, object], value).items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return {item.name: _json(getattr(value, item.name)) for item in fields(value)}
+        return {item.name: _to_json(getattr(value, item.name)) for item in fields(value)}
     if isinstance(value, Sequence):
-        return [_json(item) for item in cast(Sequence[object], value)]
+        return [_to_json(item) for item in cast(Sequence[object], value)]
     raise CertificateError(f"a verdict holds {value!r}, which JSON does not take")

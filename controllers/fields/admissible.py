@@ -1,4 +1,4 @@
-"""Admissible speeds along a curve: the least and the greatest at each phase, linear between samples."""
+"""Admissible speeds along a curve: the smallest and largest at each phase, linear between samples."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from controllers.state import Array
 
 @njit
 def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tuple[float, float]:
-    """Least and greatest admissible speed [m/s].
+    """Smallest and largest admissible speed [m/s].
 
     Parameters
     ----------
@@ -22,16 +22,16 @@ def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tup
     share : float
         Phase along the curve as a fraction of its duration, 0 to 1.
     """
-    place = share * (rows - 1)
-    i = min(int(place), rows - 2)
+    position = share * (rows - 1)
+    i = min(int(position), rows - 2)
     low, high = first + 2 * i, first + 2 * (i + 1)
-    least = params[low] + (place - i) * (params[high] - params[low])
-    greatest = params[low + 1] + (place - i) * (params[high + 1] - params[low + 1])
+    least = params[low] + (position - i) * (params[high] - params[low])
+    greatest = params[low + 1] + (position - i) * (params[high + 1] - params[low + 1])
     return least, greatest
 
 
 def checked_speeds(name: str, values: npt.ArrayLike) -> Array:
-    """Pairs of least and greatest speed [m/s] as an array of shape (m, 2); raises `ParameterError` if malformed."""
+    """Pairs of smallest and largest speed [m/s] as an array of shape (m, 2); raises `ParameterError` if malformed."""
     speeds = numbers_of(f"speeds of a {name}", values)
     if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
         raise ParameterError(

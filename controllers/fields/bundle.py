@@ -25,7 +25,7 @@ class RiverBundle(Law):
     .. math:: V = \sum_i V_i, \qquad F = \sum_i F_i
 
     This is the static sum of section 2.3: where tubes cross, the hand feels both rivers. In a `HigherOrder` field of
-    the same bundle the hand feels only the river whose direction and speed it moves with.
+    the same bundle the hand feels only the river that matches its direction and speed.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class RiverBundle(Law):
         """V(p) [m/s], shape (3,)."""
         return np.sum([river.flow(t, p) for river in self.rivers], axis=0)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         return reduce(add, (river.program() for river in self.rivers))
 
     def arrays(self) -> dict[str, Array]:

@@ -22,12 +22,12 @@ def gaussian(square: float, inverse_square: float) -> float:
 
 
 @njit
-def _square_to(params: Array, curve: int, phase: float, p: Array) -> float:
+def _squared_distance(params: Array, curve: int, phase: float, p: Array) -> float:
     x, y, z = curve_point(params, curve, phase)
     return (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
 
 
-_NEAREST, _BUNNY, _WHEN, _MEMORY = range(4)  # t*, phase t_b of the bunny, time of the last tick [s]
+_NEAREST_PHASE, _BUNNY_PHASE, _LAST_TIME, _MEMORY_SIZE = range(4)  # t*, t_b, time of the last tick [s]
 
 
 class BunnyGains(NamedTuple):
@@ -42,22 +42,22 @@ class BunnyGains(NamedTuple):
 
 @njit
 def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `Bunny`: parameters `BunnyGains`, memory see `_NEAREST`."""
+    """Kernel of `Bunny`: parameters `BunnyGains`, memory see `_NEAREST_PHASE`."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     gains = BunnyGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4])
     time = hand[HAND_TIME]
-    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot + _NEAREST])
-    memory[slot + _NEAREST] = phase
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot + _NEAREST_PHASE])
+    memory[slot + _NEAREST_PHASE] = phase
     if gains.waits == 0.0:
         bunny = params[curve + START] + time
-    elif np.isnan(memory[slot + _BUNNY]):
+    elif np.isnan(memory[slot + _BUNNY_PHASE]):
         bunny = phase
     else:
-        pace = gaussian(_square_to(params, curve, memory[slot + _BUNNY], p), gains.inverse_square)
-        bunny = memory[slot + _BUNNY] + pace * min(max(time - memory[slot + _WHEN], 0.0), LONGEST_STEP)
+        pace = gaussian(_squared_distance(params, curve, memory[slot + _BUNNY_PHASE], p), gains.inverse_square)
+        bunny = memory[slot + _BUNNY_PHASE] + pace * min(max(time - memory[slot + _LAST_TIME], 0.0), LONGEST_STEP)
     bunny = wrap_phase(params, curve, bunny)
-    memory[slot + _BUNNY], memory[slot + _WHEN] = bunny, time
-    pull = gaussian(_square_to(params, curve, bunny, p), gains.inverse_square)
+    memory[slot + _BUNNY_PHASE], memory[slot + _LAST_TIME] = bunny, time
+    pull = gaussian(_squared_distance(params, curve, bunny, p), gains.inverse_square)
     target = phase if gains.along > 0.0 else bunny
     p_curve, v_curve = curve_point(params, curve, target), curve_velocity(params, curve, target)
     for i in range(3):
@@ -83,11 +83,11 @@ def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> FeltBun
 
 @dataclass(frozen=True, eq=False)
 class Bunny(Law):
-    r"""Attractor φ(t_b) that moves along the curve at its own pace and pulls a hand that is near.
+    r"""Attractor φ(t_b) that moves along the curve at its own pace and pulls a nearby hand.
 
     .. math:: L = G_\delta(p - \varphi(t_b))\,\bigl(k_r\,(\varphi(s) - p) + b_d\,(\dot\varphi(s) - \dot p)\bigr)
 
-    with G_δ(x) = exp(−|x|²/2δ²). The paper writes L = F ∗ G_δ(φ(t)); we read it as the field F weighted by the
+    with G_δ(x) = exp(−|x|²/2δ²). The paper writes L = F ∗ G_δ(φ(t)); we read this as the field F weighted by the
     Gaussian about the bunny. "convolution" is the form "point", felt within δ, convolved with the normalised Gaussian:
 
     .. math:: L = \int G_\delta(q - \varphi)\,\bigl(k_r (\varphi - q) + b_d (\dot\varphi - \dot p)\bigr)\,
@@ -140,7 +140,7 @@ class Bunny(Law):
         """Gains of the weighted form that is executed."""
         return felt_bunny(self.k_r, self.b_d, self.delta, self.attraction)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         along, waits, felt = float(self.attraction == "along"), float(self.pace == "wait"), self.felt
         gains = BunnyGains(felt.k_r, felt.b_d, felt.delta**-2, along, waits)
-        return Program.of(self, bunny_wrench, gains, [np.nan] * _MEMORY, self.curve)
+        return Program.of(self, bunny_wrench, gains, [np.nan] * _MEMORY_SIZE, self.curve)

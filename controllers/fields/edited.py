@@ -21,12 +21,14 @@ from controllers.fields.river import River, river_flow
 from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
 from controllers.work_array import work_array
 
-_NEAREST, _PERFORMED, _WHEN, _MEMORY = range(4)  # t* of φ', s, time of the last tick [s]
-_SPACING = 0.01  # [s] between samples of a performance: short for the motion of a hand, long for encoder quantisation
+_NEAREST, _PERFORMANCE_TIME, _LAST_TIME, _MEMORY_SIZE = range(4)  # t* of φ', s, time of the last tick [s]
+_SAMPLE_INTERVAL = (
+    0.01  # [s] of a performance: short compared with hand motion, long enough to limit quantisation noise
+)
 
 
 @njit
-def _nearness(params: Array, performed: int, s: float, inverse_square: float, p: Array) -> float:
+def _performance_window(params: Array, performed: int, s: float, inverse_square: float, p: Array) -> float:
     """Window w(|p − φ'(s)|/ε) about the current point φ'(s) of the performance."""
     x, y, z = curve_point(params, performed, s)
     return window(((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2) * inverse_square)
@@ -43,7 +45,7 @@ class RecordedGains(NamedTuple):
     waits: float
 
 
-_HEADER = len(RecordedGains._fields)
+_GAINS_SIZE = len(RecordedGains._fields)
 
 
 @njit
@@ -52,28 +54,28 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     gains = RecordedGains(
         params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
     )  # fmt: skip
-    p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + _HEADER
+    p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + _GAINS_SIZE
     inverse_square, start, end = gains.inverse_square, params[performed + START], params[performed + END]
     s, time = hand[HAND_TIME], hand[HAND_TIME]
     if gains.waits > 0.0:
         s = start
-        if not math.isnan(memory[slot + _PERFORMED]):
-            s = memory[slot + _PERFORMED]
-            step = min(max(time - memory[slot + _WHEN], 0.0), LONGEST_STEP)
-            s += _nearness(params, performed, s, inverse_square, p) * step
-        # After its end the performance returns to its start and waits there for the hand to come round.
+        if not math.isnan(memory[slot + _PERFORMANCE_TIME]):
+            s = memory[slot + _PERFORMANCE_TIME]
+            step = min(max(time - memory[slot + _LAST_TIME], 0.0), LONGEST_STEP)
+            s += _performance_window(params, performed, s, inverse_square, p) * step
+        # After its end, the performance returns to its start and waits there for the hand.
         s = start if s > end else s
-    memory[slot + _PERFORMED], memory[slot + _WHEN] = s, time
+    memory[slot + _PERFORMANCE_TIME], memory[slot + _LAST_TIME] = s, time
     wrench[:] = 0.0
     if not np.isfinite(time + p[0] + p[1] + p[2]):
         wrench[:] = np.nan
     elif start <= s <= end:
-        there, speed = work_array(3), work_array(3)
-        there[0], there[1], there[2] = curve_point(params, performed, s)
+        point, speed = work_array(3), work_array(3)
+        point[0], point[1], point[2] = curve_point(params, performed, s)
         speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
         follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square, 0.0)
-        memory[slot + _NEAREST], _ = follow_at(follow, params, curve, memory[slot + _NEAREST], there, speed, wrench)
-        share = gains.weight * _nearness(params, performed, s, inverse_square, p)
+        memory[slot + _NEAREST], _ = follow_at(follow, params, curve, memory[slot + _NEAREST], point, speed, wrench)
+        share = gains.weight * _performance_window(params, performed, s, inverse_square, p)
         for i in range(3):
             wrench[i] *= -share
 
@@ -83,13 +85,13 @@ def _recorded_flow(
     river: Array, inverse_tau: float, inverse_edge: float, performed: Array, inverse_square: float, t: float, p: Array
 ) -> Array:
     """U(t, p) = w(|p − φ'|/ε) (φ̇' − V(φ')) [m/s]; both curves are packed."""
-    flow, there = np.zeros(3), np.empty(3)
+    flow, point = np.zeros(3), np.empty(3)
     if performed[START] <= t <= performed[END]:
-        there[0], there[1], there[2] = curve_point(performed, 0, t)
-        river_flow(river, inverse_tau, inverse_edge, there, np.nan, flow)
-        share, speed = _nearness(performed, 0, t, inverse_square, p), curve_velocity(performed, 0, t)
+        point[0], point[1], point[2] = curve_point(performed, 0, t)
+        river_flow(river, inverse_tau, inverse_edge, point, np.nan, flow)
+        share, velocity = _performance_window(performed, 0, t, inverse_square, p), curve_velocity(performed, 0, t)
         for i in range(3):
-            flow[i] = share * (speed[i] - flow[i])
+            flow[i] = share * (velocity[i] - flow[i])
     return flow
 
 
@@ -110,9 +112,9 @@ def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
     """
     t, p = np.asarray(times, dtype=float), np.asarray(points, dtype=float)
     t = t - t[0]
-    stride = max(1, round(_SPACING / float(np.median(np.diff(t)))))
-    kept = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
-    return Trajectory(t[kept], p[kept])
+    stride = max(1, round(_SAMPLE_INTERVAL / float(np.median(np.diff(t)))))
+    samples = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
+    return Trajectory(t[samples], p[samples])
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +127,13 @@ class Performance(Law):
     epsilon: float
     pace: Literal["clock", "wait"]
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         river, waits = self.river, float(self.pace == "wait")
         gains = RecordedGains(
             river.drag / river.tau, river.drag, river.epsilon**-2, self.weight, self.epsilon**-2, waits
         )  # fmt: skip
         numbers = np.concatenate([gains, self.performed.packed()])
-        return Program.of(self, recorded_wrench, numbers, [np.nan] * _MEMORY, river.curve)
+        return Program.of(self, recorded_wrench, numbers, [np.nan] * _MEMORY_SIZE, river.curve)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +144,8 @@ class Edited(Law):
               U_j(s, p) = w(|p - \varphi'_j(s)|/\varepsilon)\,\bigl(\dot\varphi'_j(s) - V(\varphi'_j(s))\bigr)
 
     U is the velocity that the user added to the river by moving along φ', so φ' is an integral curve of V + U (α = 1).
-    As a force, U = −F(φ', φ̇') is the opposite of the river's force on that motion: a hand that moves along φ' feels
-    nothing, and a light hand released on φ' traces it by itself; a heavy hand departs from φ' by its inertia, and
+    As a force, U = −F(φ', φ̇') is the opposite of the river's force on that motion. So a hand that moves along φ' feels
+    nothing, and a light hand released on φ' traces it by itself. A heavy hand departs from φ' due to its inertia, and
     no force returns it to its phase. U contains push, inertia and friction together, and needs no force sensor.
 
     Parameters
@@ -158,7 +160,7 @@ class Edited(Law):
         ε [m], distance from the performance at which U ends.
     pace : {"clock", "wait"}
         "clock": s is the hand's time, and U is zero after the end. "wait": s advances at the rate w(|p − φ'(s)|/ε), so
-        the performance waits for the hand to come by, and begins again after its end.
+        the performance waits until the hand is near, and begins again after its end.
 
     Raises
     ------
@@ -179,10 +181,10 @@ class Edited(Law):
         checked("epsilon", self.epsilon, "m", least=1e-4)
 
     @cached_property
-    def _blobs(self) -> tuple[Array, ...]:
+    def _packed_curves(self) -> tuple[Array, ...]:
         return tuple(curve.packed() for curve in (self.river.curve, *self.performed))
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         """With pace "wait", s starts at φ's start in each run."""
         laws = [
             Performance(self.river, curve, weight, self.epsilon, self.pace)
@@ -193,9 +195,9 @@ class Edited(Law):
     def flow(self, t: float, p: Array) -> Array:
         """V + Σ α U at time t of the performance [m/s], shape (3,)."""
         total, river = self.river.flow(t, p), self.river
-        for weight, blob in zip(self.weights, self._blobs[1:], strict=True):
+        for weight, blob in zip(self.weights, self._packed_curves[1:], strict=True):
             part = _recorded_flow(
-                self._blobs[0], 1.0 / river.tau, river.epsilon**-2, blob, self.epsilon**-2, t, p
+                self._packed_curves[0], 1.0 / river.tau, river.epsilon**-2, blob, self.epsilon**-2, t, p
             )  # fmt: skip
             total = total + weight * part
         return total

@@ -22,7 +22,7 @@ def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float,
 
 
 PACES = (0.5, 1.5)
-"""Least and largest γ of a parallel flow, reached half a radius of curvature off the curve; bounds its power."""
+"""Smallest and largest γ of a parallel flow, reached half a radius of curvature off the curve; bounds its power."""
 
 
 @njit
@@ -32,7 +32,7 @@ def parallel_pace(
     v_curve: tuple[float, float, float],
     a_curve: tuple[float, float, float],
 ) -> float:
-    """γ = 1 − (p − φ)·φ̈/|φ̇|², speed over the curve's of a point beside it whose nearest point has the curve's pace."""
+    """γ = 1 − (p − φ)·φ̈/|φ̇|²: speed, relative to the curve's, of a point off it that keeps abreast of the curve."""
     bend = (p[0] - p_curve[0]) * a_curve[0] + (p[1] - p_curve[1]) * a_curve[1] + (p[2] - p_curve[2]) * a_curve[2]
     return 1.0 - bend / (v_curve[0] ** 2 + v_curve[1] ** 2 + v_curve[2] ** 2)
 
@@ -89,10 +89,10 @@ class Follow(Law):
     axis. Where two points are equally near, the one found first is kept; beyond ε there is no force. Past an end of an
     open curve t* stays at that end.
 
-    γ is 1, as in the paper. A hand that is pushed off the outside of a bend then takes longer for the same angle: its
+    γ is 1, as in the paper. A hand that is pushed to the outside of a bend then takes longer for the same angle: its
     t* advances at :math:`\dot t^* = \dot p\cdot\dot\varphi\,/\,(|\dot\varphi|^2 - (p - \varphi)\cdot\ddot\varphi)`. A
     *parallel* flow has γ = 1 − (p − φ)·φ̈/|φ̇|², the speed along the parallel curve through p (1 − κe in path
-    following: Samson 1995), with which t* advances at rate 1 on either side; γ is held between 0.5 and 1.5.
+    following: Samson 1995), with which t* advances at rate 1 on either side; γ is clamped between 0.5 and 1.5.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Follow(Law):
         ε, radius of the tube [m], may be infinite. The default is about the radius of the workspace: the field reaches
         everywhere and is hardly weakened near the curve (2 % at 2 cm).
     parallel : bool
-        Whether the flow is parallel, so that a hand which is pushed off keeps the curve's pace.
+        Whether the flow is parallel, so that a hand that is pushed off the curve keeps its pace.
 
     Raises
     ------
@@ -126,7 +126,7 @@ class Follow(Law):
         checked("b_d", self.b_d, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         return Program.of(self, follow_wrench, self.gains, [np.nan], self.curve)
 
     @property

@@ -16,7 +16,7 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
-_SPEEDS = 3  # offset of the pairs of speeds, which follow `GovernorGains`
+_SPEEDS_OFFSET = 3  # offset of the pairs of speeds, which follow `GovernorGains`
 
 
 class GovernorGains(NamedTuple):
@@ -44,7 +44,7 @@ def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     # Where the curve's velocity is zero it has no direction; the bound then makes the force zero.
     pace = max(np.sqrt(x * x + y * y + z * z), 1e-12)
     share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
-    least, greatest = admissible_speeds(params, at + _SPEEDS, int(gains.rows), share)
+    least, greatest = admissible_speeds(params, at + _SPEEDS_OFFSET, int(gains.rows), share)
     speed = (v[0] * x + v[1] * y + v[2] * z) / pace
     force = governor_force(speed, least, greatest, gains.drag)
     force *= window(distance * distance * gains.inverse_square) / pace
@@ -63,7 +63,7 @@ class Governor(Law):
 
     at t*, the phase of the curve's point nearest to the hand, with d its distance and w the C² `window`. Inside
     [v_min, v_max] there is no force, at its ends the force is continuous, and outside it is viscous drag on the excess
-    speed. Alone it does not hold the hand to the curve: add it to a field that does.
+    speed. It does not hold the hand to the curve by itself: add it to a field that does.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Governor(Law):
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
         object.__setattr__(self, "speeds", checked_speeds("governor", self.speeds))
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         speeds = np.asarray(self.speeds)
         numbers = np.concatenate([GovernorGains(self.drag, self.epsilon**-2, len(speeds)), speeds.ravel()])
         return Program.of(self, governor_wrench, numbers, [np.nan], self.curve)

@@ -22,7 +22,7 @@ from controllers.work_array import work_array
 
 
 class Crossing(NamedTuple):
-    """Parameters of `higher_order_wrench`; then follow offsets of the rivers' blocks, from this header, and the blocks.
+    """Parameters of `higher_order_wrench`, followed by the offsets of the rivers' blocks (from here) and the blocks.
 
     Flag for the discrete form, 1/2σ² [s²/m²], r and r + h [m/s], number of rivers, time constant of the low-pass [s].
     """
@@ -49,27 +49,27 @@ class RiverGains(NamedTuple):
     speeds: float
 
 
-_HEADER, _BLOCK = len(Crossing._fields), len(RiverGains._fields)
+_HEADER_SIZE, _GAINS_SIZE = len(Crossing._fields), len(RiverGains._fields)
 # Columns of the table of candidate branches.
-_RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
+_RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE_SIZE = range(6)
 
 # Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s]].
-_ACTIVE, _HELD_PHASE, _WHEN, _SEEN, _MEMORY = 0, 1, 2, 3, 6
+_ACTIVE, _ACTIVE_PHASE, _LAST_TIME, _FILTERED_VELOCITY, _MEMORY_SIZE = 0, 1, 2, 3, 6
 
 
 @njit
-def _crossing(params: Array, at: int) -> Crossing:
+def _read_crossing(params: Array, at: int) -> Crossing:
     return Crossing(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
 
 
 @njit
-def _river(params: Array, at: int, number: float) -> tuple[RiverGains, int, int]:
+def _read_river(params: Array, at: int, number: float) -> tuple[RiverGains, int, int]:
     """Gains of a river, and the offsets of its speeds and of its packed curve."""
-    block = at + int(params[at + _HEADER + int(number)])
+    block = at + int(params[at + _HEADER_SIZE + int(number)])
     gains = RiverGains(
         params[block], params[block + 1], params[block + 2], params[block + 3], params[block + 4], params[block + 5]
     )  # fmt: skip
-    return gains, block + _BLOCK, block + _BLOCK + 2 * int(gains.speeds)
+    return gains, block + _GAINS_SIZE, block + _GAINS_SIZE + 2 * int(gains.speeds)
 
 
 @njit
@@ -77,8 +77,8 @@ def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
     r"""Distance m [m/s] of a hand's velocity from a river's, m² = |e|² − (e·Y)²/(|Y|² + |φ̇|²).
 
     e is the velocity minus the nearest admissible one, and Y = (φ(t*) − p)/τ the current towards the curve. The part of
-    e along Y is discounted, the more so the larger |Y| is against |φ̇|: otherwise a hand that springs back to its river
-    would be released because of the speed that this river gave it.
+    e along Y is discounted, the more so the larger |Y| is relative to |φ̇|. Otherwise a hand that springs back to its
+    river would be released because of the speed that this river gave it.
 
     Parameters
     ----------
@@ -94,18 +94,18 @@ def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
 def _branch_mismatch(
     params: Array, river: RiverGains, speeds: int, curve: int, phase: float, p: Array, v: Array
 ) -> float:
-    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
-    pace = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    pace = tangent[0] ** 2 + tangent[1] ** 2 + tangent[2] ** 2
     speed = max(math.sqrt(pace), 1e-12)
     s = speed
     rows = int(river.speeds)
     if rows > 0:
         share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
         least, greatest = admissible_speeds(params, speeds, rows, share)
-        s = min(max((v[0] * along[0] + v[1] * along[1] + v[2] * along[2]) / speed, least), greatest)
+        s = min(max((v[0] * tangent[0] + v[1] * tangent[1] + v[2] * tangent[2]) / speed, least), greatest)
     square = towards = draw = 0.0
     for i in range(3):
-        e, y = v[i] - s / speed * along[i], (there[i] - p[i]) / river.tau
+        e, y = v[i] - s / speed * tangent[i], (point[i] - p[i]) / river.tau
         square += e * e
         towards += e * y
         draw += y * y
@@ -115,10 +115,10 @@ def _branch_mismatch(
 @njit
 def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int:
     """Write the branches of all rivers whose tube contains p as rows of the table; returns their number."""
-    count, crossing = 0, _crossing(params, at)
+    count, crossing = 0, _read_crossing(params, at)
     found = work_array((BRANCHES, 2))
     for number in range(int(crossing.rivers)):
-        river, speeds, curve = _river(params, at, number)
+        river, speeds, curve = _read_river(params, at, number)
         for k in range(branches(params, curve, p[0], p[1], p[2], river.epsilon, found)):
             row = table[count]
             row[_RIVER], row[_PHASE], row[_DISTANCE] = number, found[k, 0], found[k, 1]
@@ -131,21 +131,21 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
 
 
 @njit
-def _look(look: float, memory: Array, slot: int, t: float, v: Array) -> Array:
+def _filter_velocity(look: float, memory: Array, slot: int, t: float, v: Array) -> Array:
     """Low-passed hand velocity [m/s] that selects the river; unfiltered if no time has passed or the filter is off."""
-    seen = memory[slot + _SEEN : slot + _MEMORY]
-    passed = t - memory[slot + _WHEN]
+    filtered = memory[slot + _FILTERED_VELOCITY : slot + _MEMORY_SIZE]
+    elapsed = t - memory[slot + _LAST_TIME]
     # The comparison is false for the NaN of the first evaluation.
-    share = 1.0 - math.exp(-passed / look) if look > 0.0 and passed > 0.0 else 1.0
-    memory[slot + _WHEN] = t
+    share = 1.0 - math.exp(-elapsed / look) if look > 0.0 and elapsed > 0.0 else 1.0
+    memory[slot + _LAST_TIME] = t
     for i in range(3):
-        seen[i] += share * (v[i] - seen[i])
-    return seen
+        filtered[i] += share * (v[i] - filtered[i])
+    return filtered
 
 
 @njit
 def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Array, wrench: Array) -> None:
-    river, _, curve = _river(params, at, row[_RIVER])
+    river, _, curve = _read_river(params, at, row[_RIVER])
     p_curve, v_curve = curve_point(params, curve, row[_PHASE]), curve_velocity(params, curve, row[_PHASE])
     for i in range(3):
         force = follow_force(p[i], v[i], p_curve[i], v_curve[i], river.k_r, river.b_d)
@@ -153,9 +153,9 @@ def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Ar
 
 
 @njit
-def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array, wrench: Array) -> int:
+def _add_smooth_forces(params: Array, at: int, table: Array, count: int, p: Array, v: Array, wrench: Array) -> int:
     """Add the weighted forces; returns the row of greatest weight, −1 if the null weight is greatest."""
-    crossing = _crossing(params, at)
+    crossing = _read_crossing(params, at)
     sharpness, null = crossing.sharpness, crossing.admission**2
     least = null
     for k in range(count):
@@ -173,29 +173,29 @@ def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array
 
 
 @njit
-def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, slot: int) -> int:
-    """Row of the active river, chosen with hysteresis, −1 for none; stored in the memory as [river, phase]."""
-    crossing = _crossing(params, at)
+def _select_river(params: Array, at: int, table: Array, count: int, memory: Array, slot: int) -> int:
+    """Row of the active river, selected with hysteresis, −1 for none; stored in the memory as [river, phase]."""
+    crossing = _read_crossing(params, at)
     admission, release = crossing.admission, crossing.release
     current, nearest = -1, math.inf
     best = -1
     for k in range(count):
         if table[k, _RIVER] == memory[slot + _ACTIVE]:
-            _, _, curve = _river(params, at, table[k, _RIVER])
-            lap = params[curve + END] - params[curve + START]
-            away = abs(table[k, _PHASE] - memory[slot + _HELD_PHASE])
+            _, _, curve = _read_river(params, at, table[k, _RIVER])
+            duration = params[curve + END] - params[curve + START]
+            phase_distance = abs(table[k, _PHASE] - memory[slot + _ACTIVE_PHASE])
             if params[curve + PERIODIC] > 0.0:
-                away = min(away, lap - away)
-            if away < min(nearest, SAME_BRANCH * lap):
-                current, nearest = k, away
+                phase_distance = min(phase_distance, duration - phase_distance)
+            if phase_distance < min(nearest, SAME_BRANCH * duration):
+                current, nearest = k, phase_distance
         if best < 0 or table[k, _SCORE] < table[best, _SCORE]:
             best = k
-    rival = math.inf if best < 0 else math.sqrt(table[best, _SCORE])
-    held = math.inf if current < 0 else math.sqrt(table[current, _SCORE])
-    if held >= release or rival + (release - admission) < held:
-        current = best if rival < admission else -1
+    best_score = math.inf if best < 0 else math.sqrt(table[best, _SCORE])
+    current_score = math.inf if current < 0 else math.sqrt(table[current, _SCORE])
+    if current_score >= release or best_score + (release - admission) < current_score:
+        current = best if best_score < admission else -1
     memory[slot + _ACTIVE] = -1.0 if current < 0 else table[current, _RIVER]
-    memory[slot + _HELD_PHASE] = 0.0 if current < 0 else table[current, _PHASE]
+    memory[slot + _ACTIVE_PHASE] = 0.0 if current < 0 else table[current, _PHASE]
     return current
 
 
@@ -209,20 +209,20 @@ def higher_order_wrench(
         wrench[:] = np.nan
         return
     wrench[:] = 0.0
-    crossing = _crossing(params, at)
-    table = work_array((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE))
-    count = _candidates(params, at, p, _look(crossing.look, memory, slot, hand[HAND_TIME], v), table)
+    crossing = _read_crossing(params, at)
+    table = work_array((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE_SIZE))
+    count = _candidates(params, at, p, _filter_velocity(crossing.look, memory, slot, hand[HAND_TIME], v), table)
     if crossing.discrete > 0.0:
-        winner = _discrete(params, at, table, count, memory, slot)
+        winner = _select_river(params, at, table, count, memory, slot)
         if winner >= 0:
             _add_force(params, at, table[winner], 1.0, p, v, wrench)
     else:
-        winner = _smooth(params, at, table, count, p, v, wrench)
-    _trace(params, at, table, count, winner, memory, p)
+        winner = _add_smooth_forces(params, at, table, count, p, v, wrench)
+    _write_trace(params, at, table, count, winner, memory, p)
 
 
 @njit
-def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory: Array, p: Array) -> None:
+def _write_trace(params: Array, at: int, table: Array, count: int, winner: int, memory: Array, p: Array) -> None:
     """Write the trace for the active river, or for the nearest one if none is active."""
     shown = winner
     if winner < 0 and count > 0:
@@ -230,12 +230,12 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
         for k in range(1, count):
             if table[k, _DISTANCE] < table[shown, _DISTANCE]:
                 shown = k
-    first, last = 0, int(_crossing(params, at).rivers)
+    first, last = 0, int(_read_crossing(params, at).rivers)
     if shown >= 0:
         first, last = int(table[shown, _RIVER]), int(table[shown, _RIVER]) + 1
     memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
     for river in range(first, last):
-        _, _, curve = _river(params, at, river)
+        _, _, curve = _read_river(params, at, river)
         if shown >= 0:
             phase, distance = table[shown, _PHASE], table[shown, _DISTANCE]
         else:
@@ -245,7 +245,7 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
 
 @dataclass(frozen=True, eq=False)
 class HigherOrder(Law):
-    r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
+    r"""Field of a bundle of rivers that depends on the hand's velocity: it feels the river that it moves with.
 
     Let m_i (`mismatch`) be the distance of the hand's velocity from the admissible velocities of river i, which are
     s φ̇_i/|φ̇_i| at t*_i with s in the interval of `River.speeds`; w_i its window; and r the admission, which gives a
@@ -254,11 +254,11 @@ class HigherOrder(Law):
     .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{e^{-s_i^2/2\sigma^2}}
               {e^{-r^2/2\sigma^2} + \sum_j e^{-s_j^2/2\sigma^2}}, \qquad s_i^2 = m_i^2 - 2\sigma^2\ln w_i
 
-    is the smooth form. In the discrete form one river acts alone: that of least s_i, if s_i < r. With hysteresis h it
-    stays active while s_i < r + h, unless s_j + h < s_i for another river j; the force jumps at a change. As σ → 0 both
-    forms select the river of least m_i, if m_i < r.
+    is the smooth form. In the discrete form one river acts alone: that of smallest s_i, if s_i < r. With hysteresis h
+    it stays active while s_i < r + h, unless s_j + h < s_i for another river j; the force jumps at a change. As σ → 0
+    both forms select the river of smallest m_i, if m_i < r.
 
-    Each branch of a river (`controllers.curves.branches`) takes part by itself, so that a river that crosses itself is
+    Each branch of a river (`controllers.curves.branches`) takes part separately, so a river that crosses itself is
     treated like two rivers that cross.
 
     Parameters
@@ -268,20 +268,20 @@ class HigherOrder(Law):
     admission : float
         r [m/s].
     sigma : float
-        σ [m/s]: width of the selection between rivers; in both forms also the weight of the penalty −2σ² ln w_i near a
+        σ [m/s]: width of the selection between rivers; in both forms it also weights the penalty −2σ² ln w_i near a
         tube's edge.
     hysteresis : float
         h [m/s], of the discrete form.
     form : {"smooth", "discrete"}
         How rivers share the hand.
     look : float
-        Time constant of a low-pass on the velocity that selects the river [s], against measurement noise; 0: no filter.
-        The forces use the unfiltered velocity.
+        Time constant of a low-pass on the velocity that selects the river [s], against measurement noise; 0 for no
+        filter. The forces use the unfiltered velocity.
 
     Raises
     ------
     ParameterError
-        If r or σ is below 1e-6 m/s, h or the time negative, one of them not finite, or the form unknown.
+        If r or σ is below 1e-6 m/s, h or the time constant negative, one of them not finite, or the form unknown.
     """
 
     bundle: RiverBundle
@@ -303,7 +303,7 @@ class HigherOrder(Law):
         """Curves of the rivers."""
         return tuple(river.curve for river in self.bundle.rivers)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         blocks: list[Array] = []
         for river in self.bundle.rivers:
             speeds = np.zeros(0) if river.speeds is None else np.ravel(river.speeds)
@@ -314,6 +314,6 @@ class HigherOrder(Law):
         release = self.admission + self.hysteresis
         discrete = float(self.form == "discrete")
         header = Crossing(discrete, 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look)
-        offsets = np.cumsum([_HEADER + len(blocks), *(len(block) for block in blocks[:-1])])
+        offsets = np.cumsum([_HEADER_SIZE + len(blocks), *(len(block) for block in blocks[:-1])])
         memory = [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0]
         return Program.of(self, higher_order_wrench, np.concatenate([header, offsets, *blocks]), memory)

@@ -1,6 +1,6 @@
 r"""LEADING: the stylus leads a walking figure and feels the limits of its following (Donald & Henle 2000, section 8).
 
-The figure's walker is a state of its own (`controllers.walking.walking`), which the law reads.
+The figure's walker is a separate state (`controllers.walking.walking`), which the law reads.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ def leading_force(  # noqa: PLR0913 - a formula of numbers, also on CasADi symbo
     x, y, c, s : float
         Point of the path nearest to the stylus, on the floor [m], and the tangent t = (c, s) there; n = (−s, c).
     along : float
-        Arc length of that point minus s + D, where the figure wants it [m].
+        Arc length of that point minus s + D, its desired value [m].
     back, lead, room : float
         Offsets that the figure can follow backwards, forwards and to each side [m]; u_t and u_n are the excess.
     scale, k_l, b : float
@@ -64,7 +64,7 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
-        # What is not finite must reach the limiter.
+        # A value that is not finite must reach the limiter.
         wrench[:3] = np.nan
         return
     gains = LeadingGains(
@@ -89,16 +89,16 @@ class Leading(Law):
     .. math:: F = -\tfrac{k_l}{S}\,(u_t\,t + u_n\,n) - k_z\,z\,e_z - b\,v
 
     g is the arc length of the path's point nearest to S p, s that of the figure; t and n are the tangent and normal at
-    g, and the figure wants to be D behind (see `Walking`). u_t is the part of g − D − s beyond what the figure follows
-    at its own pace; u_n the part of the stylus's distance from the path beyond what bending the path can reach. On the
-    path already laid this reach is zero, so the hand is guided back along it.
+    g. The figure walks D behind (see `Walking`). u_t is the part of g − D − s that exceeds what the figure can follow
+    at its own pace; u_n is the part of the stylus's distance from the path that exceeds what bending the path can
+    reach. On the path already laid this reach is zero, so the hand is guided back along it.
 
     Parameters
     ----------
     walking : Walking
         How the figure follows.
     k_l, k_z : float
-        Stiffness of the force that resists leaving what the figure can follow, and of the plane z = 0 [N/m].
+        Stiffness of the force against leaving the region that the figure can follow, and of the plane z = 0 [N/m].
     b : float
         Damping [N s/m].
 
@@ -118,7 +118,7 @@ class Leading(Law):
         for name, unit in (("k_l", "N/m"), ("k_z", "N/m"), ("b", "N s/m")):
             checked(name, getattr(self, name), unit)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         gains = LeadingGains(self.k_l, self.b, self.k_z, self.walking.scale, *self.walking.lead)
         numbers = np.concatenate([gains, self.walking.packed()])
         feed = WalkerFeed(TRACE_SIZE, len(gains), self.walking)

@@ -45,14 +45,15 @@ def orientation_wrench(
 
 @dataclass(frozen=True, eq=False)
 class Orientation(Law):
-    r"""Moment that turns the stylus to the orientation of the curve where the hand is nearest to it; no force.
+    r"""Moment that turns the stylus to the curve's orientation at the point nearest to the hand; no force.
 
     .. math:: \tau = w(d/\varepsilon)\,\bigl(k_o \log(R_c R^T) + b_o\,(\omega_c - \omega)\bigr), \qquad R_c = R(t^*)
 
     All in H; log gives the rotation vector of the shortest turn from R to R_c, so the spring pulls along the geodesic
     of SO(3) and is −grad of ½ k_o α², α the angle between the two. t*, d and the window w are those of FOLLOW, ω_c is
-    the curve's angular velocity at t*. τ is finite everywhere, with |log| ≤ π. Its switching sets: α = π, where both
-    ways round are equally short and τ changes its sign, and where t* jumps (the medial axis of the curve).
+    the curve's angular velocity at t*. τ is finite everywhere, with |log| ≤ π. It is
+    discontinuous at α = π, where both ways round are equally short and τ changes its sign, and where t* jumps (the
+    medial axis of the curve).
 
     A device with three motors, such as the Phantom, cannot render a moment: τ is evaluated and recorded (the last
     three numbers of the channel ``field``), and the limiter drops it. A device with six motors would take it as it is.
@@ -85,6 +86,6 @@ class Orientation(Law):
         checked("b_o", self.b_o, "N m s/rad")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         gains = OrientationGains(self.k_o, self.b_o, self.epsilon**-2)
         return Program.of(self, orientation_wrench, gains, [np.nan], self.curve)

@@ -23,7 +23,7 @@ __all__ = ["Course", "River", "integrate", "settling_time", "window"]
 
 Flow = Callable[[float, Array], Array]
 """A flow V(t, p): time [s] and p_H [m], shape (3,), to a velocity [m/s], shape (3,)."""
-_LONGEST_STEP = 0.02  # of an integration [s]; a much longer step could pass over a narrow river unnoticed
+_MAX_STEP = 0.02  # of an integration [s]; a much longer step could miss a narrow river
 
 
 @njit
@@ -57,7 +57,7 @@ class River(Law):
     drag : float
         b, force per velocity between current and hand [N s/m].
     speeds : array_like, shape (m, 2), optional
-        Least and greatest speed of a hand that the river takes [m/s], at m phases equally spaced from the curve's
+        Smallest and largest hand speed that the river accepts [m/s], at m phases equally spaced from the curve's
         start to its end, linear between them; without them, the curve's own speed. Only higher-order fields
         (`HigherOrder`) use them.
 
@@ -83,7 +83,7 @@ class River(Law):
             object.__setattr__(self, "speeds", checked_speeds("river", self.speeds))
 
     @cached_property
-    def _blob(self) -> Array:
+    def _packed_curve(self) -> Array:
         return self.curve.packed()
 
     @cached_property
@@ -91,13 +91,13 @@ class River(Law):
         """The river as a force: FOLLOW with k_r = b/τ and b_d = b."""
         return Follow(self.curve, self.drag / self.tau, self.drag, self.epsilon)
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         return self.force.program()
 
     def flow(self, t: float, p: Array) -> Array:
         """V(p) [m/s], shape (3,); it does not depend on the time t."""
         flow = np.empty(3)
-        river_flow(self._blob, 1.0 / self.tau, self.epsilon**-2, p, np.nan, flow)
+        river_flow(self._packed_curve, 1.0 / self.tau, self.epsilon**-2, p, np.nan, flow)
         return flow
 
 
@@ -133,16 +133,16 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Course:
     ControllerError
         If the integration fails.
     """
-    from scipy.integrate import solve_ivp  # here, since the servo imports this file and does not need it
+    from scipy.integrate import solve_ivp  # imported late: the servo imports this file and does not need it
 
-    wanted = np.asarray(times, dtype=float)
+    output_times = np.asarray(times, dtype=float)
     solution = solve_ivp(
-        flow, (wanted[0], wanted[-1]), np.asarray(start, dtype=float), "DOP853", wanted,
-        rtol=1e-10, atol=1e-12, max_step=_LONGEST_STEP,
+        flow, (output_times[0], output_times[-1]), np.asarray(start, dtype=float), "DOP853", output_times,
+        rtol=1e-10, atol=1e-12, max_step=_MAX_STEP,
     )  # fmt: skip
     if not solution.success:
         raise ControllerError(f"the flow could not be integrated from {start}: {solution.message}")
-    return Course(wanted, np.ascontiguousarray(solution.y.T))
+    return Course(output_times, np.ascontiguousarray(solution.y.T))
 
 
 def settling_time(start: float, end: float, epsilon: float, tau: float) -> float:

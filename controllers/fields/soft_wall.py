@@ -7,8 +7,8 @@ angle or component of a ball joint's rotation vector r_i,
           \qquad P = \sum_i U(r_i - b_i) + U(a_i - r_i)
 
 with U'(e) = 0 for e < 0, k e²/2m for e up to m and k (e − m/2) beyond: a spring with a smooth onset, m [rad] before
-the limit itself. The first part is conservative: −∇(P∘h) returns the energy that it stored. The second is dissipative,
-with power −Σ d (|ω_j| − ω_max)_+ |ω_j|.
+the limit. The first part is conservative: −∇(P∘h) returns the energy that it stored. The second is dissipative, with
+power −Σ d (|ω_j| − ω_max)_+ |ω_j|.
 
 h and h_* at the stylus are written to the law's memory before it is evaluated (`controllers.fields.algebra.map_feed`).
 """
@@ -29,7 +29,7 @@ from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array
 from controllers.work_array import work_array
 
 # Layout of a joint's row: [column of qpos, row of qvel, is a ball joint, three intervals (a hinge uses the first)].
-_COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9
+_COLUMN, _ROW, _IS_BALL, _LIMITS, _JOINT_SIZE = 0, 1, 2, 3, 9
 
 
 class WallGains(NamedTuple):
@@ -47,7 +47,7 @@ class WallGains(NamedTuple):
     speed: float
 
 
-_HEADER = len(WallGains._fields)
+_GAINS_SIZE = len(WallGains._fields)
 
 
 @njit
@@ -62,9 +62,9 @@ def wall_slope(angle: float, low: float, high: float, stiffness: float, margin: 
 
 @njit
 def _is_clear(params: Array, limits: int, margin: float, vector: Array) -> bool:
-    """Whether a ball joint is surely off its walls, by its quaternion's vector part (3,) and |r_i| ≤ π |q_i|.
+    """Whether a ball joint is certainly clear of its walls, by its quaternion's vector part (3,) and |r_i| ≤ π |q_i|.
 
-    A cheap test that spares the logarithm for most joints.
+    A cheap test that avoids the logarithm for most joints.
     """
     for i in range(3):
         low, high = params[limits + 2 * i], params[limits + 2 * i + 1]
@@ -74,11 +74,11 @@ def _is_clear(params: Array, limits: int, margin: float, vector: Array) -> bool:
 
 
 @njit
-def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
+def _write_joint_torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
     """Write ∇P plus the damper's torque of one joint [N m] to `torque` (3,); `rates` (3,) are its ω [rad/s]."""
     k, m = gains.stiffness, gains.margin
     column, limits = int(params[joint + _COLUMN]), joint + _LIMITS
-    if params[joint + _BALL] == 0.0:
+    if params[joint + _IS_BALL] == 0.0:
         torque[0] = wall_slope(pose[column], params[limits], params[limits + 1], k, m)
         torque[1] = torque[2] = 0.0
     elif _is_clear(params, limits, m, pose[column + 1 : column + 4]):
@@ -109,14 +109,14 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
     rates, torque = work_array(3), work_array(3)
     wrench[:] = 0.0
     for n in range(int(gains.joints)):
-        joint = at + _HEADER + n * _JOINT
-        row, size = int(params[joint + _ROW]), 1 if params[joint + _BALL] == 0.0 else 3
+        joint = at + _GAINS_SIZE + n * _JOINT_SIZE
+        row, size = int(params[joint + _ROW]), 1 if params[joint + _IS_BALL] == 0.0 else 3
         for i in range(3):
             rates[i] = 0.0
             for j in range(3 if i < size else 0):
                 rates[i] += jacobian[row + i, j] * hand[HAND_VELOCITY + j]
                 rates[i] += jacobian[row + i, 3 + j] * hand[HAND_ANGULAR_VELOCITY + j]
-        _torque(gains, params, joint, pose, rates, torque)
+        _write_joint_torque(gains, params, joint, pose, rates, torque)
         for i in range(size):
             if torque[i] != 0.0:
                 for j in range(STYLUS_TANGENT):
@@ -127,9 +127,9 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
 class SoftWall(Law):
     r"""Limits of the figure's joint angles and joint speeds, felt by the hand.
 
-    The force is finite and continuous wherever h_* is, but unbounded where h_* is large: compose it with
-    `Law.limited`. A ball joint turned by half a turn or more from its zero has no unique rotation vector: there the
-    force may jump.
+    The force is finite and continuous wherever h_* is, but grows without bound with h_*: compose it with
+    `Law.limited`. A ball joint turned by half a turn or more from its zero position has no unique rotation vector, so
+    the force may jump there.
 
     Parameters
     ----------
@@ -186,18 +186,18 @@ class SoftWall(Law):
                     f"({2.0 * self.margin:.3g} rad) or more"
                 )
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         """A new run starts with the initial memory of the map."""
         haptic_map = self.haptic_map
         _, params, memory, _ = haptic_map.compiled()
         gains = WallGains(
             haptic_map.nq, haptic_map.nv, len(self.limits), self.stiffness, self.margin, self.damping, self.speed
         )  # fmt: skip
-        table = np.zeros((len(self.limits), _JOINT))
+        table = np.zeros((len(self.limits), _JOINT_SIZE))
         for joint, column, row, limit in zip(table, self.columns, self.rows, self.limits, strict=True):
             joint[:_LIMITS] = column, row, len(limit) == 3
             joint[_LIMITS : _LIMITS + limit.size] = np.ravel(limit)
-        feed = MapFeed(TRACE_SIZE, _HEADER + table.size, haptic_map)
-        given = np.zeros(haptic_map.nq + haptic_map.nv * STYLUS_TANGENT)
+        feed = MapFeed(TRACE_SIZE, _GAINS_SIZE + table.size, haptic_map)
+        map_output = np.zeros(haptic_map.nq + haptic_map.nv * STYLUS_TANGENT)
         numbers = np.concatenate([gains, table.ravel(), params])
-        return Program.of(self, soft_wall_wrench, numbers, np.concatenate([given, memory]), feeds=(feed,))
+        return Program.of(self, soft_wall_wrench, numbers, np.concatenate([map_output, memory]), feeds=(feed,))

@@ -36,8 +36,8 @@ CLICK_TIME = 0.4  # [s] a shorter click undoes the last edit, a longer one redoe
 
 NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
 # Memory: phase t*, mode, time and position (3) of the last press, largest distance of the stylus from there, normal (3)
-# of a push, FOLLOW's gains (3), largest distance of a held point from the stylus, then the record of the curve.
-_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 14, 15
+# of a push, FOLLOW's gains (4), largest distance of a held point from the stylus, then the record of the curve.
+_PHASE, _MODE, _PRESS_TIME, _PRESS_POINT, _TRAVEL, _NORMAL, _GAINS, _OFFSET, _RECORD = 0, 1, 2, 3, 6, 7, 10, 14, 15
 
 
 class StretchyGains(NamedTuple):
@@ -67,11 +67,11 @@ def eased_share(t: float, seconds: float) -> float:
 
 
 @njit
-def _press(radius: float, memory: Array, slot: int, hand: Array, distance: float) -> None:
-    """Switch pressed: hold the tube if the stylus is inside it, otherwise become a probe that pushes it."""
-    memory[slot + _SINCE], memory[slot + _CARRIED] = hand[HAND_TIME], 0.0
+def _handle_press(radius: float, memory: Array, slot: int, hand: Array, distance: float) -> None:
+    """Switch pressed: hold the tube if the stylus is inside it, otherwise use the stylus as a probe that pushes it."""
+    memory[slot + _PRESS_TIME], memory[slot + _TRAVEL] = hand[HAND_TIME], 0.0
     for i in range(3):
-        memory[slot + _PRESSED + i] = hand[HAND_POSITION + i]
+        memory[slot + _PRESS_POINT + i] = hand[HAND_POSITION + i]
     if distance > radius:
         memory[slot + _MODE] = PROBING
     elif take_hold(memory, slot + _RECORD, memory[slot + _PHASE]):
@@ -81,15 +81,15 @@ def _press(radius: float, memory: Array, slot: int, hand: Array, distance: float
 
 
 @njit
-def _release(memory: Array, slot: int, time: float) -> None:
+def _handle_release(memory: Array, slot: int, time: float) -> None:
     """Switch released: commit the edit, or, after a click on the curve, undo or redo one."""
     record, mode = slot + _RECORD, memory[slot + _MODE]
-    if mode == PUSHING or (mode == HOLDING and memory[slot + _CARRIED] >= CLICK_DISTANCE):
+    if mode == PUSHING or (mode == HOLDING and memory[slot + _TRAVEL] >= CLICK_DISTANCE):
         commit(memory, record)
     elif mode != PROBING:
         let_go(memory, record)
-        if memory[slot + _CARRIED] < CLICK_DISTANCE:
-            if time - memory[slot + _SINCE] < CLICK_TIME:
+        if memory[slot + _TRAVEL] < CLICK_DISTANCE:
+            if time - memory[slot + _PRESS_TIME] < CLICK_TIME:
                 undo(memory, record)
             else:
                 redo(memory, record)
@@ -97,7 +97,7 @@ def _release(memory: Array, slot: int, time: float) -> None:
 
 
 @njit
-def _touch(radius: float, memory: Array, slot: int, p: Array, distance: float) -> None:
+def _start_push(radius: float, memory: Array, slot: int, p: Array, distance: float) -> None:
     """A probe that enters the tube begins to push it, along the normal of the first contact."""
     record = slot + _RECORD
     if distance < radius and take_hold(memory, record, memory[slot + _PHASE]):
@@ -107,8 +107,8 @@ def _touch(radius: float, memory: Array, slot: int, p: Array, distance: float) -
 
 
 @njit
-def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
-    """Bend the curve so that the probe stays on the tube's surface; returns its depth [m], at 0 contact is lost."""
+def _push_curve(radius: float, memory: Array, slot: int, p: Array) -> float:
+    """Bend the curve so that the probe stays on the tube's surface; returns its depth [m], 0 if contact is lost."""
     record = slot + _RECORD
     depth = radius
     for i in range(3):
@@ -127,7 +127,7 @@ def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
 
 
 @njit
-def _perform(gains: StretchyGains, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+def _write_performance(gains: StretchyGains, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
     """FOLLOW of the bent curve, eased in from the search spring."""
     follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
     share = eased_share(hand[HAND_TIME] - gains.until, gains.ease)
@@ -160,29 +160,29 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     curve, performing = work_curve(memory, record), hand[HAND_TIME] >= gains.until
     pressed = hand[HAND_SWITCH] > 0.5 and not performing
     if not pressed and memory[slot + _MODE] != SEEKING:
-        _release(memory, slot, hand[HAND_TIME])
+        _handle_release(memory, slot, hand[HAND_TIME])
     if performing:
-        _perform(gains, curve, memory, slot, hand, wrench)
+        _write_performance(gains, curve, memory, slot, hand, wrench)
         return
     phase, distance = closest_phase(memory, curve, p[0], p[1], p[2], memory[slot + _PHASE])
     memory[slot + _PHASE] = phase
     if pressed and memory[slot + _MODE] == SEEKING:
-        _press(gains.radius, memory, slot, hand, distance)
+        _handle_press(gains.radius, memory, slot, hand, distance)
     elif memory[slot + _MODE] == PROBING:
-        _touch(gains.radius, memory, slot, p, distance)
-    press = slot + _PRESSED
+        _start_push(gains.radius, memory, slot, p, distance)
+    press = slot + _PRESS_POINT
     carried = _distance(p, memory[press], memory[press + 1], memory[press + 2])
-    memory[slot + _CARRIED] = max(memory[slot + _CARRIED], carried)
+    memory[slot + _TRAVEL] = max(memory[slot + _TRAVEL], carried)
     mode, stiffness = memory[slot + _MODE], 0.0
     target = (p[0], p[1], p[2])
     if mode == HOLDING:
         carry_to(memory, record, p[0], p[1], p[2])
         stiffness = gains.stretch
-        held = slot + _PRESSED if gains.at_stylus > 0.0 else record + ANCHOR
+        held = slot + _PRESS_POINT if gains.at_stylus > 0.0 else record + ANCHOR
         target = (memory[held], memory[held + 1], memory[held + 2])
         phase = memory[record + PHASE]
     elif mode == PUSHING:
-        depth, n = _push(gains.radius, memory, slot, p), slot + _NORMAL
+        depth, n = _push_curve(gains.radius, memory, slot, p), slot + _NORMAL
         stiffness = gains.stretch
         target = (p[0] + depth * memory[n], p[1] + depth * memory[n + 1], p[2] + depth * memory[n + 2])
         phase = memory[record + PHASE]
@@ -195,7 +195,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         x, y, z = curve_point(memory, curve, phase)
         distance = _distance(p, x, y, z)
     if mode == HOLDING:
-        memory[slot + _OFF] = max(memory[slot + _OFF], distance)
+        memory[slot + _OFFSET] = max(memory[slot + _OFFSET], distance)
     leave_trace(memory, curve, memory, phase, distance, phase)
 
 
@@ -211,8 +211,8 @@ class StretchyTubes(Law):
 
     c(p) = φ(t*) is the nearest point of the curve. A press of the switch within ε of it grasps φ(t_j), t_j = t*: from
     then on this point follows the stylus, and the curve is bent with it (see `controllers.curves.deformation`). p_0 is
-    the grasped point φ(t_j) at the press; in the paper's form (`hold` "stylus") it is the stylus's position at the
-    press, where the held tube does not pull at first although the search spring before it did.
+    the grasped point φ(t_j) at the press. In the paper's form (`hold` "stylus") it is the stylus's position at the
+    press: then the held tube does not pull at first, although the search spring did.
 
     A press farther off makes the stylus a probe: it feels only damping until it meets the tube of radius ε, then pushes
     it along the normal n of the contact, without friction. Releasing the switch commits the edit. A press on the curve
@@ -238,9 +238,9 @@ class StretchyTubes(Law):
     width : float
         h, half the width of a bump [s]; see `controllers.curves.editing.record_of`.
     until : float
-        Time at which stretching ends [s]; may be infinite. An edit in progress then is committed.
+        Time at which stretching ends [s]; may be infinite. An edit in progress at that time is committed.
     then : Follow, optional
-        Gains with which the bent curve is performed from then on; needed if `until` is finite. Its curve is not used.
+        Gains with which the bent curve is performed afterwards; required if `until` is finite. Its curve is not used.
     ease : float
         T, duration of the transition from search to performance [s]: F = (1 − σ) F_open + σ F_follow, with
         σ = x³ (10 − 15x + 6x²), x = t/T. A standing body cannot reach the speed of a walk at once.
@@ -278,12 +278,12 @@ class StretchyTubes(Law):
         if np.isfinite(self.until) and self.then is None:
             raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
 
-    def _composed(self) -> Program:
-        """The memory contains the curve, which is bent there."""
+    def _compose(self) -> Program:
+        """The memory contains the curve, which is deformed in place."""
         follow = self.then
         then = FollowGains(0.0, 0.0, 0.0, 0.0) if follow is None else follow.gains
         state = np.zeros(_RECORD)
-        state[_PHASE], state[_GAINS:_OFF] = np.nan, then
+        state[_PHASE], state[_GAINS:_OFFSET] = np.nan, then
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
         gains = StretchyGains(
             self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease, float(self.hold == "stylus")
@@ -315,4 +315,4 @@ class StretchyTubes(Law):
 
     def held_off(self, memory: Array) -> float:
         """Largest distance [m] of a held point from the stylus in a run."""
-        return float(memory[TRACE_SIZE + _OFF])
+        return float(memory[TRACE_SIZE + _OFFSET])

@@ -1,1 +1,1 @@
-"""Safety between a law of force and the motors: limiter, energy tank, faults, and the gate of a real device."""
+"""Safety between a force law and the motors: limiter, energy tank, faults, and the gate of a real device."""

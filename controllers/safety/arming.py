@@ -1,7 +1,7 @@
 r"""Arming state machine of a device: disarmed → arming → ramping → active, and fault from every state.
 
-The machine is the table `TRANSITIONS`; an event without an entry changes nothing. After a fault there is no force until
-the device is cleared and armed again, the demanded force has been small, and the force has been ramped in.
+The table `TRANSITIONS` defines the machine; an event without an entry changes nothing. After a fault there is no force
+until the device is cleared and armed again, the demanded force has been small, and the force has been ramped in.
 """
 
 from enum import IntEnum
@@ -48,7 +48,7 @@ TRANSITIONS: dict[tuple[State, Event], State] = {
 }
 """All transitions of the machine."""
 
-_NEXT = np.array([[TRANSITIONS.get((state, event), state) for event in Event] for state in State], dtype=np.int64)
+_NEXT_STATE = np.array([[TRANSITIONS.get((state, event), state) for event in Event] for state in State], dtype=np.int64)
 
 # Plain integers: numba freezes globals, but would look up a member of an enumeration in each kernel.
 DISARMED, ARMING, RAMPING, ACTIVE, _ = (int(state) for state in State)
@@ -59,7 +59,7 @@ NO_REQUEST = -1
 @njit
 def next_state(state: int, event: int) -> int:
     """State after an event; unchanged where the table has no entry."""
-    return _NEXT[state, event]
+    return _NEXT_STATE[state, event]
 
 
 @njit

@@ -1,6 +1,6 @@
-"""From the field's wrench to the commanded force: ceiling, ramp, energy tank, slew limit, and the faults of these.
+"""From the field's wrench to the commanded force: ceiling, ramp, energy tank, slew limit, and their faults.
 
-The slew limit comes last, so that it also applies when the tank cuts a force. For some ticks the hand then gets more
+The slew limit comes last, so that it also applies when the tank reduces a force. For some ticks the hand then gets more
 than the tank allows; this energy is booked, and if it overdraws the tank, the next forces are reduced. A fault is
 exempt from the slew limit: the force drops to zero at once.
 """

@@ -4,10 +4,10 @@ r"""Energy tank (passivity layer): bounds the energy that a field injects, by a 
           F \cdot v \le \frac{\max(e, 0)}{\tau} + P
 
 The energy certificate gives the P that a river needs to run freely (b_d |φ̇|²/4 plus friction losses); the tank
-enforces this bound when something is not as certified: a late loop, a user's own law, a wrong gain. The energy that the
-hand gets is at most e₀ + P (t + τ), up to the change of speed within one period. That work is booked once measured:
-if it overdraws the store, all forces are reduced, F ← F ⟨1 + e/(P τ)⟩ for e < 0. Work that the hand does on a spring
-can be returned, since it raises e, up to e_max: the most that the springs store.
+enforces this bound if something differs from what was certified: a late loop, a user-defined law, a wrong gain. The
+energy that the hand gets is at most e₀ + P (t + τ), up to the change of speed within one period. That work is booked
+once measured: if it overdraws the store, all forces are reduced, F ← F ⟨1 + e/(P τ)⟩ for e < 0. Work that the hand does
+on a spring can be returned, since it raises e, up to e_max, which is the most that the springs store.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -
     tank[TANK_STARTED] = 1.0
     power = force[0] * v[0] + force[1] * v[1] + force[2] * v[2]
     allowed = max(tank[TANK_ENERGY], 0.0) * params[_DRAIN] + params[_POWER]
-    # Divides only by the larger, positive one of two powers, never by a speed.
+    # Divides only by the larger of two powers, which is positive, never by a speed.
     scale = allowed / power if power > allowed else 1.0
     if tank[TANK_ENERGY] < 0.0:
         scale *= max(0.0, 1.0 + tank[TANK_ENERGY] * params[_DRAIN] / params[_POWER])

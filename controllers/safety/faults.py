@@ -1,16 +1,16 @@
 r"""Faults of a device and its controller: plausibility checks of readings, and latching of faults.
 
-A fault is **latched**: from the tick in which it is detected the motors are off, until `rearm` is called. Its code,
-time and value stay in the device's `faults`, one array that the device's kernels, the loop and the driver of the device
-read; it is recorded tick by tick.
+A fault is **latched**: from the tick of its detection on, the motors are off until `rearm` is called. Its code, time
+and value stay in the device's `faults`, an array that the device's kernels, the loop and the device driver read; it is
+recorded at every tick.
 
 | fault | evidence |
 |---|---|
 | not finite | a reading, the field's force, or the memory of limiter or tank is NaN or infinite |
 | rate impossible | :math:`|\theta_k - \theta_{k-1}| > \omega_{max}\,\Delta t + 2\,\delta`, δ a count of the encoder |
-| stale | a device that numbers its readings has given no new one for longer than the silence |
+| stale | a device that numbers its readings has sent no new one for longer than the silence |
 | frozen | no encoder counted for longer than `still`, under a torque over `still_load` times a joint's friction |
-| clock back | a reading is numbered after the last one, and made before it |
+| clock back | a reading with a later number has an earlier time |
 | ended | a replayed hand has no more rows |
 
 A **gap** is not a fault: if two readings are further apart than the silence, the servo did not run in between. The
@@ -28,7 +28,7 @@ from controllers.state import Array
 
 
 class Fault(IntEnum):
-    """Why a device switched its force off; `words` describes it."""
+    """Reason why a device switched its force off; `words` describes it."""
 
     NONE = 0
     FORCE_NOT_FINITE = 1
@@ -57,11 +57,11 @@ class Fault(IntEnum):
     CLOCK_BACK = 24
 
     def words(self, value: float) -> str:
-        """The fault in words, with its value."""
-        return _WORDS[self].format(value)
+        """Description of the fault, with its value."""
+        return _DESCRIPTIONS[self].format(value)
 
 
-_WORDS = {
+_DESCRIPTIONS = {
     Fault.NONE: "no fault",
     Fault.FORCE_NOT_FINITE: "the field asked for a force or moment of {:g}",
     Fault.LIMITER_NOT_FINITE: "the limiter's memory held {:g}",
@@ -98,15 +98,15 @@ CLOCK_BACK = int(Fault.CLOCK_BACK)
 
 # Layout of a device's `faults`: public values, internal state, limits.
 FAULT_CODE, FAULT_TIME, FAULT_VALUE, FAULT_GAPS, FAULT_LAST_GAP, FAULT_RAMP = range(6)
-_STARTED, _CLOCK, _ELAPSED, _SEQUENCE, _FRESH, _STILL_SINCE, _LOAD, _COMMANDED = range(6, 14)
-_PERIOD, _RATE, _STEP, _SILENCE, _RAMP_TIME, _STILL, _STILL_LOAD, FAULT_SIZE = 14, 15, 18, 21, 22, 23, 24, 25
+_STARTED, _LAST_CLOCK, _ELAPSED, _SEQUENCE, _FRESH_TIME, _STILL_SINCE, _LOAD, _COMMAND_TIME = range(6, 14)
+_PERIOD, _MAX_RATE, _COUNT, _SILENCE, _RAMP_TIME, _STILL_TIME, _STILL_LOAD, FAULT_SIZE = 14, 15, 18, 21, 22, 23, 24, 25
 
 NO_SEQUENCE = -1.0
 """Sequence number of readings of a device that does not number them."""
 HELD, TAKEN, RESTARTED = 0, 1, 2
 """What to do with a reading: keep the last one, use it, or use it and reset the velocity estimate."""
 
-_LATE = 1.5  # periods between two readings, above which their true distance in time is used for the speed
+_LATE_PERIODS = 1.5  # [periods] between two readings, from which their true time difference is used for the speed
 
 
 @njit
@@ -126,7 +126,7 @@ def first_not_finite(values: Array) -> float:
 
 
 @njit
-def judge_reading(  # noqa: C901 - a kind of fault a branch, the gravest first
+def judge_reading(  # noqa: C901 - one branch per kind of fault, the most serious first
     faults: Array,
     theta: tuple[float, float, float],
     gimbal: tuple[float, float, float],
@@ -162,15 +162,15 @@ def judge_reading(  # noqa: C901 - a kind of fault a branch, the gravest first
     """
     if sequence >= 0.0:
         if sequence == faults[_SEQUENCE]:
-            if np.isnan(faults[_FRESH]):
-                faults[_FRESH] = t
+            if np.isnan(faults[_FRESH_TIME]):
+                faults[_FRESH_TIME] = t
             if faults[_STARTED] == 0.0:
                 faults[FAULT_RAMP] = 0.0
-            # Compared with half a period of tolerance, since sums of periods are rounded.
-            if t - faults[_FRESH] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
-                latch(faults, READING_STALE, t, t - faults[_FRESH])
+            # With a tolerance of half a period, since sums of periods are rounded.
+            if t - faults[_FRESH_TIME] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
+                latch(faults, READING_STALE, t, t - faults[_FRESH_TIME])
             return HELD
-        faults[_SEQUENCE], faults[_FRESH] = sequence, t
+        faults[_SEQUENCE], faults[_FRESH_TIME] = sequence, t
     for i in range(3):
         if not np.isfinite(theta[i]):
             latch(faults, READING_NOT_FINITE, t, theta[i])
@@ -183,11 +183,11 @@ def judge_reading(  # noqa: C901 - a kind of fault a branch, the gravest first
         return HELD
     period = faults[_PERIOD]
     started = faults[_STARTED] != 0.0
-    elapsed = clock - faults[_CLOCK] if started else period
-    if sequence >= 0.0 and elapsed < 0.0:  # a simulated device may be run again from its beginning
+    elapsed = clock - faults[_LAST_CLOCK] if started else period
+    if sequence >= 0.0 and elapsed < 0.0:  # a simulated device may restart from its beginning
         latch(faults, CLOCK_BACK, t, -elapsed)
-    faults[_STARTED], faults[_CLOCK] = 1.0, clock
-    faults[_ELAPSED] = elapsed if elapsed > _LATE * period else period
+    faults[_STARTED], faults[_LAST_CLOCK] = 1.0, clock
+    faults[_ELAPSED] = elapsed if elapsed > _LATE_PERIODS * period else period
     verdict = TAKEN
     if elapsed > faults[_SILENCE]:
         faults[FAULT_GAPS] += 1.0
@@ -197,19 +197,19 @@ def judge_reading(  # noqa: C901 - a kind of fault a branch, the gravest first
     for i in range(3):
         turn = abs(theta[i] - last[i])
         moved = moved or turn > 0.0
-        if started and turn > faults[_RATE + i] * faults[_ELAPSED] + 2.0 * faults[_STEP + i]:
+        if started and turn > faults[_MAX_RATE + i] * faults[_ELAPSED] + 2.0 * faults[_COUNT + i]:
             latch(faults, RATE_IMPOSSIBLE, t, turn / faults[_ELAPSED])
             verdict = RESTARTED
     if moved or held or faults[_LOAD] <= faults[_STILL_LOAD]:
         faults[_STILL_SINCE] = clock
-    elif clock - faults[_STILL_SINCE] > faults[_STILL]:
+    elif clock - faults[_STILL_SINCE] > faults[_STILL_TIME]:
         latch(faults, ENCODERS_FROZEN, t, clock - faults[_STILL_SINCE])
     return verdict
 
 
 @njit
 def ramp_in(faults: Array, force: Array) -> None:
-    """Scale a force (3,) in place by the share that is ramped in, then raise the share by one period's increment."""
+    """Scale a force (3,) in place by the ramped-in fraction, then raise this fraction by one period's increment."""
     if faults[FAULT_RAMP] < 1.0:
         for i in range(3):
             force[i] *= faults[FAULT_RAMP]
@@ -225,20 +225,20 @@ def elapsed(faults: Array) -> float:
 @njit
 def note_command(faults: Array, t: float, load: float) -> None:
     """Store the time t [s] of a command and its `load`, the largest ratio of joint torque to Coulomb friction."""
-    faults[_COMMANDED], faults[_LOAD] = t, load
+    faults[_COMMAND_TIME], faults[_LOAD] = t, load
 
 
 @njit
 def is_silent(faults: Array, t: float) -> bool:
     """Watchdog: whether at time t [s] there is a fault or the last command is older than the silence; no force then."""
-    return faults[FAULT_CODE] != 0.0 or t - faults[_COMMANDED] > faults[_SILENCE]
+    return faults[FAULT_CODE] != 0.0 or t - faults[_COMMAND_TIME] > faults[_SILENCE]
 
 
 def rearm(faults: Array) -> None:
     """Clear a latched fault: the force is ramped in from zero, from the next reading on. The count of gaps is kept."""
     faults[FAULT_CODE] = faults[FAULT_TIME] = faults[FAULT_VALUE] = faults[FAULT_RAMP] = 0.0
     faults[_STARTED] = faults[_LOAD] = 0.0
-    faults[_FRESH] = faults[_COMMANDED] = np.nan
+    faults[_FRESH_TIME] = faults[_COMMAND_TIME] = np.nan
 
 
 @dataclass(frozen=True)
@@ -250,9 +250,9 @@ class Plausibility:
     period : float
         Servo period T [s].
     rates : three floats
-        ω_max, fastest that each joint can turn [rad/s].
+        ω_max, largest possible speed of each joint [rad/s].
     steps : three floats
-        δ, a count of each encoder [rad].
+        δ, one count of each encoder [rad].
     silence : float
         Time without a reading or a command after which a device switches its force off [s]; at least two periods.
     ramp : float
@@ -260,9 +260,9 @@ class Plausibility:
         can respond.
     still, still_load : float
         Longest time without an encoder count [s] while a joint's torque exceeds `still_load` times its Coulomb
-        friction. A free stylus then moves: at four times the friction, and the Premium's 0.04 N and 75 g at the tip, by
-        a count (0.03 mm) in 6 ms. A held stylus trembles with the hand, at 8 to 12 Hz and by several counts: four
-        periods of that in half a second. At smaller torques a hand may rest without any count.
+        friction. A free stylus would move: at four times the friction, with the Premium's 0.04 N and 75 g at the tip,
+        by one count (0.03 mm) in 6 ms. A held stylus trembles with the hand, at 8 to 12 Hz and by several counts: at
+        least four periods in half a second. At smaller torques a hand may rest without any count.
 
     Raises
     ------
@@ -288,13 +288,17 @@ class Plausibility:
             raise ParameterError(f"a silence of {self.silence} s is shorter than two periods of {self.period} s")
 
     def fresh(self, ramp: float = 1.0) -> Array:
-        """`faults` of a device before its first reading, without a fault; `ramp` is the initial share of the force."""
+        """`faults` of a device before its first reading, without a fault; `ramp` is its initial force fraction."""
         faults = np.zeros(FAULT_SIZE)
         faults[FAULT_RAMP] = ramp
-        faults[_FRESH] = faults[_COMMANDED] = np.nan
-        faults[_PERIOD], faults[_RATE:_STEP], faults[_STEP:_SILENCE] = self.period, self.rates, self.steps
+        faults[_FRESH_TIME] = faults[_COMMAND_TIME] = np.nan
+        faults[_PERIOD], faults[_MAX_RATE:_COUNT], faults[_COUNT:_SILENCE] = (
+            self.period,
+            self.rates,
+            self.steps,
+        )
         faults[_SILENCE], faults[_RAMP_TIME] = self.silence, self.ramp
-        faults[_STILL], faults[_STILL_LOAD] = self.still, self.still_load
+        faults[_STILL_TIME], faults[_STILL_LOAD] = self.still, self.still_load
         return faults
 
 
@@ -307,7 +311,7 @@ class LatchedFault:
     value: float
 
     def line(self) -> str:
-        """The fault in a sentence."""
+        """The fault as a sentence."""
         return f"The device let go at {self.t:.3f} s: {self.fault.words(self.value)}."
 
 

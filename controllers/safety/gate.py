@@ -2,8 +2,8 @@ r"""Safety gate, the last stage before the motors of a real device: limits the c
 
 .. math:: F = g\, s\, w(p)\, u(v)\, \min(1, L/|F_w|)\, F_w, \qquad |F_k - F_{k-1}| \le r\,T
 
-g is the gain of the oscillation detector, s the share that is ramped in (0 in every state but `RAMPING` and `ACTIVE`);
-w and u fall from 1 to 0 between a limit of workspace or speed and the end of the margin behind it, where a fault is
+g is the gain of the oscillation detector, s the ramped-in fraction (0 in every state but `RAMPING` and `ACTIVE`);
+w and u fall from 1 to 0 between a limit of workspace or speed and the end of the margin beyond it, where a fault is
 latched. The gate does not rely on earlier stages: for any input its output is finite, within L and the slew rate r.
 Switching off is exempt from the slew rate.
 
@@ -36,8 +36,8 @@ from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
 from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
 
-_PERIOD, _FORCE, _STEP, _SPEED, _SPEED_MARGIN, _MARGIN, _SMALL, _QUIET, _RAMP = range(9)
-_DEAD_MAN, _PERMITTED, _LOW, _HIGH, _SIZE = 9, 10, 11, 14, 17
+_PERIOD, _MAX_FORCE, _MAX_CHANGE, _MAX_SPEED, _SPEED_MARGIN, _MARGIN, _SMALL_FORCE, _QUIET_TIME, _RAMP_TIME = range(9)
+_DEAD_MAN, _PERMITTED, _LOW_CORNER, _HIGH_CORNER, _SIZE = 9, 10, 11, 14, 17
 GATE_STATE, GATE_SHARE, GATE_QUIET, GATE_GAIN, GATE_FORCE, GATE_SIZE = 0, 1, 2, 3, 4, 7
 
 OSCILLATION, LEFT_WORKSPACE, TOO_FAST = int(Fault.OSCILLATION), int(Fault.LEFT_WORKSPACE), int(Fault.TOO_FAST)
@@ -71,14 +71,14 @@ def pass_gate(
     largest = max(abs(force[0]), abs(force[1]), abs(force[2]), 1e-300)
     size = largest * np.sqrt((force[0] / largest) ** 2 + (force[1] / largest) ** 2 + (force[2] / largest) ** 2)
     held = params[_DEAD_MAN] == 0.0 or hand[HAND_SWITCH] > 0.0
-    quiet = held and size <= params[_SMALL]
+    quiet = held and size <= params[_SMALL_FORCE]
     gate[GATE_QUIET] = gate[GATE_QUIET] + period if quiet else 0.0
 
     if request == CLEAR and faults[FAULT_CODE] == 0.0:
         gate[GATE_STATE] = next_state(int(gate[GATE_STATE]), CLEAR)
-    state = _requested(params, int(gate[GATE_STATE]), request, held, gate[GATE_QUIET])
+    state = _apply_requests(params, int(gate[GATE_STATE]), request, held, gate[GATE_QUIET])
     if pushes(state):
-        _judge_motion(params, faults, hand)
+        _check_motion(params, faults, hand)
         gain = oscillation_gain(shaking, shaken, force)
         if gain < 0.0:
             latch(faults, OSCILLATION, t, -gain)
@@ -89,36 +89,38 @@ def pass_gate(
         shaken[OSCILLATION_GAIN] = 1.0
     if faults[FAULT_CODE] != 0.0:
         state = next_state(state, FAULTED)
-    share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP]) if pushes(state) else 0.0
+    share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP_TIME]) if pushes(state) else 0.0
     if state == RAMPING and share >= 1.0:
         state = next_state(state, RAMPED)
     gate[GATE_STATE], gate[GATE_SHARE], gate[GATE_GAIN] = state, share, max(0.0, gain)
     if pushes(state):
-        _slew(params, gate, gain * share * _room(params, hand) * min(1.0, params[_FORCE] / max(size, 1e-300)), force)
+        _limit_slew(
+            params, gate, gain * share * _fade(params, hand) * min(1.0, params[_MAX_FORCE] / max(size, 1e-300)), force
+        )
     else:
         for i in range(3):
             force[i] = gate[GATE_FORCE + i] = 0.0
 
 
 @njit
-def _requested(params: Array, state: int, request: int, held: bool, quiet: float) -> int:
+def _apply_requests(params: Array, state: int, request: int, held: bool, quiet: float) -> int:
     """State after the user's request, the dead-man switch, and the time that the force has been small [s]."""
     if request == DISARM or (request == ARM and params[_PERMITTED] > 0.0):
         state = next_state(state, request)
     if not held:
         state = next_state(state, RELEASED)
-    if state == ARMING and quiet >= params[_QUIET]:
+    if state == ARMING and quiet >= params[_QUIET_TIME]:
         state = next_state(state, QUIET)
     return state
 
 
 @njit
-def _judge_motion(params: Array, faults: Array, hand: Array) -> None:
+def _check_motion(params: Array, faults: Array, hand: Array) -> None:
     """Latch a fault if the hand is beyond the margin of workspace or speed; the comparisons also catch NaN."""
-    speed, outside = _speed(hand), _outside(params, hand)
+    speed, outside = _speed(hand), _distance_outside(params, hand)
     if not outside <= params[_MARGIN]:
         latch(faults, LEFT_WORKSPACE, hand[HAND_TIME], outside)
-    if not speed <= params[_SPEED] + params[_SPEED_MARGIN]:
+    if not speed <= params[_MAX_SPEED] + params[_SPEED_MARGIN]:
         latch(faults, TOO_FAST, hand[HAND_TIME], speed)
 
 
@@ -129,31 +131,31 @@ def _speed(hand: Array) -> float:
 
 
 @njit
-def _outside(params: Array, hand: Array) -> float:
+def _distance_outside(params: Array, hand: Array) -> float:
     """Distance from the box of the workspace [m], 0 within it."""
     square = 0.0
     for i in range(3):
         p = hand[HAND_POSITION + i]
-        square += np.maximum(0.0, np.maximum(params[_LOW + i] - p, p - params[_HIGH + i])) ** 2
+        square += np.maximum(0.0, np.maximum(params[_LOW_CORNER + i] - p, p - params[_HIGH_CORNER + i])) ** 2
     return np.sqrt(square)
 
 
 @njit
-def _room(params: Array, hand: Array) -> float:
+def _fade(params: Array, hand: Array) -> float:
     """w(p) u(v): 1 within the limits, 0 at the end of the margins."""
-    w = 1.0 - _outside(params, hand) / params[_MARGIN]
-    u = 1.0 - (_speed(hand) - params[_SPEED]) / params[_SPEED_MARGIN]
+    w = 1.0 - _distance_outside(params, hand) / params[_MARGIN]
+    u = 1.0 - (_speed(hand) - params[_MAX_SPEED]) / params[_SPEED_MARGIN]
     return max(0.0, min(1.0, w)) * max(0.0, min(1.0, u))
 
 
 @njit
-def _slew(params: Array, gate: Array, scale: float, force: Array) -> None:
+def _limit_slew(params: Array, gate: Array, scale: float, force: Array) -> None:
     """Scale a force, limit its change from the last one to the slew rate, and store it."""
     change = 0.0
     for i in range(3):
         force[i] *= scale
         change += (force[i] - gate[GATE_FORCE + i]) ** 2
-    share = min(1.0, params[_STEP] / max(np.sqrt(change), 1e-300))
+    share = min(1.0, params[_MAX_CHANGE] / max(np.sqrt(change), 1e-300))
     for i in range(3):
         force[i] = gate[GATE_FORCE + i] + (force[i] - gate[GATE_FORCE + i]) * share
         gate[GATE_FORCE + i] = force[i]
@@ -175,14 +177,14 @@ class Gate:
     slew : float
         r, largest change of the force [N/s].
     speed, speed_margin : float
-        Tip speed above which the force fades, and the further speed range over which it does, until a fault [m/s].
+        Tip speed above which the force fades, and the range of speed above it over which it fades, until a fault [m/s].
     low, high : three floats
-        Corners of the workspace box in H [m]; the Premium 1.5's is 191 × 381 × 267 mm (data sheet) about its middle.
+        Corners of the workspace box in H [m]; the Premium 1.5's is 191 × 381 × 267 mm (data sheet) about its centre.
     margin : float
         Distance over which the force fades outside the box, until a fault [m].
     small, quiet : float
-        No force until the demanded force has been at most `small` [N] for `quiet` [s]. A river pulls along with
-        b_d |φ̇| also where the hand is on its curve: 0.6 N at 8 N s/m and 8 cm/s.
+        No force until the demanded force has been at most `small` [N] for `quiet` [s]. A river pulls with b_d |φ̇| even
+        if the hand is on its curve: 0.6 N at 8 N s/m and 8 cm/s.
     ramp : float
         Time in which the force is ramped in [s].
     dead_man : bool
@@ -234,7 +236,7 @@ class Gate:
             self.quiet, self.ramp,
         )  # fmt: skip
         params[_DEAD_MAN], params[_PERMITTED] = float(self.dead_man), float(self.permitted)
-        params[_LOW:_HIGH], params[_HIGH:_SIZE] = self.low, self.high
+        params[_LOW_CORNER:_HIGH_CORNER], params[_HIGH_CORNER:_SIZE] = self.low, self.high
         return params
 
     def fresh_memory(self) -> Array:

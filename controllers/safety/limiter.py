@@ -9,7 +9,7 @@ from controllers.errors import ParameterError
 from controllers.safety.faults import FORCE_NOT_FINITE, LIMITER_NOT_FINITE
 from controllers.state import Array
 
-_CONTINUOUS, _PEAK, _SHARE, _STEP = range(4)
+_CONTINUOUS, _PEAK, _HEAT_COEFFICIENT, _MAX_CHANGE = range(4)
 THERMAL_TIME = 10.0
 """Thermal time constant of a motor's winding [s]: the RE 25's is of this order."""
 
@@ -35,8 +35,8 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
         Memory [h, last force (3), fault], written. Once a fault is set the force stays zero until the memory is
         renewed.
     wrench : Array, shape (6,)
-        Wrench demanded by the field; the moment is dropped, since the device has motors for a force only, but
-        one that is not finite is a fault too: whatever computes it is wrong.
+        Wrench demanded by the field. The moment is dropped, since the device has motors for a force only; but a moment
+        that is not finite is a fault too, since its computation is wrong.
     force : Array
         Written [N].
 
@@ -49,7 +49,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
         limiter[LIMITER_FAULT] = LIMITER_NOT_FINITE
     elif not np.isfinite(wrench[0] + wrench[1] + wrench[2] + wrench[3] + wrench[4] + wrench[5]):
         limiter[LIMITER_FAULT] = FORCE_NOT_FINITE
-    # Written as a comparison with 0 that is also true if the fault code itself is NaN.
+    # In this form the comparison is also true if the fault code itself is NaN.
     if limiter[LIMITER_FAULT] != 0.0:
         for i in range(3):
             force[i] = limiter[LIMITER_FORCE + i] = 0.0
@@ -72,15 +72,15 @@ def slew_force(limits: Array, limiter: Array, force: Array) -> None:
     for i in range(3):
         change += (force[i] - limiter[LIMITER_FORCE + i]) ** 2
     change = np.sqrt(change)
-    if change > limits[_STEP]:
+    if change > limits[_MAX_CHANGE]:
         for i in range(3):
             last = limiter[LIMITER_FORCE + i]
-            force[i] = last + (force[i] - last) * (limits[_STEP] / change)
+            force[i] = last + (force[i] - last) * (limits[_MAX_CHANGE] / change)
     norm = np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
     # The last force may have been allowed by a higher ceiling than the present one.
     scale = min(1.0, ceiling / max(norm, 1e-300))
     heat = limiter[LIMITER_HEAT]
-    limiter[LIMITER_HEAT] = heat + limits[_SHARE] * ((scale * norm) ** 2 - heat)
+    limiter[LIMITER_HEAT] = heat + limits[_HEAT_COEFFICIENT] * ((scale * norm) ** 2 - heat)
     for i in range(3):
         force[i] *= scale
         limiter[LIMITER_FORCE + i] = force[i]
@@ -113,7 +113,7 @@ class ForceLimiter:
     .. math:: |F| \le L(h), \qquad T\,|\dot F| \le T\,r, \qquad \dot h = (|F|^2 - h)/\tau
 
     The magnitude is scaled, the direction kept. h is the mean square of the force over the thermal time τ: a cold
-    motor gives the peak force, a motor that has worked for some τ the continuous one (see `force_ceiling`). A
+    motor gives the peak force, a motor that has worked for several τ the continuous force (see `force_ceiling`). A
     non-finite force or memory is a fault: the force is zero from then on.
 
     Parameters

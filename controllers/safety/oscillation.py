@@ -2,7 +2,7 @@ r"""Oscillation detector: counts reversals of the force's high-frequency part, a
 
 .. math:: F_h = F - F_l, \quad \dot F_l = \omega_c (F - F_l), \qquad \dot n = -n/\tau + \sum_k \delta(t - t_k)
 
-t_k are the times at which F_h, larger than a threshold, points against its direction at the last such time. A limit
+t_k are the times at which F_h exceeds a threshold and points against its direction at the previous such time. A limit
 cycle of f Hz raises n to 2 f τ; a step or a wall raises it to 1 or 2, tremor (8–12 Hz) and voluntary motion (below
 10 Hz) to at most 2.4. While n is above its limit the force is multiplied by a falling gain, g' = −g/τ_d, which
 recovers slowly. F is the force that the hand gets, so the gain settles where the oscillation stops: a loop that is too
@@ -10,8 +10,8 @@ stiff ends up at its stability limit, a noisy one at a very small gain. Oscillat
 fault.
 
 The index of Dimeas & Aspragathos, "Online stability in human-robot cooperation with admittance control", IEEE Trans.
-Haptics 9(2), 2016, compares the high-frequency part of the force's spectrum with the whole, and lowers gains by it;
-counting reversals needs no window and no transform.
+Haptics 9(2), 2016, compares the high-frequency part of the force's spectrum with the whole, and lowers gains
+accordingly. Counting reversals needs no window and no transform.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.state import Array, Mask
 
-_PERIOD, _PASS, _THRESHOLD, _LEAK, _MOST, _DOWN, _UP, _FORGET, _LONGEST = range(9)
+_PERIOD, _LOW_PASS, _THRESHOLD, _COUNT_DECAY, _MAX_COUNT, _GAIN_FALL, _GAIN_RISE, _TIME_DECAY, _MAX_TIME = range(9)
 OSCILLATION_LAST, OSCILLATION_COUNT, OSCILLATION_GAIN, OSCILLATION_TIME, OSCILLATION_SIZE = 3, 6, 7, 8, 9
 
 
@@ -47,11 +47,11 @@ def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
     """
     dot, size, gain = 0.0, 0.0, memory[OSCILLATION_GAIN]
     for i in range(3):
-        memory[i] += params[_PASS] * (gain * force[i] - memory[i])
+        memory[i] += params[_LOW_PASS] * (gain * force[i] - memory[i])
         fast = gain * force[i] - memory[i]
         size += fast * fast
         dot += fast * memory[OSCILLATION_LAST + i]
-    memory[OSCILLATION_COUNT] *= params[_LEAK]
+    memory[OSCILLATION_COUNT] *= params[_COUNT_DECAY]
     x, y, z = memory[OSCILLATION_LAST], memory[OSCILLATION_LAST + 1], memory[OSCILLATION_LAST + 2]
     last = x**2 + y**2 + z**2
     if size > params[_THRESHOLD] ** 2:
@@ -60,11 +60,11 @@ def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
         if dot < 0.0 or last == 0.0:
             for i in range(3):
                 memory[OSCILLATION_LAST + i] = gain * force[i] - memory[i]
-    shakes = memory[OSCILLATION_COUNT] > params[_MOST]
-    gain = gain * params[_DOWN] if shakes else min(1.0, gain + params[_UP])
+    oscillates = memory[OSCILLATION_COUNT] > params[_MAX_COUNT]
+    gain = gain * params[_GAIN_FALL] if oscillates else min(1.0, gain + params[_GAIN_RISE])
     memory[OSCILLATION_GAIN] = gain
-    memory[OSCILLATION_TIME] = memory[OSCILLATION_TIME] * params[_FORGET] + (params[_PERIOD] if shakes else 0.0)
-    return -np.sqrt(size) if memory[OSCILLATION_TIME] > params[_LONGEST] else gain
+    memory[OSCILLATION_TIME] = memory[OSCILLATION_TIME] * params[_TIME_DECAY] + (params[_PERIOD] if oscillates else 0.0)
+    return -np.sqrt(size) if memory[OSCILLATION_TIME] > params[_MAX_TIME] else gain
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ class OscillationDetector:
     fall, rise : float
         Time constant of the gain's fall, and time of its recovery from 0 to 1 [s].
     longest, forget : float
-        Accumulated time of oscillation that is a fault, and the time constant with which it decays [s]: 1 s on end, or
-        a fifth of the time.
+        Accumulated time of oscillation that is a fault, and the time constant with which it decays [s]: a fault after
+        1 s of continuous oscillation, or oscillation for a fifth of the time.
 
     Raises
     ------
@@ -138,12 +138,12 @@ def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> 
         `fresh_memory` as a list, written, so that a record can be processed in blocks.
     """
     params = detector.params()
-    params[_DOWN], params[_UP], params[_LONGEST] = 1.0, 0.0, np.inf
-    # In plain Python: compiling the kernel would take a second for a tenth of a second of work.
+    params[_GAIN_FALL], params[_GAIN_RISE], params[_MAX_TIME] = 1.0, 0.0, np.inf
+    # In plain Python, which takes 0.1 s; compiling the kernel would take 1 s.
     given: Any = params.tolist()
     step: Any = oscillation_gain.py_func
     found = np.zeros(len(force), dtype=np.bool_)
     for k, row in enumerate(force.tolist()):
         step(given, memory, row)
-        found[k] = memory[OSCILLATION_COUNT] > given[_MOST]
+        found[k] = memory[OSCILLATION_COUNT] > given[_MAX_COUNT]
     return found

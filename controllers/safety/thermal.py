@@ -4,7 +4,7 @@ r"""Thermal model of the motors: i²t of each, and the torque ceiling that follo
           \quad L_i^2 = c_i^2 + (p_i^2 - c_i^2) \max(0, 1 - h_i/c_i^2)
 
 Copper loss is proportional to the square of the current, and the winding cools: h is the mean square of the torque over
-the winding's time constant, and h = c² the steady state at the continuous torque c. p is the stall torque. With the
+the winding's time constant, and h = c² is the steady state at the continuous torque c. p is the stall torque. With the
 ceiling L no demand takes h above c², as long as T/τ_th ≤ c²/p² for the period T (0.0001 against 0.05 for a Phantom at
 1 kHz). Maxon's data sheets give c, p and the time constant; the `ForceLimiter` has the same law for the force.
 """
@@ -22,7 +22,7 @@ def hold_to_heat(
 ) -> float:
     """Scale joint torques in place to the ceilings that the motors' heat allows, and update the heat.
 
-    All three are scaled alike, so that the force keeps its direction.
+    All three are scaled by the same factor, so that the force keeps its direction.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def hold_to_heat(
     Returns
     -------
     float
-        Largest used share of a motor's thermal capacity, max h_i/c_i².
+        Largest used fraction of a motor's thermal capacity, max h_i/c_i².
     """
     scale = 1.0
     for i in range(3):

@@ -1,4 +1,4 @@
-"""Trials of flights: the physical figure flies the longest flight of clips at many playback rates.
+"""Trials of flights: the physical figure performs the longest flight of clips at many playback rates.
 
 ``python -m experiments.certify.ballistic_figures docs/pictures CAPTURES`` flies the embedded jump and backflip
 and two captured jumps, draws the picture of the docs and prints its table.
@@ -18,7 +18,7 @@ from controllers.certificates.flight.flight_fit import best_fall
 from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 
-_RATES = 13  # number of rates flown by the physical figure
+_RATE_COUNT = 13  # number of rates flown by the physical figure
 
 
 class FlownClip(NamedTuple):
@@ -46,7 +46,7 @@ def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
     """Fly the longest flight of a clip at rates inside and outside the interval at which it is feasible."""
     flight = max(ballistics.flights, key=lambda flight: flight.fit.duration)
     low, high = flight.done or flight.seen
-    rates = np.geomspace(0.8 * low, 1.25 * min(high, 2.0), _RATES)
+    rates = np.geomspace(0.8 * low, 1.25 * min(high, 2.0), _RATE_COUNT)
     return FlownClip(name, ballistics, flight, [fly(ballistics.clip, flight.fit, float(rate)) for rate in rates])
 
 
@@ -56,8 +56,8 @@ def rates_table(cases: Sequence[FlownClip]) -> str:
     for case in cases:
         low, high = case.flight.done or (np.inf, 0.0)
         for trial in case.trials:
-            said = "yes" if low <= trial.rate <= high else "no"
-            row = f"{trial.rate:.2f} | {said} | {100 * trial.distance:.1f} | {100 * trial.predicted:.1f}"
+            feasible = "yes" if low <= trial.rate <= high else "no"
+            row = f"{trial.rate:.2f} | {feasible} | {100 * trial.distance:.1f} | {100 * trial.predicted:.1f}"
             lines.append(f"| {case.name} | {row} |")
     return "\n".join(lines)
 
@@ -76,9 +76,9 @@ def _draw_rates(
     low, high = flight.done or flight.seen
     rates = [trial.rate for trial in trials]
     com = ballistics.motion.com[flight.fit.start : flight.fit.end + 1]
-    many = np.geomspace(rates[0], rates[-1], 100)
-    predicted = [100 * best_fall(com, ballistics.motion.fps, float(rate))[0] for rate in many]
-    ax.plot(many, predicted, color="#2f6db3", lw=1.2, label="certificate")
+    fine_rates = np.geomspace(rates[0], rates[-1], 100)
+    predicted = [100 * best_fall(com, ballistics.motion.fps, float(rate))[0] for rate in fine_rates]
+    ax.plot(fine_rates, predicted, color="#2f6db3", lw=1.2, label="certificate")
     ax.plot(rates, [100 * trial.distance for trial in trials], "o", ms=4, color="#c2473b", label="physical figure")
     ax.axhline(5.0, color="#566072", lw=0.8, ls="--")
     if flight.done is not None:

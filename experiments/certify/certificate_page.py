@@ -16,8 +16,8 @@ from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
 
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
-_SHORT = 12  # largest size of an array that the page shows
-_RATES = (0.25, 4.0)  # range of the figure of admissible rates
+_MAX_SHOWN_SIZE = 12  # largest array that the page shows
+_RATE_RANGE = (0.25, 4.0)  # range of the figure of admissible rates
 
 
 def stability_figure(river: River, verdict: Verdict) -> Figure:
@@ -42,7 +42,7 @@ def stability_figure(river: River, verdict: Verdict) -> Figure:
 
 
 def region_figure(verdict: Verdict) -> Figure:
-    """Region of attraction and the ball reached, over offset and error of speed, for the lightest and heaviest hand."""
+    """Region of attraction and the ball reached, over offset and speed error, for the lightest and heaviest hand."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
     masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
@@ -58,7 +58,7 @@ def region_figure(verdict: Verdict) -> Figure:
 
 
 def flights_figure(found: ClipBallistics) -> Figure:
-    """Height of the centre of mass with free fall between the ends of each flight, and admissible rates of a lap."""
+    """Height of the centre of mass, with free fall between the ends of each flight, and admissible rates of a lap."""
     motion, lap = found.motion, len(found.bounds.low)
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     height, rates = figure.subplots(1, 2)
@@ -79,12 +79,12 @@ def flights_figure(found: ClipBallistics) -> Figure:
     height.set(xlabel="time [s]", ylabel="height [m]")
     height.set_title("flights", loc="left")
     height.legend(frameon=False, fontsize=8)
-    low, high = (np.clip(np.nan_to_num(rate, posinf=_RATES[1]), *_RATES) for rate in found.bounds[:2])
+    low, high = (np.clip(np.nan_to_num(rate, posinf=_RATE_RANGE[1]), *_RATE_RANGE) for rate in found.bounds[:2])
     rates.fill_between(
         times, low, np.maximum(low, high), color="#dbe7f4", label="in flight by gravity, else by friction", step="mid"
     )
     rates.axhline(1.0, color="#c2473b", label="as recorded")
-    rates.set(yscale="log", xlabel="time [s]", ylabel="rate σ", ylim=_RATES)
+    rates.set(yscale="log", xlabel="time [s]", ylabel="rate σ", ylim=_RATE_RANGE)
     rates.set_yticks([0.25, 0.5, 1.0, 2.0, 4.0], ["0.25", "0.5", "1", "2", "4"])
     rates.minorticks_off()
     rates.set_title("admissible rates", loc="left")
@@ -118,13 +118,13 @@ def _table(numbers: Mapping[str, object]) -> str:
     rows: list[str] = []
     for key, value in numbers.items():
         name, unit = WORDS.get(key, (key.replace("_", " "), ""))
-        told = _described(value)
-        if told:
-            rows.append(f"<tr><td>{escape(name)}</td><td>{escape(told)} {escape(unit)}</td></tr>")
+        text = _value_text(value)
+        if text:
+            rows.append(f"<tr><td>{escape(name)}</td><td>{escape(text)} {escape(unit)}</td></tr>")
     return f"<table>{''.join(rows)}</table>" if rows else ""
 
 
-def _described(value: object) -> str:
+def _value_text(value: object) -> str:
     """A number, a short array or a hand as text; empty for anything longer."""
     if isinstance(value, bool | str | int):
         return str(value)
@@ -134,9 +134,9 @@ def _described(value: object) -> str:
         return str(value)
     if isinstance(value, Mapping):
         entries = cast(Mapping[str, object], value)
-        return ", ".join(f"{name}: {_described(item)}" for name, item in entries.items())
+        return ", ".join(f"{name}: {_value_text(item)}" for name, item in entries.items())
     if isinstance(value, np.ndarray | list | tuple):
         array = np.asarray(cast(npt.ArrayLike, value))
-        if array.dtype.kind in "fiu" and 0 < array.size <= _SHORT:
+        if array.dtype.kind in "fiu" and 0 < array.size <= _MAX_SHOWN_SIZE:
             return ", ".join(f"{number:.4g}" for number in array.ravel().tolist())
     return ""

@@ -1,4 +1,4 @@
-"""Clips of a run or of a map's file for its certificate, and verdicts on their flights."""
+"""Clips of a run or of a map file for its certificate, and verdicts on their flights."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,17 +18,17 @@ from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 
 PLAYED = "as played"
-_PACE = "clips are judged at their own pace, what a run played as it was played, its first second left out"
+_PACE_ASSUMPTION = "clips are judged at their own pace, what a run played as it was played, its first second left out"
 _FPS = 125.0  # frame rate at which a played animation is judged [1/s]
-_LONGEST = 120.0  # longest part of it that is judged [s]
-_ORDER = ("refuted", "unknown", "certified")
+_MAX_DURATION = 120.0  # longest part of it that is judged [s]
+_SEVERITY_ORDER = ("refuted", "unknown", "certified")
 
 
 def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tuple[Clip, ...]]:
-    """Configuration and clips of a recorded run, of which the last is its animation as it was played.
+    """Configuration and clips of a recorded run; the last clip is its animation as it was played.
 
-    Without a recording: the given configuration, and the clips of its map's file or those that it names.
-    What a figure of another stature played is given on the default one, as the clips are.
+    Without a recording: the given configuration, and the clips of its map file or those that it names.
+    The animation of a figure of another stature is converted to the default figure, as the clips are.
 
     Raises
     ------
@@ -39,8 +39,8 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
         with Recording(folder / RECORDING) as recording:
             config = config_of(recording)
             size = config.figure.stature / DEFAULT_STATURE
-            shown = (clip.resized(1.0 / size) for clip in played(recording))
-            return config, (*clips_of(recording), *shown)
+            played_clips = (clip.resized(1.0 / size) for clip in played(recording))
+            return config, (*clips_of(recording), *played_clips)
     if isinstance(config.map, MapFile):
         return config, load_figure_map(Path(config.map.file))[1]
     return config, clips_for(config.map)[0]
@@ -49,7 +49,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
 def similar(clip: Clip, size: float) -> Clip:
     """The default figure's motion that is dynamically similar to a clip on a figure of size s (equal Froude number).
 
-    With lengths s times as long at the same times it accelerates s times as much, as the clip does at √s of its pace.
+    A figure with lengths s times as long accelerates s times as much, as the clip does when played √s times as fast.
     """
     return clip if size == 1.0 else replace(clip, fps=clip.fps * size**0.5)
 
@@ -59,24 +59,30 @@ def played(recording: Recording) -> tuple[Clip, ...]:
     if not animated(recording):
         return ()
     rate = recording.rates["frames"]
-    stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_LONGEST * rate)
+    stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_MAX_DURATION * rate)
     poses = recording.channel("frames", "reference")[first:last:stride]
     return (Clip(poses, rate / stride, PLAYED),) if len(poses) > 1 else ()
 
 
 def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING, size: float = 1.0) -> dict[str, Verdict]:
-    """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with those of all clips listed.
+    """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with a list of all clips.
 
-    `size`: lengths of the figure over those of the default one, for which the clips are [1].
+    `size`: lengths of the figure relative to the default one, for which the clips are made [1].
     """
     found = [(clip.name, clip_ballistics(similar(clip, size), judging).certificate.verdicts) for clip in clips]
-    told: dict[str, Verdict] = {}
+    verdicts: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
-        name, worst = min(((name, of[kind]) for name, of in found), key=lambda pair: _ORDER.index(pair[1].verdict))
-        each = {name: of[kind].verdict for name, of in found}
-        listed = ", ".join(f"{clip} {known}" for clip, known in each.items())
-        by = "" if size == 1.0 else f" by a figure of {size * DEFAULT_STATURE:g} m, times over {size**0.5:.2f}"
-        reason = f"{name}{by}: {worst.reason}" + (f"; each: {listed}" if len(each) > 1 else "")
-        assumptions = (*worst.assumptions, _PACE) if PLAYED not in each or len(each) > 1 else worst.assumptions
-        told[kind] = replace(worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": each})
-    return told
+        name, worst = min(
+            ((name, by_kind[kind]) for name, by_kind in found), key=lambda pair: _SEVERITY_ORDER.index(pair[1].verdict)
+        )
+        outcomes = {name: by_kind[kind].verdict for name, by_kind in found}
+        listed = ", ".join(f"{clip} {outcome}" for clip, outcome in outcomes.items())
+        figure_text = "" if size == 1.0 else f" by a figure of {size * DEFAULT_STATURE:g} m, times over {size**0.5:.2f}"
+        reason = f"{name}{figure_text}: {worst.reason}" + (f"; each: {listed}" if len(outcomes) > 1 else "")
+        assumptions = (
+            (*worst.assumptions, _PACE_ASSUMPTION) if PLAYED not in outcomes or len(outcomes) > 1 else worst.assumptions
+        )
+        verdicts[kind] = replace(
+            worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": outcomes}
+        )
+    return verdicts

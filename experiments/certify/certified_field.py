@@ -1,7 +1,7 @@
-"""Inputs of a certificate, by whose hash it is checked: laws, gains, curves, clock, device, hands, clips and code.
+"""Inputs of a certificate, whose hash identifies it: laws, gains, curves, clock, device, hands, clips and code.
 
-A check must be fast, so nothing here imports CasADi or splines at the top: the inputs hold curves as the map has them,
-not as the field leads along them.
+A check must be fast, so nothing here imports CasADi or splines at the top. The inputs contain curves as the map has
+them, not as the field leads along them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,12 +25,12 @@ from experiments.setups.parts.defaults import resolved
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
-_Timed = Callable[[Trajectory], Trajectory]
+_Retiming = Callable[[Trajectory], Trajectory]
 """Maps a curve to the curve along which a field leads."""
 
 
 def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
-    """Curves along which a run leads: by "" that of its start, by "_NAME" the other curves of a lifted map.
+    """Curves along which a run leads: under "" that of its start, under "_NAME" the other curves of a lifted map.
 
     Raises
     ------
@@ -51,14 +51,14 @@ def given_curves(config: RunConfig) -> dict[str, Trajectory]:
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach a lifted one, or there is no such map.
     """
-    return MAP_CURVES[config.map.kind](config, config.map, _as_given)
+    return MAP_CURVES[config.map.kind](config, config.map, _unchanged)
 
 
-def _as_given(curve: Trajectory) -> Trajectory:
+def _unchanged(curve: Trajectory) -> Trajectory:
     return curve
 
 
-def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajectory]:
+def _lead_curve(config: RunConfig, part: Led, retime: _Retiming) -> dict[str, Trajectory]:
     # Imported late: loads splines, which a check of gains does not need.
     from experiments.setups.parts.leading_hand import s_curve
 
@@ -66,27 +66,27 @@ def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajec
 
 
 def _circle(
-    config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile, timed: _Timed
+    config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile, retime: _Retiming
 ) -> dict[str, Trajectory]:
-    return {"": timed(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
+    return {"": retime(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
 
 
-def _tilted_circle(config: RunConfig, part: RobotArm, timed: _Timed) -> dict[str, Trajectory]:
+def _tilted_circle(config: RunConfig, part: RobotArm, retime: _Retiming) -> dict[str, Trajectory]:
     from experiments.setups.maps.robot_arm import tilted
 
-    return {"": timed(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
+    return {"": retime(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
 
 
-def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str, Trajectory]:
+def _curves_of_file(config: RunConfig, part: MapFile, retime: _Retiming) -> dict[str, Trajectory]:
     from experiments.files.map_files import Lifted, load_map
     from experiments.setups.modes.lifted_runs import curve_number, lifted_curve
 
     found = load_map(Path(part.file))
     if not isinstance(found, Lifted):
-        return _circle(config, part, timed)
+        return _circle(config, part, retime)
     first = found.names[curve_number(found, part.curve)]
     names = [first, *(name for name in found.names if name != first)]
-    return {"" if name == first else f"_{name}": timed(lifted_curve(found, name)) for name in names}
+    return {"" if name == first else f"_{name}": retime(lifted_curve(found, name)) for name in names}
 
 
 MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
@@ -102,7 +102,7 @@ def certified_sampling(config: RunConfig, delay: float) -> Sampling:
 
 
 def certified_options(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
-    """The options on which a certificate depends, by name, to say which of them differ from those of a run.
+    """The options on which a certificate depends, by name, to report those that differ from a run's.
 
     Parameters
     ----------
@@ -110,20 +110,20 @@ def certified_options(config: RunConfig, delay: float, hands: HandRange, push: f
         As in `certificate_inputs`.
     """
     found = linkage_of(config.device)
-    told: dict[str, object] = {"coulomb": found.coulomb, "viscous": found.viscous, "inertia": found.inertia}
+    options: dict[str, object] = {"coulomb": found.coulomb, "viscous": found.viscous, "inertia": found.inertia}
     for part in (config.mode, config.map, config.device, config.clock):
-        told |= _leaves(to_dict(part))
+        options |= _flatten(to_dict(part))
     for unused in ("kind", "device_file", "physics_step"):
-        del told[unused]
+        del options[unused]
     chosen = {"mode": config.mode.kind, "map": config.map.kind, "delay": delay, "hand_push": push}
-    return told | chosen | {f"hand_{name}": value for name, value in asdict(hands).items()}
+    return options | chosen | {f"hand_{name}": value for name, value in asdict(hands).items()}
 
 
-def _leaves(values: Mapping[str, object]) -> dict[str, object]:
-    found: dict[str, object] = {}
+def _flatten(values: Mapping[str, object]) -> dict[str, object]:
+    leaves: dict[str, object] = {}
     for name, value in values.items():
-        found |= _leaves(cast(Mapping[str, object], value)) if isinstance(value, Mapping) else {name: value}
-    return found
+        leaves |= _flatten(cast(Mapping[str, object], value)) if isinstance(value, Mapping) else {name: value}
+    return leaves
 
 
 def certificate_inputs(
@@ -147,7 +147,7 @@ def certificate_inputs(
     push : float
         Largest force of the hand [N].
     clips : sequence of Clip
-        Clips that are also judged; of a led figure, the clip that defines its gait.
+        Clips that are also judged; for a led figure, the clip that defines its gait.
     judging : Judging
         Tolerances by which clips are judged.
     """

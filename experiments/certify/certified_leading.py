@@ -46,15 +46,15 @@ def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
     """Regimes by the suffix of their verdicts' names, for headings of the path that represent all directions.
 
-    - "": the stylus is on the path, and only the spring across it acts; if only the spring along it acts, the law is
+    - "": the stylus is on the path, and only the spring across it acts. If only the spring along it acts, the law is
       the same with t for n, which the headings include.
-    - ``_back``: on the path, and both springs act: the figure is held back.
-    - ``_aside``: beyond the path's front, and the spring across acts: the stylus is beside what the figure can reach.
-    - ``_beyond``: likewise, and both act: the stylus is too far ahead as well, as far as the limiter lets a hand pull.
+    - ``_back``: the stylus is on the path, and both springs act: the figure is held back.
+    - ``_aside``: it is beyond the path's front, and the spring across acts: it is beside what the figure can reach.
+    - ``_beyond``: likewise, and both act: it is also too far ahead, as far as the limiter lets a hand pull it.
     """
     lead, curvature = field.walking.lead[0], field.walking.curvature
-    drawn = field.walking.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
-    near, far = curvature * lead, curvature * (lead + drawn)
+    pull_distance = field.walking.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
+    near, far = curvature * lead, curvature * (lead + pull_distance)
     sides = [(sign, heading) for sign in (1.0, -1.0) for heading in QUARTERS[::2].tolist()]
     return {
         "": [Regime(False, True, heading=heading) for heading in QUARTERS.tolist()],
@@ -66,8 +66,8 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
 
 def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling) -> River:
     """LEADING in one regime, in the form that certificates take."""
-    law_there = regime.law(field.walking.scale, field.k_z / max(field.k_l, 1e-3))
-    return River(law_there, field.k_l, field.b, float("inf"), curve, device, sampling)
+    law = regime.law(field.walking.scale, field.k_z / max(field.k_l, 1e-3))
+    return River(law, field.k_l, field.b, float("inf"), curve, device, sampling)
 
 
 def certify_leading(
@@ -87,8 +87,8 @@ def certify_leading(
     verdicts: dict[str, Verdict] = {}
     for name, regimes in leading_regimes(field).items():
         found = [stability(leading_river(field, it, curve, device, sampling), hands.hands()) for it in regimes]
-        verdicts["stability" + name] = _least(found)
-    radius = max(_walker_radius(field, regime, curve, device, sampling, hands) for regime in _FOLLOWED)
+        verdicts["stability" + name] = _worst_verdict(found)
+    radius = max(_walker_radius(field, regime, curve, device, sampling, hands) for regime in _FOLLOWING_REGIMES)
     for name in ("stability", "stability_back"):
         verdict = verdicts[name]
         figures = {**verdict.figures, "walker_radius": radius}
@@ -111,8 +111,8 @@ def leading_energy(field: Leading) -> Verdict:
 
     .. math:: F \cdot v = f(p, t) \cdot v - b\,|v|^2 \le |f|^2 / 4 b
 
-    with f the force of the springs. The bound needs no potential, which the force does not have ahead and aside. It is
-    evaluated for springs that pull with the limiter's force.
+    with f the force of the springs. The bound needs no potential; ahead and aside the force has none. It is evaluated
+    for springs that pull with the limiter's force.
     """
     force = ForceLimiter(1e-3).peak
     if field.b == 0.0:
@@ -127,7 +127,10 @@ def leading_energy(field: Leading) -> Verdict:
     return Verdict("certified", reason, None, assumptions, {}, figures)
 
 
-_FOLLOWED = (Regime(True, True), *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()))
+_FOLLOWING_REGIMES = (
+    Regime(True, True),
+    *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()),
+)
 
 
 def _walker_radius(
@@ -135,16 +138,16 @@ def _walker_radius(
 ) -> float:
     """Largest spectral radius, over phases and hands, with the walker as part of the state."""
     river = leading_river(field, regime, curve, device, sampling)
-    how, radii = field.walking, list[float]()
+    settings, radii = field.walking, list[float]()
     for hand in hands.hands():
         loop = SampledLoop(river.still(hand), sampling)
-        matrices = walking(loop, regime, how.scale, how.rate, field.k_l, field.b)
+        matrices = walking(loop, regime, settings.scale, settings.rate, field.k_l, field.b)
         radii.append(np.abs(np.linalg.eigvals(matrices)).max())
     return float(max(radii))
 
 
-def _least(verdicts: Sequence[Verdict]) -> Verdict:
-    """The worst verdict; of equal verdicts, the one with the least margin."""
+def _worst_verdict(verdicts: Sequence[Verdict]) -> Verdict:
+    """The worst verdict; of equal verdicts, the one with the smallest margin."""
     order = ("refuted", "unknown", "certified")
     worst = min(verdicts, key=lambda found: (order.index(found.verdict), found.margin or 0.0))
     return replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))

@@ -62,10 +62,10 @@ def meetings(rivers: Sequence[River]) -> list[Meeting]:
 
 
 def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, crossing: str) -> Common | None:
-    """Common Lyapunov function where two rivers meet, for a hand in the middle of a range that holds on there.
+    """Common Lyapunov function where two rivers meet, for a hand in the middle of a range that stays there.
 
-    It is common to the loops with either river, with none and, if rivers are summed, with both; so the state decays
-    under any switching and any blending of them. None if there is none, or such a hand has no stiffness.
+    It is common to the loops with either river, with none and, if rivers are summed, with both. So the state decays
+    under any switching and blending of them. None if none was found, or the hand has no stiffness.
     """
     hand = HandImpedance(*(0.5 * (low + high) for low, high in (hands.mass, hands.damping, hands.stiffness)))
     if hand.stiffness == 0.0:
@@ -100,7 +100,7 @@ def certify_rivers(
     push : float
         Largest force of the hand [N].
     curves : mapping of str to Trajectory
-        Curves of the rivers, beginning with that of `main`; a single one stands for the default rivers about it.
+        Curves of the rivers, beginning with that of `main`; a single one means the default rivers about it.
     """
     sampling, ceiling = main.sampling, ForceLimiter(main.sampling.period).peak
     if len(curves) > 1:
@@ -118,16 +118,18 @@ def certify_rivers(
     common = held_common(rivers, places[0], hands, mode.crossing) if places else None
     field = law_of(mode, choice)
     if isinstance(field, HigherOrder):
-        found = _search(field, rivers, places, push)
+        found = _find_counterexample(field, rivers, places, push)
         sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
         others = [tuple(other for other in rivers if other is not river) for river in rivers]
         keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
         return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
-    return verdicts | {"switching": _summed(common)}
+    return verdicts | {"switching": _summed_verdict(common)}
 
 
-def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float) -> dict[str, object]:
-    """First counterexample to switching, at any meeting, first without a push; empty if torques are delayed."""
+def _find_counterexample(
+    field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float
+) -> dict[str, object]:
+    """First counterexample to switching at any meeting, without a push first; empty if torques are delayed."""
     if rivers[0].sampling.delay > 0.0:
         return {}
     simulate = partial(simulated_course, field, rivers[0].sampling)
@@ -143,10 +145,12 @@ def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meetin
     return {}
 
 
-def _summed(common: Common | None) -> Verdict:
+def _summed_verdict(common: Common | None) -> Verdict:
     """Verdict on summed rivers: nothing switches, but a hand enters and leaves their windows."""
     if common is None:
         return Verdict("unknown", "no common Lyapunov function of the rivers, of none and of both was found")
-    said = f"a hand that holds on settles however rivers come and go: a common Lyapunov function, ρ = {common.rate:.4g}"
+    reason = (
+        f"a hand that holds on settles however rivers come and go: a common Lyapunov function, ρ = {common.rate:.4g}"
+    )
     assumptions = ("a hand in the middle of its range stays where two rivers are nearest", "linear, in that place")
-    return Verdict("certified", said, 1.0 - common.rate, assumptions, {}, {"common_p": common.p})
+    return Verdict("certified", reason, 1.0 - common.rate, assumptions, {}, {"common_p": common.p})

@@ -1,4 +1,4 @@
-"""Certificates of a run's field and of a clip, made before a run and written to a folder."""
+"""Certificates of a run's field and of a clip, computed before a run and written to a folder."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -45,7 +45,7 @@ from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
-_MOMENT = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"
+_MOMENT_ASSUMPTION = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"
 PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
@@ -70,7 +70,7 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
 def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:
     """Verdicts on stability and region of attraction for a range of hands, and on passivity; for FOLLOW also on energy.
 
-    `push` [N] is the hand's force for the energy bound; `drag` [N s/m] is that of a governor beside the laws.
+    `push` [N] is the hand's force for the energy bound; `drag` [N s/m] is that of a governor in addition to the laws.
     """
     verdicts: dict[str, Verdict] = {}
     for name, river in rivers.items():
@@ -112,7 +112,7 @@ def certify_into(
     push : float
         U_max, the hand's force in the bound on the distance [N].
     clips : sequence of Clip
-        Clips whose flights are judged too; in the mode "lead" the first of them is led.
+        Clips whose flights are judged too; in the mode "lead" the figure walks with the first one.
     judging : Judging
         Tolerances of flights, and the floor's friction.
 
@@ -123,9 +123,9 @@ def certify_into(
     """
     config, hands = resolved(config), hands or HandRange()
     inputs = certificate_inputs(config, delay, hands, push, clips, judging)
-    held = _held(out, inputs)
-    if held is not None:
-        return held
+    existing = _existing_certificate(out, inputs)
+    if existing is not None:
+        return existing
     main, verdicts = _field_verdicts(config, delay, hands, push, clips)
     if clips:
         verdicts |= certify_clips(clips, judging, config.figure.stature / DEFAULT_STATURE)
@@ -133,7 +133,7 @@ def certify_into(
     plots: dict[str, tuple[Figure, str]] = {PLOT: (stability_figure(main, verdicts["stability"]), "stability boundary")}
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
         plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
-    _write(certificate, plots, out)
+    _write_certificate(certificate, plots, out)
     (out / OPTIONS).write_text(json_text(certified_options(config, delay, hands, push)) + "\n", encoding="utf-8")
     return certificate
 
@@ -156,37 +156,37 @@ def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
         If there is no such clip, or the file cannot be read.
     """
     (clip,), notes = load_clips([name], raw=True)
-    held = _held(out, clip_inputs(clip, judging))
-    if held is not None:
-        return held
+    existing = _existing_certificate(out, clip_inputs(clip, judging))
+    if existing is not None:
+        return existing
     report = None if name in embedded_names() else load(Path(name)).report
     scaled = () if report is None else (f"lengths, and gravity with them, are scaled to the figure: {report.scaling}",)
     found = clip_ballistics(clip, judging, (*scaled, *notes))
-    _write(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
+    _write_certificate(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
     return found.certificate
 
 
-def _held(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
-    """The certificate in a folder, if its page is there and it has these inputs; else None.
+def _existing_certificate(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
+    """The certificate in a folder, if it has these inputs and its page exists; else None.
 
     Raises
     ------
     SimError
-        If the folder holds a page of that name that is no certificate's.
+        If the folder has a page of that name without a certificate.
     """
     if (out / PAGE).exists() and not (out / CERTIFICATE).exists():
         raise SimError(f"{out / PAGE}: is there already, without a certificate; choose another --out, or move it")
     if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
         return None
     try:
-        held = read_certificate(out / CERTIFICATE)
-        held.check(inputs)
+        existing = read_certificate(out / CERTIFICATE)
+        existing.check(inputs)
     except CertificateError:
         return None  # not a certificate, or of other inputs
-    return held
+    return existing
 
 
-def _write(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
+def _write_certificate(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for file, (figure, _) in plots.items():
         figure.savefig(out / file, dpi=150)
@@ -207,7 +207,7 @@ def _field_verdicts(
         device, sampling = phantom_device(linkage_of(config.device)), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
         return main, certify_leading(field, curve, device, sampling, hands)
-    rivers, drag, missing = certified_rivers(config, delay), governor_drag(config), left_out(config)
+    rivers, drag, omitted = certified_rivers(config, delay), governor_drag(config), left_out(config)
     verdicts, main = certify(rivers, hands, push, drag), rivers[""]
     if isinstance(config.mode, Rivers):
         verdicts |= certify_rivers(config, config.mode, main, hands, push, certified_curves(config))
@@ -216,9 +216,11 @@ def _field_verdicts(
             if name:
                 verdicts["stability" + name] = governed_stability(main._replace(curve=curve), drag, hands.hands())
     if getattr(config.mode, "orientation", None) is not None:
-        verdicts = {name: replace(it, assumptions=(*it.assumptions, _MOMENT)) for name, it in verdicts.items()}
-    if missing:
-        verdicts = {name: leaving_out(verdict, missing) for name, verdict in verdicts.items()}
+        verdicts = {
+            name: replace(it, assumptions=(*it.assumptions, _MOMENT_ASSUMPTION)) for name, it in verdicts.items()
+        }
+    if omitted:
+        verdicts = {name: leaving_out(verdict, omitted) for name, verdict in verdicts.items()}
     if getattr(config.mode, "walls", None) is not None and verdicts["stability"].verdict != "refuted":
         verdicts["stability"] = walled(config, main, verdicts["stability"], hands, clips)
     return main, verdicts

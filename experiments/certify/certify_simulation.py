@@ -1,4 +1,4 @@
-"""Certificates of a simulation made in Python: of its own field, including user-defined laws."""
+"""Certificates of a simulation defined in Python: of its field, including user-defined laws."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -55,14 +55,14 @@ class SimulationCertificate:
     inputs_hash: str
 
 
-class _Scaled(NamedTuple):
-    """A law of a sum, or the force [N] and moment [N m] to which a part of it is cut, and the factor before it."""
+class _ScaledPart(NamedTuple):
+    """A law of a sum, or the force [N] and moment [N m] to which a part of it is limited, and its factor."""
 
     what: Law | tuple[float, ...]
     factor: float
 
 
-class _Parts(NamedTuple):
+class _FieldParts(NamedTuple):
     """The law that leads along a curve, user-defined laws and their factors, and the drag of a governor [N s/m]."""
 
     leading: Follow | Bunny
@@ -75,9 +75,9 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
     The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, each
-    times a number, and with a force limit. Any other law makes the verdicts unknown and is named. With user-defined
-    laws and with such others the executed program is linearised at states about the curve, and stability is refuted if
-    one of them is unstable.
+    times a number, and with a force limit. Any other law makes the verdicts unknown, and the reason names it. With
+    user-defined laws, and with such other laws, the executed program is linearised in states about the curve, and
+    stability is refuted if one of them is unstable.
 
     Parameters
     ----------
@@ -91,8 +91,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     Raises
     ------
     ParameterError
-        If an argument is of another kind, the delay is negative or not finite, its hand is a replayed one, which feels
-        no force, or a user-defined law raises or does not return three or six numbers.
+        If an argument is of another kind, the delay is negative or not finite, the simulation's hand is a replayed one,
+        which feels no force, or a user-defined law raises or does not return three or six numbers.
     """
     of_kind("sim", sim, Simulation)
     of_kind("hands", hands, HandRange | None)
@@ -100,35 +100,41 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
-    own, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
-    for law in own if curve is not None else ():
-        with suppress(NotFollowed):  # of a certificate before: it makes this one unknown, below
+    own_laws, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
+    for law in own_laws if curve is not None else ():
+        with suppress(NotFollowed):  # left by an earlier certificate; it makes this one unknown, below
             executed(law, curve)  # pyright: ignore[reportArgumentType]
     try:
-        parts = _parts_of(sim.field)
-        river = _river(sim, parts.leading, delay)
+        parts = _field_parts(sim.field)
+        river = _certified_river(sim, parts.leading, delay)
         cases = [certified_cases(law, river.curve).scaled(factor) for law, factor in parts.added]
-        rivers, assumed = rivers_with(river, cases), _assumed(sim.field, cases)
+        rivers, assumptions = rivers_with(river, cases), _field_assumptions(sim.field, cases)
         stability = switched_stability(rivers, parts.drag, hands.hands())
-        passive = passivity(rivers[0] if len(rivers) == 1 else river)
+        passivity_verdict = passivity(rivers[0] if len(rivers) == 1 else river)
     except ControllerError as error:
         unknown = Verdict("unknown", str(error))
-        return SimulationCertificate(_seen(sim, curve, delay, unknown, hands), unknown, inputs)
-    if own:
-        stability = stability if stability.verdict == "refuted" else _seen(sim, curve, delay, stability, hands)
-        # The condition of passivity is of the river's spring and damper alone.
-        if passive.verdict == "certified" or len(rivers) > 1:
-            passive = leaving_out(passive, [law.place for law in own])
-    return SimulationCertificate(_assuming(stability, assumed), _assuming(passive, assumed), inputs)
+        return SimulationCertificate(_check_executed(sim, curve, delay, unknown, hands), unknown, inputs)
+    if own_laws:
+        stability = (
+            stability if stability.verdict == "refuted" else _check_executed(sim, curve, delay, stability, hands)
+        )
+        # The condition of passivity covers only the river's spring and damper.
+        if passivity_verdict.verdict == "certified" or len(rivers) > 1:
+            passivity_verdict = leaving_out(passivity_verdict, [law.place for law in own_laws])
+    return SimulationCertificate(
+        _add_assumptions(stability, assumptions), _add_assumptions(passivity_verdict, assumptions), inputs
+    )
 
 
 def _curve_of(sim: Simulation) -> Trajectory | None:
-    """The curve about which a field is examined: that of a law along one, or the map's; None if there is none."""
+    """The curve about which a field is examined: that of its leading law, or the map's; None if there is none."""
     curves = [law.curve for law in sim.field.program().laws if isinstance(law, Follow | Bunny)]
     return next(iter(curves), getattr(sim.haptic_map, "around", None))
 
 
-def _seen(sim: Simulation, curve: Trajectory | None, delay: float, verdict: Verdict, hands: HandRange) -> Verdict:
+def _check_executed(
+    sim: Simulation, curve: Trajectory | None, delay: float, verdict: Verdict, hands: HandRange
+) -> Verdict:
     """A verdict checked with the executed program about a curve."""
     if curve is None:
         return verdict
@@ -138,11 +144,11 @@ def _seen(sim: Simulation, curve: Trajectory | None, delay: float, verdict: Verd
     try:
         return seen(sim.field.program(), place, reach, verdict, hands)
     except NotFollowed:
-        keeps = "a law of one's own keeps numbers of the hand between calls"
-        return Verdict("unknown", f"{verdict.reason}; {keeps}" if verdict.verdict == "unknown" else keeps)
+        reason = "a law of one's own keeps numbers of the hand between calls"
+        return Verdict("unknown", f"{verdict.reason}; {reason}" if verdict.verdict == "unknown" else reason)
 
 
-def _river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
+def _certified_river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
     """The law that leads along a curve, in the form that is certified."""
     if isinstance(law, Follow):
         base = PARALLEL_LAW if law.parallel else FOLLOW_LAW
@@ -150,23 +156,23 @@ def _river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
     else:
         base, (k_r, b_d, width) = BUNNY_LAW, law.felt
         if law.attraction == "along":
-            # Near a bunny that pulls along the curve, the field is that of FOLLOW to first order.
+            # Near a bunny that pulls along the curve, the field equals FOLLOW to first order.
             base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
     return River(base, k_r, b_d, width, law.curve, phantom_device(linkage_of(sim.device)), sampling)
 
 
-def _scaled(field: Law) -> list[_Scaled]:
-    """A field as a sum: its laws and limits in their order, each times a number."""
-    stack: list[list[_Scaled]] = []
+def _split_sum(field: Law) -> list[_ScaledPart]:
+    """A field as a sum: its laws and limits in order, each times a number."""
+    stack: list[list[_ScaledPart]] = []
     for what, numbers in field.program().composition():
         if isinstance(what, Law):
-            stack.append([_Scaled(what, 1.0)])
+            stack.append([_ScaledPart(what, 1.0)])
         elif what is Join.ADD:
             last = stack.pop()
             stack[-1] += last
         elif what is Join.LIMIT:
-            stack[-1].append(_Scaled(tuple(numbers.tolist()), 1.0))
+            stack[-1].append(_ScaledPart(tuple(numbers.tolist()), 1.0))
         elif what is Join.GATE and (factor := Weight(tuple(numbers.tolist())).factor) is not None:
             stack[-1] = [part._replace(factor=factor * part.factor) for part in stack[-1]]
         else:
@@ -174,8 +180,8 @@ def _scaled(field: Law) -> list[_Scaled]:
     return stack[0]
 
 
-def _parts_of(field: Law) -> _Parts:
-    scaled = _scaled(field)
+def _field_parts(field: Law) -> _FieldParts:
+    scaled = _split_sum(field)
     laws = [part.what for part in scaled if isinstance(part.what, Law)]
     leading = [law for law in laws if isinstance(law, Follow | Bunny)]
     governors = [law for law in laws if isinstance(law, Governor)]
@@ -193,14 +199,14 @@ def _parts_of(field: Law) -> _Parts:
             )
     factors = {id(law): factor for law, factor in scaled}
     times = factors[id(leading[0])]
-    led = replace(leading[0], k_r=times * leading[0].k_r, b_d=times * leading[0].b_d)
+    leading_law = replace(leading[0], k_r=times * leading[0].k_r, b_d=times * leading[0].b_d)
     added = tuple((law, factor) for law, factor in scaled if isinstance(law, FunctionLaw))
-    return _Parts(led, added, sum(factors[id(law)] * law.drag for law in governors))
+    return _FieldParts(leading_law, added, sum(factors[id(law)] * law.drag for law in governors))
 
 
-def _assumed(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
-    """What a certificate of a field assumes because of its limits, its moments and its user-defined laws."""
-    scaled = _scaled(field)
+def _field_assumptions(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
+    """Assumptions of a field's certificate due to its limits, its moments and its user-defined laws."""
+    scaled = _split_sum(field)
     assumed = [
         f"the field stays below the {' and '.join(bounds)} to which it is cut"
         for what, factor in scaled
@@ -216,5 +222,5 @@ def _assumed(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
     return tuple(assumed)
 
 
-def _assuming(verdict: Verdict, assumed: tuple[str, ...]) -> Verdict:
+def _add_assumptions(verdict: Verdict, assumed: tuple[str, ...]) -> Verdict:
     return replace(verdict, assumptions=verdict.assumptions + assumed)

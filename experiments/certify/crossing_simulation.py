@@ -37,7 +37,7 @@ def simulated_course(
         joint = data.joint(PHANTOM + name)
         joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
     mujoco.mj_forward(model, data)
-    # The velocity filter begins settled at the initial velocity.
+    # The velocity filter starts settled at the initial velocity.
     sensed_before(port, theta, rate)
     program = field.program()
     memory, wrench = program.fresh_memory(), np.zeros(6)

@@ -18,9 +18,9 @@ from experiments.setups.setups import map_parts, parts_of
 from models.mocap.motion.clip import Clip
 from sim.world.world import World
 
-REACH = 0.025  # [m] for maps that define no reach
-NEAR = 0.2  # share of the map's reach: as far off the curve as pushes bring a hand
-FAST = 2.0  # ratio to the curve's own speed, of a hand that pushes forwards at the edge of the map
+REACH = 0.025  # [m] for maps without a reach
+NEAR = 0.2  # fraction of the map's reach: distance off the curve to which pushes bring a hand
+FAST = 2.0  # speed of a hand that pushes forwards at the edge of the map, relative to the curve's
 
 
 def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
@@ -35,39 +35,41 @@ def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
 
 
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
-    """A verdict that leaves out walls, complemented by a check of the executed program (`seen`)."""
+    """A verdict that omits walls, complemented by a check of the executed program (`seen`)."""
     parts = executed_parts(config, clips)
     reach = float(getattr(parts.maps, "reach", REACH))
     return seen(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
-    """A verdict on a program after a check: refuted if the program is unstable at a state about the curve of `main`."""
-    looked = [looked_at(program, main, NEAR * reach, hands.hands()), looked_about(program, main, hands.hands())]
-    found, strongest = max(looked, key=lambda it: it.radius), max(it.strongest for it in looked)
+    """A verdict after a check of the program: refuted if it is unstable in a state about the curve of `main`."""
+    examined = [looked_at(program, main, NEAR * reach, hands.hands()), looked_about(program, main, hands.hands())]
+    found, strongest = max(examined, key=lambda it: it.radius), max(it.strongest for it in examined)
     figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": strongest}
     if found.radius >= 1.0:
         reason = (
-            f"unstable, by a factor of {found.radius:.4g} a period, for a hand {_told(main, found)}; {verdict.reason}"
+            f"unstable, by a factor of {found.radius:.4g} a period, for a hand {_place(main, found)}; {verdict.reason}"
         )
-        return Verdict("refuted", reason, None, verdict.assumptions, _example(found), figures)
+        return Verdict("refuted", reason, None, verdict.assumptions, _counterexample(found), figures)
     peak = ForceLimiter(main.sampling.period).peak
-    cut = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
-    abrupt = [at for it in looked for at in it.abrupt]
-    judged = sum(it.states for it in looked) - len(abrupt)
-    told = f"no oscillation grows at {judged} states of the program{cut}" if judged else "no state can be judged"
+    limit_text = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
+    abrupt = [at for it in examined for at in it.abrupt]
+    judged = sum(it.states for it in examined) - len(abrupt)
+    summary = (
+        f"no oscillation grows at {judged} states of the program{limit_text}" if judged else "no state can be judged"
+    )
     if abrupt:
-        told += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
+        summary += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
     far = looked_at(program, main, reach, hands.hands(), FAST)
     if far.radius >= 1.0:
-        told += f", but not for a hand {_told(main, far)}"
-    return replace(verdict, reason=f"{verdict.reason}; {told}", figures=figures)
+        summary += f", but not for a hand {_place(main, far)}"
+    return replace(verdict, reason=f"{verdict.reason}; {summary}", figures=figures)
 
 
-def _told(main: River, found: Seen) -> str:
+def _place(main: River, found: Seen) -> str:
     off, speed = 1e3 * np.linalg.norm(found.p - main.curve.point(found.phase)), np.linalg.norm(found.v)
     return f"{off:.2g} mm off the curve at phase {found.phase:.3g} s with {speed:.3g} m/s"
 
 
-def _example(found: Seen) -> dict[str, object]:
+def _counterexample(found: Seen) -> dict[str, object]:
     return {"phase": found.phase, "p": found.p, "v": found.v, "hand": found.hand, "radius": found.radius}

@@ -15,7 +15,7 @@ from experiments.setups.certified_law import governor_drag, left_out
 from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import kept_folder
 
-_LEAD = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
+_LEADING_REASON = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
 _SEVERITY = ("certified", "unknown", "refuted")
 
 
@@ -28,7 +28,7 @@ class Stability:
     verdict : {"certified", "refuted", "unknown"}
         The worst verdict of the laws that the run uses.
     margin : float or None
-        Least margin (critical k_r)/k_r − 1 of these laws; None if there is no certificate.
+        Smallest margin (critical k_r)/k_r − 1 of these laws; None if there is no certificate.
     reason : str
         Reason of the worst verdict.
     """
@@ -47,7 +47,7 @@ def kept_stability(config: RunConfig) -> Stability:
     """Certify the stability of a run, or return the cached verdict for the same inputs and code."""
     config, hands = resolved(config), HandRange()
     if config.leads:
-        return Stability("unknown", None, _LEAD)
+        return Stability("unknown", None, _LEADING_REASON)
     try:
         inputs = certificate_inputs(config, 0.0, hands, 1.0)
     except ControllerError as error:
@@ -55,13 +55,13 @@ def kept_stability(config: RunConfig) -> Stability:
     file = kept_folder(__name__) / f"stability-{hash_of(inputs)}.json"
     with suppress(OSError, ValueError, TypeError):
         return Stability(**json.loads(file.read_text(encoding="utf-8")))
-    found = _found(config, hands)
+    found = _certify_stability(config, hands)
     with suppress(OSError):
-        _write(file, json.dumps(asdict(found)))
+        _write_whole(file, json.dumps(asdict(found)))
     return found
 
 
-def _found(config: RunConfig, hands: HandRange) -> Stability:
+def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
     from controllers.certificates.loop.governed import governed_stability  # imported late: loads CasADi
     from experiments.certify.certify import certified_rivers
 
@@ -77,7 +77,7 @@ def _found(config: RunConfig, hands: HandRange) -> Stability:
     return Stability(worst.verdict, margin, worst.reason)
 
 
-def _write(path: Path, text: str) -> None:
+def _write_whole(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         file.write(text.encode())

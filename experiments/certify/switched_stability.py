@@ -1,4 +1,4 @@
-"""Stability of a field whose laws switch between linear cases: each by itself, and every change between them."""
+"""Stability of a field whose laws switch between linear cases: each case by itself, and any switching between them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,9 +17,9 @@ from controllers.state import Array
 def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on a field that switches arbitrarily between rivers, with a governor of a drag [N s/m].
 
-    Certified if every river is, and at every phase, with every hand, they have a common quadratic Lyapunov function.
-    A river that is not stable leaves the field unknown: a hand may be in that case too briefly to shake. Of a single
-    river the verdict is its own.
+    Certified if every river is certified and, at every phase and with every hand, they have a common quadratic Lyapunov
+    function. If a river is not stable the result is unknown, since a hand may be in that case too briefly to oscillate.
+    A single river keeps its own verdict.
     """
     verdicts = [governed_stability(river, drag, hands) for river in rivers]
     if len(rivers) == 1:
@@ -29,9 +29,9 @@ def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[Han
         if verdict.verdict != "certified":
             reason = f"in one of {len(rivers)} cases of laws of one's own it is {verdict.verdict}: {verdict.reason}"
             return Verdict("unknown", reason, None, verdict.assumptions)
-    missing = _uncommon(rivers, drag, hands)
-    if missing is not None:
-        phase, hand = missing
+    uncovered = _first_without_common(rivers, drag, hands)
+    if uncovered is not None:
+        phase, hand = uncovered
         reason = (
             f"stable in each of {len(rivers)} cases of laws of one's own, but switching between them is not certified: "
             f"no common Lyapunov function was found at phase {phase:.3g} s with {hand}; {worst.reason}"
@@ -41,25 +41,27 @@ def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[Han
     return replace(worst, reason=reason)
 
 
-def _uncommon(
+def _first_without_common(
     rivers: Sequence[River], drag: float, hands: Sequence[HandImpedance]
 ) -> tuple[float, HandImpedance] | None:
     """The first phase and hand with which no common Lyapunov function of the rivers was found; None if all have one."""
-    acting = [river._replace(law=with_damper(river.law, drag, river.k_r, river.b_d)) for river in rivers if drag > 0.0]
+    governed = [
+        river._replace(law=with_damper(river.law, drag, river.k_r, river.b_d)) for river in rivers if drag > 0.0
+    ]
     for hand in hands:
-        loops = [SampledLoop(river.still(hand), river.sampling) for river in (*rivers, *acting)]
+        loops = [SampledLoop(river.still(hand), river.sampling) for river in (*rivers, *governed)]
         maps = np.stack([loop.frozen(rivers[0].k_r, rivers[0].b_d) for loop in loops], axis=1)
         last: Array | None = None
-        for phase, at, basis in zip(rivers[0].phases().tolist(), maps, loops[0].across[0], strict=True):
-            # Mostly the function of the phase before is one here, too, in the coordinates of this phase.
-            if last is not None and contraction(_symmetric(basis.T @ last @ basis), list(at)) < 1.0:
+        for phase, phase_maps, basis in zip(rivers[0].phases().tolist(), maps, loops[0].across[0], strict=True):
+            # The function of the previous phase, in the coordinates of this phase, usually serves here too.
+            if last is not None and contraction(_symmetrise(basis.T @ last @ basis), list(phase_maps)) < 1.0:
                 continue
-            found = common_lyapunov(list(at))
+            found = common_lyapunov(list(phase_maps))
             if found is None:
                 return phase, hand
             last = basis @ found.p @ basis.T
     return None
 
 
-def _symmetric(p: Array) -> Array:
+def _symmetrise(p: Array) -> Array:
     return 0.5 * (p + p.T)

@@ -1,8 +1,8 @@
-"""Trials of the sampled loop of a river in MuJoCo, against which stability certificates are validated.
+"""Trials of a river's sampled loop in MuJoCo, to validate stability certificates.
 
-The linkage stands alone, in the world's axes. Sensing, law and actuation are the servo's functions, in its order. A
-trial can also have what the servo does not: torques delayed by whole periods, encoders without quantisation, no Coulomb
-friction, another integrator.
+The linkage is simulated alone, in the world's axes. Sensing, law and actuation are the servo's functions, in its order.
+Unlike the servo, a trial can have torques delayed by whole periods, encoders without quantisation, no Coulomb friction,
+or another integrator.
 """
 
 from dataclasses import dataclass
@@ -34,8 +34,8 @@ from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense, se
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
 
-LAP = 1e6  # [s] of a lap: so slow that a trial is about one configuration
-START = 1e-6  # [m] distance from the curve at which a trial begins
+LAP = 1e6  # [s] duration of a lap, so slow that a trial stays at one configuration
+START = 1e-6  # [m] distance from the curve at which a trial starts
 
 
 @njit
@@ -80,7 +80,7 @@ def run_late(
     rounded : bool
         Whether encoders quantise.
     path : Array
-        Output: the measured position of the hand at each tick, shape (n, 3) [m]; NaN after it is more than 5 cm off.
+        Output: the measured position of the hand at each tick, shape (n, 3) [m]; NaN once it is more than 5 cm off.
     """
     path[:] = np.nan
     wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
@@ -115,7 +115,7 @@ class Trial:
     Attributes
     ----------
     curve : Trajectory
-        A circle somewhere in the workspace, passed so slowly that its point practically rests.
+        A circle in the workspace, traversed so slowly that its point is practically at rest.
     phase : float
         Phase on it [s].
     b_d : float
@@ -145,7 +145,7 @@ class Trial:
         return Follow(self.curve, k_r, self.b_d, np.inf).program()
 
     def user(self, k_r: float) -> Arm:
-        """The simulated hand, which holds on at the trial's place if it has stiffness or damping."""
+        """The simulated hand, which is held at the trial's place if it has stiffness or damping."""
         held = self.hand.damping > 0.0 or self.hand.stiffness > 0.0
         path = self.curve.point(self.phase)[None] if held else np.zeros((0, 3))
         return Arm(self.hand.stiffness, self.hand.damping, path)
@@ -169,7 +169,7 @@ def draw_trial(rng: np.random.Generator) -> Trial:
         try:
             for point in curve.point(np.linspace(0.0, LAP, 24)):
                 phantom_angles(point)
-        except SimError:  # out of the workspace: another one
+        except SimError:  # out of the workspace: draw another one
             continue
         phase = float(rng.uniform(0.0, LAP))
         tangent = curve.velocity(phase) / np.linalg.norm(curve.velocity(phase))
@@ -177,8 +177,8 @@ def draw_trial(rng: np.random.Generator) -> Trial:
         sideways -= tangent * (tangent @ sideways)
         trial = Trial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
         loop = trial.loop()
-        most = _critical_damping(loop)
-        return Trial(curve, phase, float(rng.uniform(0.05, 0.7)) * most, sampling, hand, trial.direction)
+        max_damping = _critical_damping(loop)
+        return Trial(curve, phase, float(rng.uniform(0.05, 0.7)) * max_damping, sampling, hand, trial.direction)
 
 
 def _critical_damping(loop: SampledLoop) -> float:
@@ -239,8 +239,8 @@ EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True
 def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
     """Displacement across the curve from the trial's place at each tick [m], shape (n, 3); see `hand_path`."""
     tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))
-    away = hand_path(trial, k_r, ticks, conditions, state) - trial.curve.point(trial.phase)
-    return away - np.outer(away @ tangent, tangent)
+    displacement = hand_path(trial, k_r, ticks, conditions, state) - trial.curve.point(trial.phase)
+    return displacement - np.outer(displacement @ tangent, tangent)
 
 
 def hand_path(
@@ -260,7 +260,7 @@ def hand_path(
     k_r : float
         Stiffness of FOLLOW [N/m].
     ticks : int
-        Largest number of ticks; there are fewer if the hand gets 5 cm off.
+        Largest number of ticks; fewer are returned if the hand gets 5 cm off.
     state : Array, optional
         Initial state ξ of the linear loop; by default at rest, `conditions.start` off in the trial's direction.
     user : Arm, optional
@@ -275,9 +275,9 @@ def hand_path(
     if state is None:
         theta, rate = np.array(phantom_angles(centre + conditions.start * trial.direction)), np.zeros(3)
     else:
-        still = np.array(phantom_angles(centre))
-        theta, rate = still + state[:3], state[3:6]
-        sensed_before(port, still + state[6:9], state[9:12])
+        rest_angles = np.array(phantom_angles(centre))
+        theta, rate = rest_angles + state[:3], state[3:6]
+        sensed_before(port, rest_angles + state[6:9], state[9:12])
         late += state[12:].reshape(-1, 3)[::-1]
     late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
     names = [PHANTOM + name for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]

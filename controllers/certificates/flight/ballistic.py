@@ -5,7 +5,7 @@ A flight recorded under gravity ĝ falls with σ² ĝ at the rate σ. Two tolera
 .. math:: g_{min} \le \sigma^2 \hat g \le g_{max} \quad\text{(seen)}, \qquad
           \min_{p_0, v_0} \max_t \lVert c_\sigma(t) - p_0 - v_0 t + \tfrac12 g t^2 e_z \rVert \le d \quad\text{(done)} .
 
-The first is the perception of viewers; the second the feasibility for a body with the best take-off, in free fall.
+The first is what viewers accept; the second is what a body in free fall can do after the best possible take-off.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ from controllers.errors import ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array
 
-_BORNE = 0.12  # of g, as at 2.9 times its own pace: what falls more slowly is hardly a slow recording of a flight
+_MIN_GRAVITY_RATIO = 0.12  # of g: a slower fall, to be played at over 2.9 times its speed, is hardly a slowed recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class FlightJudgement:
 
     @property
     def admissible(self) -> tuple[float, float]:
-        """Rates in both `seen` and `done`; `seen` alone if there are none in both."""
+        """Rates in both `seen` and `done`; `seen` alone if the two do not overlap."""
         if self.done is None:
             return self.seen
         low, high = max(self.seen[0], self.done[0]), min(self.seen[1], self.done[1])
@@ -120,10 +120,10 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
         verdict = "unknown"
         why = f"{falls} and rises only {100 * fit.clearance:.0f} cm: it may stand on a floor that the recording misses"
     elif not low <= likely <= high:
-        natural = "; something bears it that the recording misses, such as a box, or the frame rate is wrong"
-        if fit.gravity > _BORNE * GRAVITY:
-            natural = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g"
-        why = f"{falls}, not within {low:g} to {high:g}{natural}"
+        explanation = "; something bears it that the recording misses, such as a box, or the frame rate is wrong"
+        if fit.gravity > _MIN_GRAVITY_RATIO * GRAVITY:
+            explanation = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g"
+        why = f"{falls}, not within {low:g} to {high:g}{explanation}"
     elif fit.misfit > tolerance.misfit:
         why = f"strays {100 * fit.misfit:.1f} cm (RMS) from a parabola, more than {100 * tolerance.misfit:g}"
     elif fit.drift > tolerance.drift:
@@ -148,14 +148,14 @@ def ballistic_verdict(
     doubts: Sequence[str] = (),
     measures: Mapping[str, object] | None = None,
 ) -> Verdict:
-    """Verdict on a whole motion: that of its worst flight, but unknown if its support may not be contact.
+    """Verdict on a whole motion: that of its worst flight, but unknown if its support may not be real contact.
 
     `doubts` and `measures` are those of `contact_doubts`.
 
-    The margin is the least distance, over all flights, of the rate 1 from the ends of the interval `seen`: how much
-    faster or slower the motion may be played; negative when refuted for its gravity.
-    The counterexample of a refuted motion is the best take-off of its first refuted flight: position and velocity with
-    which free fall stays nearest to the recorded centre of mass, and its largest ``distance`` from it [m].
+    The margin is the smallest distance, over all flights, of the rate 1 from the ends of the interval `seen`: how much
+    faster or slower the motion may be played. It is negative if the gravity of a flight refutes the motion.
+    The counterexample of a refuted motion is the best take-off of its first refuted flight: the position and velocity
+    with which free fall stays nearest to the recorded centre of mass, and its largest ``distance`` from it [m].
     """
     assumptions = (
         f"gravity is {GRAVITY} m/s², without drag, on the figure's own size and mass",
@@ -167,10 +167,10 @@ def ballistic_verdict(
         "is not noticed",
     )
     figures: dict[str, object] = {**(measures or {})}
-    unsure = "; ".join(doubts)
+    doubt_text = "; ".join(doubts)
     if not flights:
         if doubts:
-            return Verdict("unknown", f"no flight, but {unsure}", None, assumptions, figures=figures)
+            return Verdict("unknown", f"no flight, but {doubt_text}", None, assumptions, figures=figures)
         return Verdict("certified", "no flight: nothing has to fall", None, assumptions, figures=figures)
     refuted = [flight for flight in flights if flight.verdict == "refuted"]
     doubtful = [flight for flight in flights if flight.verdict == "unknown"]
@@ -187,8 +187,8 @@ def ballistic_verdict(
         reason = "; ".join(flight.reason for flight in refuted)
         return Verdict("refuted", reason, margin, assumptions, counterexample, figures)
     reasons = [*(flight.reason for flight in doubtful or flights), *doubts]
-    known = "unknown" if doubtful or doubts else "certified"
-    return Verdict(known, "; ".join(reasons), margin, assumptions, figures=figures)
+    outcome = "unknown" if doubtful or doubts else "certified"
+    return Verdict(outcome, "; ".join(reasons), margin, assumptions, figures=figures)
 
 
 def _figures(flight: FlightJudgement) -> dict[str, object]:

@@ -1,16 +1,16 @@
 r"""Plausibility of contacts: whether the support of a motion between its flights can be real contact with the floor.
 
-Contacts are detected leniently, since captures miss the floor: a slow foot 5 cm above it counts as support. This finds
-flights, but does not prove contact. So for a certificate the following must hold too:
+Contacts are detected leniently, since feet in captures often hover: a slow foot 5 cm above the floor counts as support.
+That is enough to find flights, but does not prove contact. So a certificate also requires the following:
 
 - the floor level, the median height of the body's lowest point while supported, is near z = 0;
-- for nine tenths of the supported time that point is near the floor level, above and below;
-- some contact is at rest most of the time, and no resting contact slides far: a gliding body is not held by friction;
-- the centre of mass does not accelerate more than legs can push: with d the noise of a recording's centre of mass,
+- for 90 % of the supported time that point is within a tolerance of the floor level, above and below;
+- some contact is at rest most of the time, and no resting contact slides far: friction does not hold a gliding body;
+- the centre of mass accelerates no more than legs can push; with d the noise of the recorded centre of mass,
 
 .. math:: |\ddot c| \le a_{max} + 4 d f^2, \quad \ddot c \text{ by second differences at } f \text{ frames a second};
 
-- no joint turns in one frame by many times as much as in the frames before and after.
+- no joint turns in one frame by many times as much as in the frames before and after it.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from controllers.state import Array, Mask
 
 @dataclass(frozen=True, eq=False)
 class BodyContact:
-    """Contacts with the floor in n frames, and turns of the joints.
+    """Contacts with the floor in n frames, and joint rotations between frames.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class BodyContact:
     skate : float
         Largest slide (foot skate) of a foot's contact point while it counts as at rest [m].
     turned : array, shape (n − 1,)
-        Largest turn of a joint from frame to frame [rad].
+        Largest rotation of a joint from frame to frame [rad].
     """
 
     lowest: Array
@@ -48,7 +48,7 @@ class BodyContact:
 def contact_doubts(
     touched: BodyContact, com: Array, fps: float, tolerance: ContactTolerance
 ) -> tuple[list[str], dict[str, object]]:
-    """Doubts whether the support of a motion is contact, as clauses, and measures; com: centre of mass (n, 3) [m]."""
+    """Reasons to doubt that the support is contact, as clauses, and measures; com: centre of mass (n, 3) [m]."""
     doubts: list[str] = []
     figures: dict[str, object] = {}
     if touched.supported.any():
@@ -64,27 +64,27 @@ def contact_doubts(
                 f"its lowest point is {1e3 * low:.0f} to {1e3 * high:+.0f} mm from where it stands, beyond "
                 f"±{1e3 * tolerance.spread:g}"
             )
-    unheld = _longest(touched.supported & ~touched.held) / fps
+    unheld = _longest_run(touched.supported & ~touched.held) / fps
     figures |= {"unheld": unheld, "skate": touched.skate}
     if unheld > tolerance.unheld:
         doubts.append(f"for {unheld:.2f} s it is low and nothing of it is at rest, longer than {tolerance.unheld:g}")
     if touched.skate > tolerance.skate:
         doubts.append(f"a foot that stands slides by {100 * touched.skate:.2f} cm, more than {100 * tolerance.skate:g}")
-    return doubts + _jumps(touched, com, fps, tolerance, figures), figures
+    return doubts + _jump_doubts(touched, com, fps, tolerance, figures), figures
 
 
-def _jumps(
+def _jump_doubts(
     touched: BodyContact, com: Array, fps: float, tolerance: ContactTolerance, figures: dict[str, object]
 ) -> list[str]:
     doubts: list[str] = []
     if len(com) > 2:
-        carried = np.linalg.norm(np.diff(com, 2, axis=0), axis=1) * fps**2
-        at, most = int(np.argmax(carried)), tolerance.push + 4.0 * NOISE * fps**2
-        figures["jump"] = float(carried[at])
-        if carried[at] > most:
+        size = np.linalg.norm(np.diff(com, 2, axis=0), axis=1) * fps**2
+        at, limit = int(np.argmax(size)), tolerance.push + 4.0 * NOISE * fps**2
+        figures["jump"] = float(size[at])
+        if size[at] > limit:
             doubts.append(
-                f"jumps at {(at + 1) / fps:.2f} s: its centre of mass accelerates by {carried[at]:.0f} m/s², more than "
-                f"{most:.0f}"
+                f"jumps at {(at + 1) / fps:.2f} s: its centre of mass accelerates by {size[at]:.0f} m/s², more than "
+                f"{limit:.0f}"
             )
     turned = touched.turned
     if len(turned) > 2:
@@ -96,7 +96,7 @@ def _jumps(
     return doubts
 
 
-def _longest(mask: Mask) -> int:
+def _longest_run(mask: Mask) -> int:
     """Number of frames of the longest run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return int(np.max(edges[1::2] - edges[::2], initial=0))

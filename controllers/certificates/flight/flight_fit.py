@@ -17,12 +17,12 @@ from controllers.state import Array, Mask
 
 NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 FEWEST = 5  # frames of a flight: two more than a parabola has coefficients
-SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support is a foot that rolls over
+SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support occurs when a foot rolls over
 
 
 @dataclass(frozen=True)
 class FlightFit:
-    """A flight, from the last frame of support before it to the first one after it, and its least-squares parabola.
+    """A flight, from the last supported frame before it to the first one after it, and its least-squares parabola.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class FlightFit:
     momentum : array, shape (3,)
         Mean angular momentum about the centre of mass [kg m²/s].
     drift, yaw : float
-        Largest deviation of the body's orientation from that by constant angular momentum, in total and about the
+        Largest deviation of the body's orientation from that under constant angular momentum, in total and about the
         vertical [rad].
     """
 
@@ -74,12 +74,12 @@ class FlightFit:
 
     @property
     def take_off_speed(self) -> float:
-        """Upward speed that the recorded rise needs under true gravity: √(2 g h) [m/s]."""
+        """Take-off speed that the recorded rise needs under true gravity: √(2 g h) [m/s]."""
         return float(np.sqrt(2.0 * GRAVITY * self.rise))
 
 
 def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
-    """First and last frame of every flight: the frames of support around an interval without any.
+    """First and last frame of every flight: the supported frames around an interval without support.
 
     Parameters
     ----------
@@ -115,24 +115,26 @@ def fit_flight(
     t = np.arange(b - a + 1) / fps
     middle = t - t[-1] / 2.0
     c = com[a : b + 1]
-    level = np.polynomial.polynomial.polyfit(middle, c[:, :2], 1)
+    horizontal = np.polynomial.polynomial.polyfit(middle, c[:, :2], 1)
     height = np.polynomial.polynomial.polyfit(middle, c[:, 2], 2)
-    missed = c - np.column_stack([level[0] + np.outer(middle, level[1]), np.vander(middle, 3, True) @ height])
-    spread = max(float(np.sqrt(np.sum(missed[:, 2] ** 2) / (len(t) - 3))), NOISE)
+    residual = c - np.column_stack(
+        [horizontal[0] + np.outer(middle, horizontal[1]), np.vander(middle, 3, True) @ height]
+    )
+    spread = max(float(np.sqrt(np.sum(residual[:, 2] ** 2) / (len(t) - 3))), NOISE)
     covariance = np.linalg.inv(np.vander(middle, 3).T @ np.vander(middle, 3))
     uncertainty = 2.0 * spread * np.sqrt(covariance[0, 0]) * float(stdtrit(len(t) - 3, 0.975))
     air = slice(a + 1, b)
     mean = angular[air].mean(axis=0)
     excess = np.linalg.solve(inertia[air], (angular[air] - mean)[:, :, None])[:, :, 0]
-    strayed = np.cumsum(excess, axis=0) / fps
-    strayed -= strayed.mean(axis=0)
+    deviation = np.cumsum(excess, axis=0) / fps
+    deviation -= deviation.mean(axis=0)
     return FlightFit(
         start=a, end=b, time=a / fps, duration=float(t[-1]), gravity=float(-2.0 * height[2]),
-        uncertainty=float(uncertainty), misfit=float(np.sqrt(np.mean(np.sum(missed**2, axis=1)))),
+        uncertainty=float(uncertainty), misfit=float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))),
         rise=float(max(c[:, 2].max() - c[0, 2], 0.0)),
-        take_off=np.array([*level[1], height[1] + 2.0 * height[2] * middle[0]]),
+        take_off=np.array([*horizontal[1], height[1] + 2.0 * height[2] * middle[0]]),
         clearance=float(clearance[a : b + 1].max()), momentum=mean,
-        drift=float(np.linalg.norm(strayed, axis=1).max()), yaw=float(np.abs(strayed[:, 2]).max()),
+        drift=float(np.linalg.norm(deviation, axis=1).max()), yaw=float(np.abs(deviation[:, 2]).max()),
     )  # fmt: skip
 
 
@@ -166,12 +168,12 @@ def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
     for _ in range(40):
         normal = basis.T @ (weights[:, None] * basis)
         state = np.asarray(np.linalg.solve(normal, basis.T @ (weights[:, None] * wanted)), dtype=np.float64)
-        missed = np.linalg.norm(wanted - basis @ state, axis=1)
-        if missed.max() < greatest:
-            greatest, best = float(missed.max()), state
+        residual = np.linalg.norm(wanted - basis @ state, axis=1)
+        if residual.max() < greatest:
+            greatest, best = float(residual.max()), state
         if greatest < 1e-9:
             break
-        weights = weights * missed + 1e-12
+        weights = weights * residual + 1e-12
         weights /= weights.sum()
     return greatest, best
 
@@ -179,8 +181,8 @@ def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
 def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, float] | None:
     """Interval of rates σ at which some free fall stays within a distance of the flight, or None.
 
-    The least distance is convex in 1/σ², since distances are jointly convex in the fall's parameters and 1/σ²; so its
-    minimum is found by trisection, and the two crossings of the tolerance by bisection.
+    The smallest distance is convex in 1/σ², since distances are jointly convex in the fall's parameters and 1/σ². So
+    its minimum is found by ternary search, and the two crossings of the tolerance by bisection.
 
     Parameters
     ----------
@@ -192,10 +194,10 @@ def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, fl
     Returns
     -------
     (float, float) or None
-        Least and greatest rate; the greatest is infinite for a flight that is straight within the tolerance.
+        Smallest and largest rate; the largest is infinite for a flight that is straight within the tolerance.
     """
 
-    def missed(inverse: float) -> float:
+    def fall_distance(inverse: float) -> float:
         return best_fall(com, fps, 1.0 / np.sqrt(max(inverse, 1e-9)))[0]
 
     duration = (len(com) - 1) / fps
@@ -203,20 +205,20 @@ def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, fl
     top = high
     for _ in range(20):
         first, second = low + (high - low) / 3.0, high - (high - low) / 3.0
-        if missed(first) < missed(second):
+        if fall_distance(first) < fall_distance(second):
             high = second
         else:
             low = first
     bottom = (low + high) / 2.0
-    if missed(bottom) > tolerance:
+    if fall_distance(bottom) > tolerance:
         return None
 
     def crossing(inside: float, outside: float) -> float:
         for _ in range(20):
             middle = (inside + outside) / 2.0
-            inside, outside = (middle, outside) if missed(middle) <= tolerance else (inside, middle)
+            inside, outside = (middle, outside) if fall_distance(middle) <= tolerance else (inside, middle)
         return inside
 
     slowest = crossing(bottom, 2.0 * top)
-    fastest = 0.0 if missed(0.0) <= tolerance else crossing(bottom, 0.0)
+    fastest = 0.0 if fall_distance(0.0) <= tolerance else crossing(bottom, 0.0)
     return float(1.0 / np.sqrt(slowest)), float(1.0 / np.sqrt(fastest)) if fastest > 0.0 else np.inf

@@ -9,8 +9,8 @@ In a turn of radius r at speed v this is v² / r ≤ μ g; for a vertical accele
 pull.
 
 Accelerations are those of the least-squares parabola through a window of frames, a = Σ c_i p_i (Savitzky & Golay 1964).
-This is a mean, with weights ≥ 0, of the accelerations in the window, so it lies within the (convex) cone for every body
-that the floor supports. If a misses the cone by d, each such body misses some frame of the window by at least
+This is a mean, with weights ≥ 0, of the accelerations in the window, so for every body that the floor supports it lies
+within the (convex) cone. If a lies outside the cone by d, each such body misses some frame of the window by at least
 d / Σ|c_i|.
 """
 
@@ -35,7 +35,7 @@ class RateBounds(NamedTuple):
     Attributes
     ----------
     low, high : array, shape (n,)
-        Least and greatest σ; 0 and infinity where there is no bound.
+        Smallest and largest σ; 0 and infinity where there is no bound.
     """
 
     low: Array
@@ -44,19 +44,19 @@ class RateBounds(NamedTuple):
     def stylus_speed(self, phases: Array, speed: Array) -> tuple[Array, Array]:
         """Admissible speeds of the stylus along a curve that plays the motion: σ |φ̇|.
 
-        Between two frames the narrower bound of the two holds.
+        Between two frames, the narrower of their bounds applies.
 
         Parameters
         ----------
         phases : array, shape (m,)
-            Elapsed share of the motion at samples of the curve, 0 to 1.
+            Elapsed fraction of the motion at samples of the curve, 0 to 1.
         speed : array, shape (m,)
             |φ̇| there when the motion is played as recorded [m/s].
 
         Returns
         -------
         low, high : array, shape (m,)
-            Least and greatest speed [m/s].
+            Smallest and largest speed [m/s].
 
         Raises
         ------
@@ -71,7 +71,7 @@ class RateBounds(NamedTuple):
         before, after = np.floor(at + 1e-9).astype(np.int64), np.ceil(at - 1e-9).astype(np.int64)
         low = np.maximum(self.low[before], self.low[after]) * speed
         fastest = np.minimum(self.high[before], self.high[after])
-        # Where the curve is at rest, the speed is zero at any rate, also an infinite one.
+        # Where the curve is at rest, the speed is zero at any rate, even an infinite one.
         return low, np.where(speed > 0.0, fastest * np.maximum(speed, 1e-12), 0.0)
 
 
@@ -105,7 +105,7 @@ def floor_rates(motion: BodyMotion, friction: float) -> Array:
     """
     if not (np.isfinite(friction) and friction > 0.0):
         raise ParameterError(f"the coefficient of friction is {friction}; expected a finite number > 0")
-    window = _frames_of_window(motion.fps)
+    window = _window_frame_count(motion.fps)
     if len(motion.com) < window:
         return np.full(len(motion.com), np.inf)
     a = _mean_acceleration(motion)
@@ -113,7 +113,7 @@ def floor_rates(motion: BodyMotion, friction: float) -> Array:
     return np.where(needed > 0.0, np.sqrt(friction * GRAVITY / np.maximum(needed, 1e-12)), np.inf)
 
 
-def _frames_of_window(fps: float) -> int:
+def _window_frame_count(fps: float) -> int:
     return 2 * max(2, round(_WINDOW * fps / 2)) + 1
 
 
@@ -121,16 +121,16 @@ def _mean_acceleration(motion: BodyMotion) -> Array:
     """Acceleration of the least-squares parabola about each frame, (n, 3); the first and last windows are extended."""
     from scipy.signal import savgol_filter  # imported late: loads scipy.stats
 
-    window = _frames_of_window(motion.fps)
+    window = _window_frame_count(motion.fps)
     return np.asarray(savgol_filter(motion.com, window, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
 
 
 def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], friction: float, frames: int) -> Verdict:
     """Verdict on whether friction can turn, start and stop the first `frames` as recorded; margin is the least σ² − 1.
 
-    The counterexample is the window of frames ``start`` to ``end`` about the hardest ``frame``, with the centre of mass
-    [m] and its velocity [m/s] at its start, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which any
-    body on that floor misses the window, for any initial state.
+    The counterexample is the window of frames ``start`` to ``end`` about the most demanding ``frame``: the centre of
+    mass [m] and its velocity [m/s] at the start, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which
+    every body on that floor misses the window, whatever its initial state.
     """
     high = floor_rates(motion, friction)
     for flight in flights:
@@ -143,28 +143,28 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     )
     if not np.isfinite(rate):
         return Verdict("certified", "nothing turns, starts or stops on the floor", None, assumptions)
-    # As many decimals as tell a rate below 1 from 1.
+    # Enough decimals to tell a rate below 1 from 1.
     digits = next((k for k in range(2, 16) if round(rate, k) < 1.0), 2)
     up_to = f"up to {rate:.{digits}f} of" if rate < ANY_RATE else f"more than {ANY_RATE:g} times"
     reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0 if rate < ANY_RATE else None, assumptions)
-    counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
+    counterexample = {"frame": frame, "rate": rate, **_window_counterexample(motion, frame, friction)}
     within = np.format_float_positional(1e3 * counterexample["distance"], 2, unique=False, fractional=False, trim="-")
     reason = f"{reason}, which no body on that floor follows within {within} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
 
 
-def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str, Any]:
+def _window_counterexample(motion: BodyMotion, frame: int, friction: float) -> dict[str, Any]:
     from scipy.signal import savgol_coeffs, savgol_filter
 
-    window, delta = _frames_of_window(motion.fps), 1.0 / motion.fps
+    window, delta = _window_frame_count(motion.fps), 1.0 / motion.fps
     start = int(np.clip(frame - window // 2, 0, len(motion.com) - window))
     a = _mean_acceleration(motion)[frame]
-    drift = float(np.linalg.norm(a[:2]))
+    level = float(np.linalg.norm(a[:2]))
     push = float(a[2]) + GRAVITY
-    # For a force within the polar cone the nearest point of the friction cone is its apex.
-    outside = (drift - friction * push) / np.hypot(1.0, friction) if push > -friction * drift else np.hypot(drift, push)
+    # For a force within the polar cone, the nearest point of the friction cone is its apex.
+    outside = (level - friction * push) / np.hypot(1.0, friction) if push > -friction * level else np.hypot(level, push)
     per_metre = float(np.abs(savgol_coeffs(window, 2, deriv=2, delta=delta)).sum())
     span = slice(start, start + window)
     velocity = savgol_filter(motion.com[span], window, 2, deriv=1, delta=delta, axis=0)[0]

@@ -24,18 +24,19 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 
-# Half or twice of these numbers on SNU's backflip, which is repaired to 2.73 s with its body moved by up to 11.4 cm:
-_PACE = 0.5  # s_h, scale of changes of the rate (natural logarithm): 2.47 or 3.03 s
-_PLACE = 0.05  # s_δ [m], scale of shifts of the body: 5.2 or 24.2 cm
-_HASTE = 3.0  # [1/s] scale of the rate of change of the rate's logarithm: 2.92 or 2.58 s
-_JOLT = 10.0  # [m/s²] scale of accelerations of the shift: 23.0 or 5.1 cm
-_TURN = 0.5  # weight of deviations from constant angular momentum: the same to 0.1 cm and 0.01 s
-_RATES = (0.15, 3.0)  # least and greatest playing rate, relative to the recording
-_REACH = 0.998  # largest extension of a leg, as a share of its length: a knee bent by 7°
+# Tried on SNU's backflip, which is repaired to a duration of 2.73 s with shifts of up to 11.4 cm. Each comment ends
+# with the result for half and for twice the number.
+_RATE_SCALE = 0.5  # s_h, scale of the rate's logarithm: 2.47 or 3.03 s
+_SHIFT_SCALE = 0.05  # s_δ [m], scale of shifts of the body: 5.2 or 24.2 cm
+_RATE_CHANGE_SCALE = 3.0  # [1/s] scale of the rate of change of the rate's logarithm: 2.92 or 2.58 s
+_SHIFT_ACCELERATION_SCALE = 10.0  # [m/s²] scale of accelerations of the shift: 23.0 or 5.1 cm
+_ANGULAR_MOMENTUM_WEIGHT = 0.5  # weight of changes of angular momentum: the same to 0.1 cm and 0.01 s
+_RATE_RANGE = (0.15, 3.0)  # smallest and largest playing rate, relative to the recording
+_MAX_LEG_EXTENSION = 0.998  # largest extension of a leg, as a fraction of its length: a knee bent by 7°
 
 
 class RepairError(ControllerError):
-    """A motion for which no feasible neighbour was found."""
+    """A motion for which no feasible motion was found nearby."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,36 +133,40 @@ def repair(task: RepairTask) -> RepairPlan:
     """
     n, step = len(task.com), 1.0 / task.fps
     opti = ca.Opti()
-    pace = opti.variable(n - 1)  # ln(h_k / h): timing without a constraint of sign
+    log_steps = opti.variable(n - 1)  # ln(h_k / h): keeps durations positive without a constraint
     shift = opti.variable(n, 3)
-    steps = step * ca.exp(pace)
+    steps = step * ca.exp(log_steps)
     moved: Any = task.com + shift
     velocity = (moved[1:, :] - moved[:-1, :]) / ca.repmat(steps, 1, 3)
-    between = (steps[1:] + steps[:-1]) / 2.0
-    rise = (velocity[1:, 2] - velocity[:-1, 2]) / between
+    interval_duration = (steps[1:] + steps[:-1]) / 2.0
+    vertical_acceleration = (velocity[1:, 2] - velocity[:-1, 2]) / interval_duration
     jolt = (shift[2:, :] - 2.0 * shift[1:-1, :] + shift[:-2, :]) / step**2
 
-    cost = ca.sumsqr(pace / _PACE) + ca.sumsqr(shift / _PLACE) + ca.sumsqr(jolt / _JOLT)
-    cost += ca.sumsqr((pace[1:] - pace[:-1]) / (step * _HASTE))
-    opti.subject_to(opti.bounded(-np.log(_RATES[1]), pace, -np.log(_RATES[0])))
+    cost = (
+        ca.sumsqr(log_steps / _RATE_SCALE)
+        + ca.sumsqr(shift / _SHIFT_SCALE)
+        + ca.sumsqr(jolt / _SHIFT_ACCELERATION_SCALE)
+    )
+    cost += ca.sumsqr((log_steps[1:] - log_steps[:-1]) / (step * _RATE_CHANGE_SCALE))
+    opti.subject_to(opti.bounded(-np.log(_RATE_RANGE[1]), log_steps, -np.log(_RATE_RANGE[0])))
     airborne = np.zeros(n, dtype=bool)
     states: list[ca.MX] = []
     for start, end in task.flights:
         airborne[start + 1 : end] = True
-        states.append(_free_fall(opti, task, start, end, moved, pace, steps))
-        cost += _TURN * _change_of_spin(opti, task, start, end, pace)
+        states.append(_free_fall(opti, task, start, end, moved, log_steps, steps))
+        cost += _ANGULAR_MOMENTUM_WEIGHT * _angular_momentum_cost(opti, task, start, end, log_steps)
     for k in np.flatnonzero(~airborne[1:-1]):
-        opti.subject_to(rise[int(k)] >= -GRAVITY)
+        opti.subject_to(vertical_acceleration[int(k)] >= -GRAVITY)
     for k in np.flatnonzero(airborne):
         opti.subject_to(shift[int(k), 2] >= -max(float(task.clearance[k]), 0.0))
     for k, leg in np.argwhere(task.standing):
-        line = task.legs[k, leg]
-        longest = max(_REACH * task.leg_length, float(np.linalg.norm(line)))
-        opti.subject_to(ca.sumsqr(line[None, :] - shift[int(k), :]) <= longest**2)
+        hip_to_ankle = task.legs[k, leg]
+        max_length = max(_MAX_LEG_EXTENSION * task.leg_length, float(np.linalg.norm(hip_to_ankle)))
+        opti.subject_to(ca.sumsqr(hip_to_ankle[None, :] - shift[int(k), :]) <= max_length**2)
     for held, frame, interval in ((task.held[0], 0, 0), (task.held[1], n - 1, n - 2)):
         if held:
             opti.subject_to(shift[frame, :] == 0.0)
-            opti.subject_to(pace[interval] == 0.0)
+            opti.subject_to(log_steps[interval] == 0.0)
     opti.minimize(cost / n)
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 500, "tol": 1e-6})
     try:
@@ -180,33 +185,35 @@ def repair(task: RepairTask) -> RepairPlan:
     )
 
 
-def _free_fall(opti: ca.Opti, task: RepairTask, start: int, end: int, moved: Any, pace: ca.MX, steps: ca.MX) -> ca.MX:
+def _free_fall(
+    opti: ca.Opti, task: RepairTask, start: int, end: int, moved: Any, log_steps: ca.MX, steps: ca.MX
+) -> ca.MX:
     """Constrain a flight to free fall; returns its position and velocity at take-off, shape (2, 3)."""
     state = opti.variable(2, 3)
-    since = ca.vertcat(0, ca.cumsum(steps[start:end]))
-    fall = ca.repmat(state[0, :], end - start + 1, 1) + since @ state[1, :]
+    elapsed = ca.vertcat(0, ca.cumsum(steps[start:end]))
+    fall = ca.repmat(state[0, :], end - start + 1, 1) + elapsed @ state[1, :]
     opti.subject_to(moved[start : end + 1, :2] == fall[:, :2])
-    opti.subject_to(moved[start : end + 1, 2] == fall[:, 2] - 0.5 * GRAVITY * since**2)
-    guess = _first_fall(task.com[start : end + 1], 1.0 / task.fps)
+    opti.subject_to(moved[start : end + 1, 2] == fall[:, 2] - 0.5 * GRAVITY * elapsed**2)
+    guess = _guess_fall(task.com[start : end + 1], 1.0 / task.fps)
     opti.set_initial(state, guess[:2])
-    opti.set_initial(pace[start:end], guess[2, 0])
+    opti.set_initial(log_steps[start:end], guess[2, 0])
     return state
 
 
-def _change_of_spin(opti: ca.Opti, task: RepairTask, start: int, end: int, pace: ca.MX) -> Any:
-    """Sum of squares of the changes of the angular momentum in a flight, as shares of its largest."""
+def _angular_momentum_cost(opti: ca.Opti, task: RepairTask, start: int, end: int, log_steps: ca.MX) -> Any:
+    """Sum of squared deviations of the angular momentum from its mean in a flight, relative to its largest value."""
     mean = opti.variable(1, 3)
     air = np.arange(start + 1, end)
     scale = max(float(np.linalg.norm(task.angular[air], axis=1).max()), 1.0)
-    turning = task.angular[air] / scale / ca.repmat(ca.exp(pace[start + 1 : end]), 1, 3)
+    momentum = task.angular[air] / scale / ca.repmat(ca.exp(log_steps[start + 1 : end]), 1, 3)
     opti.set_initial(mean, task.angular[air].mean(axis=0) / scale)
-    return ca.sumsqr(turning - ca.repmat(mean, len(air), 1))
+    return ca.sumsqr(momentum - ca.repmat(mean, len(air), 1))
 
 
-def _first_fall(com: Array, step: float) -> Array:
-    """A first guess of take-off (position, velocity) and ln(h_k / h) of a flight, shape (3, 3)."""
+def _guess_fall(com: Array, step: float) -> Array:
+    """Initial guess of the take-off (position, velocity) and ln(h_k / h) of a flight, shape (3, 3)."""
     t = np.arange(len(com)) * step
     curve = np.polynomial.polynomial.polyfit(t, com, 2)
     rate = np.sqrt(GRAVITY / max(-2.0 * curve[2, 2], 1.0))
-    rate = float(np.clip(rate, *_RATES))
+    rate = float(np.clip(rate, *_RATE_RANGE))
     return np.array([curve[0], rate * curve[1], np.full(3, -np.log(rate))])

@@ -15,19 +15,19 @@ class BallisticTolerance:
     Parameters
     ----------
     gravity : (float, float)
-        Least and greatest gravity that viewers accept as natural [m/s²] (after Reitsma & Pollard 2003; its basis is
+        Smallest and largest gravity that viewers accept as natural [m/s²] (after Reitsma & Pollard 2003; its basis is
         explained in docs/explanation/ballistics.md).
     distance : float
         Largest distance of a body in real free fall from the recorded centre of mass [m].
     misfit : float
         RMS distance of the recorded centre of mass from its own parabola [m].
     drift : float
-        Largest deviation of the body's orientation from that by constant angular momentum [rad].
+        Largest deviation of the body's orientation from that under constant angular momentum [rad].
     yaw : float
-        The same about the vertical [rad]: real flights in captures stay within 1.5°; a turn of 38° that begins and ends
+        The same about the vertical [rad]. Real flights in captures stay within 1.5°; a turn of 38° that begins and ends
         in the air gives 4°.
     clearance : float
-        A body that never rises higher than this and does not fall may stand on a floor that the recording misses [m].
+        A body that never rises higher than this and does not fall may stand on a floor above the recorded one [m].
 
     Raises
     ------
@@ -55,24 +55,24 @@ class BallisticTolerance:
 class ContactTolerance:
     """Tolerances of contacts between flights.
 
-    Chosen on 22 retargeted captures: in the six with real jumps, soles stand within 5 mm of the floor and stay within
-    17 mm of that height, a foot slides by up to 7 cm, and no contact is at rest for up to 0.19 s.
+    Chosen on 22 retargeted captures. In the six with real jumps, soles in stance are within 5 mm of the floor and stay
+    within 17 mm of that height, a foot slides by up to 7 cm, and for up to 0.19 s no contact is at rest.
 
     Parameters
     ----------
     floor : float
         Largest distance of the median height of the supporting points from the floor [m].
     spread : float
-        Largest deviation from that height for nine tenths of the supported time, up and down [m].
+        Largest deviation from that height for 90 % of the supported time, up and down [m].
     unheld : float
         Longest time for which no contact is at rest [s].
     skate : float
         Largest slide of a foot in a stance [m].
     push : float
-        Largest acceleration of the centre of mass [m/s²]: legs give some ten times g.
+        Largest acceleration of the centre of mass [m/s²]; legs can give about ten times g.
     leap, outlier : float
-        A joint jumps if it turns by more than `leap` in a frame [rad], and by more than `outlier` times as much as
-        before and after.
+        A joint jumps if it turns by more than `leap` in a frame [rad], and by more than `outlier` times as much as in
+        the frames before and after.
 
     Raises
     ------

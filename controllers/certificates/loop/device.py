@@ -16,7 +16,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Device:
-    r"""Force-feedback arm with three motors: kernels that evaluate on CasADi symbols, and its friction and limits.
+    r"""Force-feedback arm with three motors: kernels that accept CasADi symbols, and its friction and limits.
 
     .. math:: M(\theta)\ddot\theta + C(\theta, \dot\theta)\dot\theta + D\dot\theta + f_c\,\mathrm{sign}\,\dot\theta
               + N(\theta) = \tau + J(\theta)^T F
@@ -74,7 +74,7 @@ def kinematics_function(device: Device) -> Any:
 def plant_function(device: Device) -> Any:
     """CasADi function (θ, θ̇, θ̈, p_d, v_d, [m, b, k]) → mass matrix of linkage and hand, ∂ID/∂θ, ∂ID/∂θ̇, ∂N/∂θ.
 
-    ID is the inverse dynamics, viscous friction and hand included: the joint torques of a motion.
+    ID is the inverse dynamics, including viscous friction and hand: the joint torques that a motion needs.
     """
     theta, rate, turn = (casadi.SX.sym(name, 3) for name in ("theta", "rate", "turn"))
     p_d, v_d, hand = (casadi.SX.sym(name, 3) for name in ("p_d", "v_d", "hand"))
@@ -83,13 +83,13 @@ def plant_function(device: Device) -> Any:
     weight = vector(device.gravity(theta))
     linkage_mass = matrix(device.mass(theta))
     acceleration = jacobian @ turn + casadi.jtimes(velocity, theta, rate)
-    push = hand[0] * acceleration + hand[1] * (velocity - v_d) + hand[2] * (vector(device.position(theta)) - p_d)
+    hand_force = hand[0] * acceleration + hand[1] * (velocity - v_d) + hand[2] * (vector(device.position(theta)) - p_d)
     torque = (
         linkage_mass @ turn
         + matrix(device.coriolis(theta, rate)) @ rate
         + casadi.DM(device.viscous) * rate
         + weight
-        + jacobian.T @ push
+        + jacobian.T @ hand_force
     )
     return casadi.Function(
         "plant",

@@ -1,18 +1,18 @@
 r"""Energy of a river: injected energy per lap, speed of a relaxed hand, and its distance under a bounded force.
 
 A river pushes along its tangent, so it is active by design. Of FOLLOW's force, the spring (k_r) is conservative and the
-damper (b_d) injects b_d (γφ̇ − v)·v ≤ b_d |γφ̇|²/4: this bounds the power of the ideal law for any motion of the hand;
-`injected` bounds what sampling, filter and rounding add to it for a vibrating hand. A relaxed hand moves at the speed
-at which the force balances friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
+damper (b_d) injects b_d (γφ̇ − v)·v ≤ b_d |γφ̇|²/4. This bounds the power of the ideal law for any motion of the hand;
+`injected` bounds what sampling, filter and rounding add for a vibrating hand. A relaxed hand moves at the speed at
+which the force balances friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
 
 .. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon)) + b_d s R\bigr), \qquad
           G = \sum_j \sigma_{max}(E\,A^j B)
 
 with A the state matrix transverse to the curve, B its response to a force, E the displacement of the tip: G is the
-peak gain of the sampled loop, the least number for which this holds. U_0 bounds the force that motion along the lap
-itself needs: inertia, friction and the filter's lag. The last terms are the part of the spring that the window removes
-off the curve, and the change of a parallel flow across the curve, s = max |φ̇|κ, else 0. A hand that starts on the
-curve stays within the least solution R: the loop is input-to-state stable.
+peak gain of the sampled loop, the smallest number for which this holds. U_0 bounds the force that motion along the
+curve needs by itself: inertia, friction and the filter's lag. The last two terms are the part of the spring that the
+window removes off the curve, and the change of a parallel flow across the curve, with s = max |φ̇|κ (0 for any other
+flow). A hand that starts on the curve stays within the smallest solution R: the loop is input-to-state stable.
 """
 
 from typing import NamedTuple
@@ -32,7 +32,7 @@ from controllers.state import Array
 
 
 class Drag(NamedTuple):
-    """Friction along the curve: viscous [N s/m] and Coulomb's [N] at the tip, shape (n,) each."""
+    """Friction along the curve: viscous [N s/m] and Coulomb [N] at the tip, shape (n,) each."""
 
     viscous: Array
     coulomb: Array
@@ -46,7 +46,7 @@ def drag(river: River, linear: LinearLoop) -> Drag:
 
 
 def terminal_speed(river: River, linear: LinearLoop) -> Array:
-    """Speed [m/s] at which a relaxed hand is carried at every phase: (b_d |φ̇| − f_c)/(b_d + b), at least 0."""
+    """Speed [m/s] of a relaxed hand in the flow at every phase: (b_d |φ̇| − f_c)/(b_d + b), at least 0."""
     friction, pace = drag(river, linear), np.linalg.norm(linear.velocity, axis=1)
     return np.maximum(0.0, (river.b_d * pace - friction.coulomb) / (river.b_d + friction.viscous))
 
@@ -68,26 +68,26 @@ def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
     rows = [loop.linear.jacobian @ basis[:, :3], loop.force(k_r, b_d) @ basis]
     gains = np.zeros((2, len(maps)))
     for _ in range(200_000):
-        part = np.array([np.linalg.norm(row @ force, ord=2, axis=(1, 2)) for row in rows])
-        gains += part
-        if np.all(part < 1e-9 * gains):
+        term = np.array([np.linalg.norm(row @ force, ord=2, axis=(1, 2)) for row in rows])
+        gains += term
+        if np.all(term < 1e-9 * gains):
             break
         rows = [row @ maps for row in rows]
     return PeakGain(*(float(gain.max()) for gain in gains))
 
 
 def own_force(river: River, linear: LinearLoop) -> Array:
-    """U_0 [N] at every phase: force at the tip that motion along the lap at its own pace needs."""
+    """U_0 [N] at every phase: force at the tip that motion along the curve at its own speed needs."""
     kinematics = kinematics_function(river.device).map(len(linear.phases))
     acceleration = river.curve.acceleration(linear.phases)
-    bend = np.array(kinematics(linear.theta.T, linear.rate.T)[1]).T
-    turn = joint_motion(linear.jacobian, acceleration - bend)
-    torque = np.einsum("nij,nj->ni", linear.mass, turn)
+    bias_acceleration = np.array(kinematics(linear.theta.T, linear.rate.T)[1]).T
+    joint_acceleration = joint_motion(linear.jacobian, acceleration - bias_acceleration)
+    torque = np.einsum("nij,nj->ni", linear.mass, joint_acceleration)
     for i, (theta, rate) in enumerate(zip(linear.theta, linear.rate, strict=True)):
         coriolis = np.array(river.device.coriolis(theta, rate), dtype=float)
         torque[i] += coriolis @ rate + np.array(river.device.viscous) * rate
     inertia = np.linalg.norm(joint_motion(linear.jacobian.transpose(0, 2, 1), torque), axis=1)
-    # Coulomb friction torques have any sign: the worst of all combinations is taken.
+    # Coulomb friction torques may have any sign: the worst of all combinations is taken.
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1) * np.array(river.device.coulomb)[:, None]
     stiction = np.linalg.norm(np.linalg.solve(linear.jacobian.transpose(0, 2, 1), signs[None]), axis=1).max(axis=1)
     sampling = river.sampling
@@ -96,7 +96,7 @@ def own_force(river: River, linear: LinearLoop) -> Array:
 
 
 def distance_bound(river: River, gain: float, force: float) -> float:
-    """Least R [m] with R = G (U + k_r R (1 − w(R/ε)) + b_d s R); inf when there is none within the tube."""
+    """Smallest R [m] with R = G (U + k_r R (1 − w(R/ε)) + b_d s R); inf if there is none within the tube."""
     radius, shear = 0.0, river.b_d * river.shear
     for _ in range(500):
         share = float(window(radius * radius * river.width**-2))
@@ -156,15 +156,15 @@ class Pushed(NamedTuple):
 def energy(river: River, push: float, ceiling: float) -> Verdict:
     """Verdict on the distance from the curve of a hand that pushes with at most `push` newtons, with FOLLOW.
 
-    Certified when the bound exists, stays within the tube and the curve's reach, where the nearest point is unique, and
-    the river's force below `ceiling` [N]. The margin is the additional push that would be allowed [N].
+    Certified if there is a bound within the tube and the curve's reach, where the nearest point is unique, and the
+    river's force stays below `ceiling` [N]. The margin is the additional push that would be allowed [N].
     """
     moving = river.moving()
     gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
     pushed, executed = Pushed(river, gain, float(own_force(river, moving).max()), ceiling), injection(river, moving)
     allowed, (distance, felt) = pushed.most(), pushed.bounds(push)
-    figures = _powers(river, moving, executed) | {
-        "speed_bound": float(_pace(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,
+    figures = _power_figures(river, moving, executed) | {
+        "speed_bound": float(_curve_speed(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,
         "peak_gain": gain.distance,
         "force_gain": gain.force,
         "own_force": pushed.own,
@@ -193,9 +193,9 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     return Verdict("unknown", reason, allowed - push, assumptions, {}, figures)
 
 
-def _powers(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
-    """Figures on power and energy of a lap, for the ideal and for the executed law."""
-    pace, speed, friction = _pace(moving), terminal_speed(river, moving), drag(river, moving)
+def _power_figures(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
+    """Figures on power and energy of a lap, for the ideal law and the executed one."""
+    pace, speed, friction = _curve_speed(moving), terminal_speed(river, moving), drag(river, moving)
     lap = river.curve.duration
     return {
         "phases": river.phases(),
@@ -210,6 +210,6 @@ def _powers(river: River, moving: LinearLoop, executed: Injection) -> dict[str, 
     }
 
 
-def _pace(linear: LinearLoop) -> Array:
+def _curve_speed(linear: LinearLoop) -> Array:
     """|φ̇| at every phase [m/s]."""
     return np.linalg.norm(linear.velocity, axis=1)

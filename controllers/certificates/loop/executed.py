@@ -2,8 +2,8 @@ r"""Linearisation of an executed program of laws by finite differences, for laws
 
 The torques τ(θ, ω) = J(θ)ᵀ F(p(θ), J(θ) ω) come from the compiled program itself; their derivatives are central
 differences at a state of the hand, with memory and phase fixed. They replace the symbolic derivatives in `LinearLoop`.
-Where a force jumps or bends, differences ahead and behind, or of two steps, differ: there is no derivative to judge by.
-This can refute stability but not prove it, since only the given states are examined.
+Where a force jumps or has a kink, forward and backward differences, or those of two step sizes, disagree: there is no
+derivative. This method can refute stability but not prove it, since only the given states are examined.
 """
 
 from collections.abc import Sequence
@@ -22,14 +22,15 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
 from controllers.state import Array, HandState, Mask
 
-_STEP = 1e-6  # [rad], [rad/s] of the differences
-# Differences ahead and behind, of two steps, of a force that has a derivative there. That of a Gaussian of 1 mm width
-# changes by 0.01 % within a step; a jump makes one of them ten times another, a bend makes two sides differ.
+_STEP = 1e-6  # [rad], [rad/s] step of the differences
+# Forward and backward steps of two sizes; all give the same slope where the force has a derivative. The slope of a
+# Gaussian of 1 mm width changes by 0.01 % within a step. At a jump one slope is ten times another; at a kink the two
+# sides differ.
 _STEPS = (_STEP, -_STEP, 0.1 * _STEP, -0.1 * _STEP)
-_AGREES = 0.01  # share of the largest derivative within which they agree
-_NO_SLOPE = 1e-6  # [N m/rad], [N m s/rad] below any derivative that matters, above rounding over a step
-_CUT = 0.999  # share of a limit from which a force is cut
-_SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
+_SLOPE_TOLERANCE = 0.01  # largest difference between the slopes, as a fraction of the largest derivative
+_MIN_SLOPE = 1e-6  # [N m/rad], [N m s/rad] smaller than any relevant derivative, larger than rounding divided by a step
+_LIMIT_FRACTION = 0.999  # fraction of the limit from which a force counts as limited
+_MIN_OSCILLATION_ANGLE = 1e-2  # [rad per period] an eigenvalue with a smaller angle is a drift, not an oscillation
 _DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
 
@@ -39,7 +40,7 @@ class Seen(NamedTuple):
     Attributes
     ----------
     radius : float
-        Spectral radius of a period there, over the oscillating modes.
+        Spectral radius of a period in that state, over the oscillating modes.
     phase : float
         Phase of the curve [s].
     p, v : Array
@@ -49,10 +50,10 @@ class Seen(NamedTuple):
     states : int
         Number of examined states.
     strongest : float
-        Largest force of the program at any of them [N].
+        Largest force of the program in any of these states [N].
     abrupt : tuple of Array
-        Positions [m] of those states where the force jumps, bends or is not finite: it has no derivative there, and
-        they are not judged.
+        Positions [m] of the states in which the force jumps, has a kink or is not finite. It has no derivative there,
+        so these states are not judged.
     """
 
     radius: float
@@ -66,7 +67,7 @@ class Seen(NamedTuple):
 
 
 class Differenced(NamedTuple):
-    """A linear loop with the derivatives of a program, and at which of its n states they exist, shape (n,)."""
+    """A linear loop with the derivatives of a program, and whether they exist in each of its n states, shape (n,)."""
 
     loop: LinearLoop
     smooth: Mask
@@ -83,8 +84,8 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
 def differenced(linear: LinearLoop, program: Program, river: River, states: States) -> Differenced:
     """The linear loop of `river` with the program's derivatives at n hands; use it with k_r = 1, b_d = 0.
 
-    `linear` has the plant at the same phases, of a curve that may be slowed down; hands need not be on the curve. Their
-    time is their phase, as in the first lap. Where the force has no derivative, that is zero.
+    `linear` has the plant at the same phases, possibly of a slowed-down curve; hands need not be on the curve. Their
+    time is their phase, as in the first lap. Where the force has no derivative, zero is used.
     """
     by_theta, by_omega = np.zeros((2, *linear.weight_theta.shape)), np.zeros((2, *linear.weight_theta.shape))
     smooth = np.ones(len(states.p), dtype=np.bool_)
@@ -104,8 +105,8 @@ def differenced(linear: LinearLoop, program: Program, river: River, states: Stat
 
         here, unit = torque(theta, omega), np.eye(3)
         found = (
-            _slope([torque(theta + step * axis, omega) - here for axis in unit for step in _STEPS]),
-            _slope([torque(theta, omega + step * axis) - here for axis in unit for step in _STEPS]),
+            _derivative([torque(theta + step * axis, omega) - here for axis in unit for step in _STEPS]),
+            _derivative([torque(theta, omega + step * axis) - here for axis in unit for step in _STEPS]),
         )
         smooth[i] = all(slope is not None for slope in found)
         for slopes, slope in zip((by_theta, by_omega), found, strict=True):
@@ -113,20 +114,20 @@ def differenced(linear: LinearLoop, program: Program, river: River, states: Stat
     return Differenced(replace(linear, unit_theta=by_theta, unit_omega=by_omega), smooth)
 
 
-def _slope(changes: Sequence[Array]) -> Array | None:
-    """Derivative (3, 3) of torques by changes of theirs for `_STEPS` along each axis; None where there is none."""
+def _derivative(changes: Sequence[Array]) -> Array | None:
+    """Derivative (3, 3) of torques from their changes for `_STEPS` along each axis; None if it does not exist."""
     slopes = np.array(changes).reshape(3, len(_STEPS), 3) / np.array(_STEPS)[:, None]
-    # Central, of the larger step: its error is of the second order.
+    # Central difference of the larger step, with an error of second order.
     central = 0.5 * (slopes[:, 0] + slopes[:, 1])
-    apart = np.abs(slopes - central[:, None]).max()
-    # Written so that NaN is no derivative.
-    return central.T if apart <= _AGREES * np.abs(central).max() + _NO_SLOPE else None
+    spread = np.abs(slopes - central[:, None]).max()
+    # In this form the comparison is false for NaN, which is no derivative.
+    return central.T if spread <= _SLOPE_TOLERANCE * np.abs(central).max() + _MIN_SLOPE else None
 
 
 def looked_at(
     program: Program, river: River, reach: float, hands: Sequence[HandImpedance], pace: float = 1.0, n: int = 16
 ) -> Seen:
-    """The worst of states on the curve at rest and at `pace` times its own, and of states off it by `reach` [m]."""
+    """The worst of states on the curve, at rest and at `pace` times its speed, and of states `reach` [m] off it."""
     phases = river.phases(n)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     tangent = velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -135,52 +136,52 @@ def looked_at(
     away = [reach * (np.cos(a) * plane[:, 0] + np.sin(a) * plane[:, 1]) for a in angles]
     offs, paces = (0.0 * points, 0.0 * points, *away), (0.0, *[pace] * (1 + _DIRECTIONS))
     states = [States(phases, points + off, share * velocity) for off, share in zip(offs, paces, strict=True)]
-    return _worst(program, river, states, hands)
+    return _worst_state(program, river, states, hands)
 
 
 def looked_about(program: Program, river: River, hands: Sequence[HandImpedance]) -> Seen:
-    """The worst of the states about the curve (`states_about`), of which no law of one's own knows beforehand."""
-    return _worst(program, river, [states_about(river.curve)], hands)
+    """The worst of the random states about the curve (`states_about`), which a user-defined law cannot anticipate."""
+    return _worst_state(program, river, [states_about(river.curve)], hands)
 
 
-def _worst(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
-    """The worst of several sets of states beside the same phases, with every hand.
+def _worst_state(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
+    """The worst of several sets of states near the same phases, with every hand.
 
-    States out of reach are left out, and those at which the limit of the whole program cuts its force: a certificate
-    assumes that it does not.
+    States out of reach are omitted, and so are those in which the limit of the whole program reduces its force: a
+    certificate assumes that it does not.
     """
     plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
     worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
     strongest, abrupt = 0.0, list[Array]()
     *_, (last, numbers) = program.composition()
-    limit = numbers[0] if last is Join.LIMIT else np.inf  # of the whole field; an earlier one is of a part of it
-    for phases, asked, v in states:
-        reached = np.array([_reaches(river, place) for place in asked])
-        p = np.where(reached[:, None], asked, river.curve.point(phases))
+    limit = numbers[0] if last is Join.LIMIT else np.inf  # of the whole field; an earlier one is of a part
+    for phases, wanted, v in states:
+        reachable = np.array([_is_reachable(river, place) for place in wanted])
+        p = np.where(reachable[:, None], wanted, river.curve.point(phases))
         law, smooth = differenced(plants[0][1], program, river, States(phases, p, v))
         fresh = program.fresh_memory()
         sizes = np.linalg.norm(
-            [force_at(program, fresh, *of) for of in zip(p, v, phases.tolist(), strict=True)], axis=1
+            [force_at(program, fresh, *state) for state in zip(p, v, phases.tolist(), strict=True)], axis=1
         )
-        strongest = max(strongest, float(sizes[reached].max(initial=0.0)))
-        reached &= np.logical_not(sizes >= _CUT * limit)
-        abrupt += list(p[reached & ~smooth])
-        worst = worst._replace(states=worst.states + int(reached.sum()))
+        strongest = max(strongest, float(sizes[reachable].max(initial=0.0)))
+        reachable &= np.logical_not(sizes >= _LIMIT_FRACTION * limit)
+        abrupt += list(p[reachable & ~smooth])
+        worst = worst._replace(states=worst.states + int(reachable.sum()))
         for hand, plant in plants:
             loop = SampledLoop(replace(plant, unit_theta=law.unit_theta, unit_omega=law.unit_omega), river.sampling)
             values = np.linalg.eigvals(loop.frozen(1.0, 0.0))
-            radius = np.where(np.abs(np.angle(values)) > _SWINGS, np.abs(values), 0.0).max(axis=1)
-            radius = np.where(reached & smooth, radius, 0.0)
+            radius = np.where(np.abs(np.angle(values)) > _MIN_OSCILLATION_ANGLE, np.abs(values), 0.0).max(axis=1)
+            radius = np.where(reachable & smooth, radius, 0.0)
             at = int(radius.argmax())
             if radius[at] > worst.radius:
                 worst = worst._replace(radius=float(radius[at]), phase=float(phases[at]), p=p[at], v=v[at], hand=hand)
     return worst._replace(strongest=strongest, abrupt=tuple(abrupt))
 
 
-def _reaches(river: River, place: Array) -> bool:
-    """Whether the device reaches a place [m]."""
+def _is_reachable(river: River, place: Array) -> bool:
+    """Whether the device reaches a position [m]."""
     try:
         river.device.angles(place)
-    except ValueError:  # the base of the errors of devices
+    except ValueError:  # base class of the errors of devices
         return False
     return True

@@ -1,8 +1,8 @@
-"""Numbers of the hand with which a law's own function is followed: CasADi symbols whose comparisons are decided.
+"""Symbolic execution of a user-defined law: numbers of the hand as CasADi symbols whose comparisons are decided.
 
-A Python function that compares numbers of the hand takes one of several ways. Every comparison asks a `Way` for its
-truth; the way answers with the decisions that it was given, and records what was decided. All ways together, with their
-conditions, are the function (symbolic execution: King, *Symbolic execution and program testing*, CACM 19(7), 1976).
+A Python function that compares numbers of the hand takes one of several paths. Every comparison asks a `Way` (one path)
+for its truth; the path answers with the decisions that it was given, and records what was decided. All paths together,
+with their conditions, are the function (King, *Symbolic execution and program testing*, CACM 19(7), 1976).
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +16,12 @@ import numpy as np
 from controllers.certificates.loop.device import Symbol
 from controllers.errors import ControllerError
 
-_DEEPEST = 1000  # operations above each other that are compared; what is nested deeper counts as different
-MOST_CONDITIONS = 64  # decisions on one way: more is a loop that does not end on symbols
+_MAX_DEPTH = 1000  # depth to which nested operations are compared; deeper expressions count as different
+MOST_CONDITIONS = 64  # decisions on one path: more indicate a loop that does not end on symbols
 
 
 class NotFollowed(ControllerError):
-    """A function that cannot be followed on symbols."""
+    """A function that cannot be executed on symbols."""
 
 
 class Condition(NamedTuple):
@@ -34,7 +34,7 @@ class Condition(NamedTuple):
     kind : {"<", "<=", "=="}
         Comparison of the gap with zero.
     holds : bool
-        What was decided.
+        The decision: whether the comparison holds.
     """
 
     gap: Symbol
@@ -42,55 +42,58 @@ class Condition(NamedTuple):
     holds: bool
 
     def symbol(self) -> Symbol:
-        """1 where the gap is as it was decided, 0 elsewhere (NaN included, if it was decided to hold)."""
+        """1 where the gap satisfies the decision, 0 elsewhere (also for NaN, if the comparison was decided to hold)."""
         true = {"<": self.gap < 0.0, "<=": self.gap <= 0.0, "==": self.gap == 0.0}[self.kind]
         return true if self.holds else casadi.logic_not(true)
 
 
 def identical(a: Symbol, b: Symbol) -> bool:
-    """Whether two expressions are the same, to the last bit of their numbers, of which their texts show six digits."""
-    return bool(casadi.is_equal(a, b, _DEEPEST))
+    """Whether two expressions are the same, to the last bit of their numbers (their texts show six digits only)."""
+    return bool(casadi.is_equal(a, b, _MAX_DEPTH))
 
 
-_TRUE = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
+_TRUE_SIGNS = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
 
 
 class Way:
-    """One way through a function: the first decisions are given, each further comparison is taken to hold.
+    """One path through a function: the first decisions are given, and every further comparison is taken to hold.
 
-    What earlier comparisons of the same two numbers leave no choice of is not decided again.
+    A comparison whose result follows from earlier ones of the same two numbers is not decided again.
     """
 
     def __init__(self, given: Sequence[bool]) -> None:
         self.given = tuple(given)
         self.conditions: list[Condition] = []
         self.lost: str | None = None
-        self._signs = list[tuple[Symbol, frozenset[int]]]()  # that a gap may still have, the latest last
+        self._possible_signs = list[tuple[Symbol, frozenset[int]]]()  # signs that a gap may still have, the latest last
 
     def decide(self, left: Any, right: Any, kind: Literal["<", "<=", "=="]) -> bool:
-        """Truth of ``left kind right`` on this way."""
-        gap, true = casadi.SX(left - right), _TRUE[kind]
+        """Truth of ``left kind right`` on this path."""
+        gap, true = casadi.SX(left - right), _TRUE_SIGNS[kind]
         if gap.is_constant():
             return (float(gap) > 0.0) - (float(gap) < 0.0) in true and float(gap) == float(gap)
-        signs = next((left for of, left in reversed(self._signs) if identical(of, gap)), frozenset((-1, 0, 1)))
+        signs = next(
+            (left for known_gap, left in reversed(self._possible_signs) if identical(known_gap, gap)),
+            frozenset((-1, 0, 1)),
+        )
         if signs <= true or not signs & true:
             return signs <= true
         at = len(self.conditions)
         if at >= MOST_CONDITIONS:
             self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
         holds = self.given[at] if at < len(self.given) else True
-        left_over = signs & true if holds else signs - true
-        self._signs += ((gap, left_over), (casadi.SX(right - left), frozenset(-sign for sign in left_over)))
+        remaining = signs & true if holds else signs - true
+        self._possible_signs += ((gap, remaining), (casadi.SX(right - left), frozenset(-sign for sign in remaining)))
         self.conditions.append(Condition(gap, kind, holds))
         return holds
 
     def lose(self, why: str) -> NoReturn:
-        """Give the function up; it is remembered, since the function may catch what is raised."""
+        """Give up on the function. The reason is stored, since the function may catch the exception."""
         self.lost = self.lost or why
         raise NotFollowed(why)
 
 
-_PLAIN = (
+_CONVERSION_MESSAGE = (
     "it makes a plain number of one of the hand's, as float(), the functions of math and an array of floats do; "
     "expected functions of NumPy, as np.sqrt, np.hypot, np.linalg.norm(hand.p), and np.array([...]) of such numbers"
 )
@@ -101,7 +104,7 @@ def _hypot(a: Symbol, b: Symbol) -> Symbol:
 
 
 class FollowedNumber:
-    """A number of the hand, or what a function made of it, on one `Way`."""
+    """A number of the hand, or one that a function computed from it, on one `Way`."""
 
     __slots__ = ("symbol", "way")
     __hash__: ClassVar[None]  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -110,15 +113,15 @@ class FollowedNumber:
         self.symbol = symbol
         self.way = way
 
-    def _with(self, other: object, made: Callable[[Symbol, Symbol], Symbol]) -> Any:
-        """A number made of this and another one; what is neither is left to Python, and arrays to NumPy."""
+    def _combine(self, other: object, operation: Callable[[Symbol, Symbol], Symbol]) -> Any:
+        """A number computed from this and another one; any other operand is left to Python, and arrays to NumPy."""
         if isinstance(other, FollowedNumber):
-            return FollowedNumber(made(self.symbol, other.symbol), self.way)
+            return FollowedNumber(operation(self.symbol, other.symbol), self.way)
         if isinstance(other, Real | np.bool_):
-            return FollowedNumber(made(self.symbol, float(other)), self.way)
+            return FollowedNumber(operation(self.symbol, float(other)), self.way)
         return NotImplemented
 
-    def _asked(self, other: object, kind: Literal["<", "<=", "=="], swapped: bool = False) -> Any:
+    def _compare(self, other: object, kind: Literal["<", "<=", "=="], swapped: bool = False) -> Any:
         if isinstance(other, FollowedNumber):
             value: Any = other.symbol
         elif isinstance(other, Real | np.bool_):
@@ -128,32 +131,32 @@ class FollowedNumber:
         return self.way.decide(value, self.symbol, kind) if swapped else self.way.decide(self.symbol, value, kind)
 
     def __add__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: a + b)
+        return self._combine(other, lambda a, b: a + b)
 
     __radd__ = __add__
 
     def __sub__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: a - b)
+        return self._combine(other, lambda a, b: a - b)
 
     def __rsub__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: b - a)
+        return self._combine(other, lambda a, b: b - a)
 
     def __mul__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: a * b)
+        return self._combine(other, lambda a, b: a * b)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: a / b)
+        return self._combine(other, lambda a, b: a / b)
 
     def __rtruediv__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: b / a)
+        return self._combine(other, lambda a, b: b / a)
 
     def __pow__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: a**b)
+        return self._combine(other, lambda a, b: a**b)
 
     def __rpow__(self, other: object) -> Any:
-        return self._with(other, lambda a, b: b**a)
+        return self._combine(other, lambda a, b: b**a)
 
     def __neg__(self) -> "FollowedNumber":
         return FollowedNumber(-self.symbol, self.way)
@@ -165,55 +168,55 @@ class FollowedNumber:
         return self if self >= 0.0 else -self
 
     def __lt__(self, other: object) -> Any:
-        return self._asked(other, "<")
+        return self._compare(other, "<")
 
     def __le__(self, other: object) -> Any:
-        return self._asked(other, "<=")
+        return self._compare(other, "<=")
 
     def __gt__(self, other: object) -> Any:
-        return self._asked(other, "<", swapped=True)
+        return self._compare(other, "<", swapped=True)
 
     def __ge__(self, other: object) -> Any:
-        return self._asked(other, "<=", swapped=True)
+        return self._compare(other, "<=", swapped=True)
 
     def __eq__(self, other: object) -> Any:
-        return self._asked(other, "==")
+        return self._compare(other, "==")
 
     def __ne__(self, other: object) -> Any:
-        equal = self._asked(other, "==")
+        equal = self._compare(other, "==")
         return equal if equal is NotImplemented else not equal
 
     def __bool__(self) -> bool:
         return not self.way.decide(self.symbol, 0.0, "==")
 
-    def _plain(self, *_: object) -> NoReturn:
-        self.way.lose(_PLAIN)
+    def _refuse_conversion(self, *_: object) -> NoReturn:
+        self.way.lose(_CONVERSION_MESSAGE)
 
-    __float__ = __int__ = __index__ = __complex__ = __round__ = __floor__ = __ceil__ = __trunc__ = _plain
+    __float__ = __int__ = __index__ = __complex__ = __round__ = __floor__ = __ceil__ = __trunc__ = _refuse_conversion
 
-    # NumPy calls these methods of an object for its functions of the same names.
+    # For its functions of the same names, NumPy calls these methods of an object.
 
-    def _mapped(self, function: Callable[[Symbol], Symbol]) -> "FollowedNumber":
+    def _apply(self, function: Callable[[Symbol], Symbol]) -> "FollowedNumber":
         return FollowedNumber(function(self.symbol), self.way)
 
-    sqrt = partialmethod(_mapped, casadi.sqrt)
-    exp = partialmethod(_mapped, casadi.exp)
-    log = partialmethod(_mapped, casadi.log)
-    sin = partialmethod(_mapped, casadi.sin)
-    cos = partialmethod(_mapped, casadi.cos)
-    tan = partialmethod(_mapped, casadi.tan)
-    arcsin = partialmethod(_mapped, casadi.asin)
-    arccos = partialmethod(_mapped, casadi.acos)
-    arctan = partialmethod(_mapped, casadi.atan)
-    sinh = partialmethod(_mapped, casadi.sinh)
-    cosh = partialmethod(_mapped, casadi.cosh)
-    tanh = partialmethod(_mapped, casadi.tanh)
-    arctan2 = partialmethod(_with, made=casadi.atan2)
-    hypot = partialmethod(_with, made=_hypot)
+    sqrt = partialmethod(_apply, casadi.sqrt)
+    exp = partialmethod(_apply, casadi.exp)
+    log = partialmethod(_apply, casadi.log)
+    sin = partialmethod(_apply, casadi.sin)
+    cos = partialmethod(_apply, casadi.cos)
+    tan = partialmethod(_apply, casadi.tan)
+    arcsin = partialmethod(_apply, casadi.asin)
+    arccos = partialmethod(_apply, casadi.acos)
+    arctan = partialmethod(_apply, casadi.atan)
+    sinh = partialmethod(_apply, casadi.sinh)
+    cosh = partialmethod(_apply, casadi.cosh)
+    tanh = partialmethod(_apply, casadi.tanh)
+    arctan2 = partialmethod(_combine, operation=casadi.atan2)
+    hypot = partialmethod(_combine, operation=_hypot)
 
 
 class FollowedVector(np.ndarray[Any, np.dtype[Any]]):
-    """A vector of the hand as an array of `FollowedNumber`, whose Euclidean norm is one, too."""
+    """A vector of the hand as an array of `FollowedNumber`; its Euclidean norm is a `FollowedNumber`, too."""
 
     @staticmethod
     def of(symbols: Symbol, way: Way) -> "FollowedVector":
@@ -223,7 +226,7 @@ class FollowedVector(np.ndarray[Any, np.dtype[Any]]):
         return numbers.view(FollowedVector)
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        # NumPy's own makes floats of the numbers.
+        # NumPy's own norm converts the numbers to floats.
         if func is np.linalg.norm and len(args) == 1 and not kwargs and args[0].ndim == 1:
             return np.sqrt(sum(number * number for number in args[0]))
         return super().__array_function__(func, types, args, kwargs)

@@ -11,7 +11,7 @@ from controllers.checks import check_kinds
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_MOST_MASS = 1e3  # [kg] beyond any hand, and within what the eigenvalues of the loop bear
+_MAX_MASS = 1e3  # [kg] more than any hand, and small enough for accurate eigenvalues of the loop
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class HandImpedance:
     Parameters
     ----------
     mass, damping, stiffness : float
-        m [kg], b [N s/m], k [N/m]; all zero: no hand.
+        m [kg], b [N s/m], k [N/m]; all zero means no hand.
 
     Raises
     ------
     ParameterError
-        If one is negative, not finite, or beyond any hand's.
+        If one is negative, not finite, or larger than that of any hand.
     """
 
     mass: float = 0.0
@@ -34,12 +34,12 @@ class HandImpedance:
     stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, most in (("mass", _MOST_MASS), ("damping", MOST_DAMPING), ("stiffness", MOST_STIFFNESS)):
+        for name, limit in (("mass", _MAX_MASS), ("damping", MOST_DAMPING), ("stiffness", MOST_STIFFNESS)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
-            if value > most:
-                raise ParameterError(f"{name} of a hand must be at most {most:g}, got {value:g}")
+            if value > limit:
+                raise ParameterError(f"{name} of a hand must be at most {limit:g}, got {value:g}")
 
     def __str__(self) -> str:
         """Description with units."""
@@ -62,11 +62,11 @@ class HandRange:
     Parameters
     ----------
     mass : two floats
-        Least and largest m [kg].
+        Smallest and largest m [kg].
     damping : two floats
-        Least and largest b [N s/m].
+        Smallest and largest b [N s/m].
     stiffness : two floats
-        Least and largest k [N/m].
+        Smallest and largest k [N/m].
     """
 
     mass: tuple[float, float] = (0.0, 0.3)

@@ -1,4 +1,4 @@
-"""Hands about a curve at which a law is tried: at random, and the same ones every time."""
+"""Random states of the hand about a curve, for the examination of a law; the same ones every time."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,14 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, HandState
 
-HANDS = 50  # hands at which a law is compared with its expression
-NEAREST, FURTHEST = 1e-5, 5e-3  # [m] off the curve: from a reading's rounding to a fifth of a map's reach
-SLOWEST, FASTEST = 1e-3, 0.1  # [m/s] beside the curve's own motion, up to that of a hand that pushes
+HANDS = 50  # states of the hand at which a law is compared with its expression
+NEAREST, FURTHEST = 1e-5, 5e-3  # [m] distance from the curve: from the encoders' rounding to a fifth of a map's reach
+SLOWEST, FASTEST = 1e-3, 0.1  # [m/s] speed relative to the curve's motion, up to that of a hand that pushes
 _SEED = 3
 
 
 class States(NamedTuple):
-    """Positions and velocities of hands beside phases of a curve: phases (n,) [s], p (n, 3) [m], v (n, 3) [m/s]."""
+    """Positions and velocities of the hand near phases of a curve: phases (n,) [s], p (n, 3) [m], v (n, 3) [m/s]."""
 
     phases: Array
     p: Array
@@ -22,19 +22,23 @@ class States(NamedTuple):
 
 
 def states_about(curve: Trajectory, n: int = HANDS) -> States:
-    """States beside a curve at rest, at its own pace and between, with distances and speeds of all orders."""
+    """States near a curve, at 0 to 1.5 times its speed, with deviations of all orders of magnitude."""
     rng = np.random.default_rng(_SEED)
-    # Inside the ends of an open curve, where it may stand still.
+    # Away from the ends of an open curve, where it may stand still.
     phases = curve.start + curve.duration * rng.uniform(0.01, 0.99, size=n)
-    away, aside = (rng.normal(size=(n, 3)) for _ in range(2))
-    away *= np.geomspace(NEAREST, FURTHEST, n)[rng.permutation(n), None] / np.linalg.norm(away, axis=1, keepdims=True)
-    aside *= np.geomspace(SLOWEST, FASTEST, n)[rng.permutation(n), None] / np.linalg.norm(aside, axis=1, keepdims=True)
+    offset, relative_velocity = (rng.normal(size=(n, 3)) for _ in range(2))
+    offset *= np.geomspace(NEAREST, FURTHEST, n)[rng.permutation(n), None] / np.linalg.norm(
+        offset, axis=1, keepdims=True
+    )
+    relative_velocity *= np.geomspace(SLOWEST, FASTEST, n)[rng.permutation(n), None] / np.linalg.norm(
+        relative_velocity, axis=1, keepdims=True
+    )
     pace = rng.choice([0.0, 0.5, 1.0, 1.5], size=(n, 1))
-    return States(phases, curve.point(phases) + away, pace * curve.velocity(phases) + aside)
+    return States(phases, curve.point(phases) + offset, pace * curve.velocity(phases) + relative_velocity)
 
 
 def hands_about(curve: Trajectory) -> list[HandState]:
-    """The hands of `states_about`, and as many on the curve, with any time, orientation, turning and switch."""
+    """The states of `states_about`, and as many on the curve, with random time, orientation, turning and switch."""
     rng, (phases, p, v) = np.random.default_rng(_SEED), states_about(curve)
     found: list[HandState] = []
     for place, velocity in zip(
@@ -51,6 +55,6 @@ def hands_about(curve: Trajectory) -> list[HandState]:
 
 
 def told(p: Array, v: Array | None = None) -> str:
-    """Position, and velocity, of a hand for messages."""
+    """Position and, if given, velocity of a hand as text for messages."""
     place = f"p = ({', '.join(f'{1e3 * x:.3g}' for x in p)}) mm"
     return place if v is None else f"{place}, v = ({', '.join(f'{x:.3g}' for x in v)}) m/s"

@@ -26,7 +26,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.state import Array
 
-BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; vibration felt by the skin
+BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; what the skin feels
 
 
 class Injection(NamedTuple):
@@ -35,7 +35,7 @@ class Injection(NamedTuple):
     Attributes
     ----------
     passive_below : float
-        f_0 [Hz]: a slower vibration gains no energy.
+        f_0 [Hz]: slower vibrations gain no energy.
     activity : tuple of float
         max E⁺ [N s/m] up to each of `BANDS`.
     rounding : float
@@ -47,16 +47,16 @@ class Injection(NamedTuple):
     rounding: float
 
     def bound(self, ideal: float, speed: float, band: int) -> float:
-        """P̄ [W] of a vibration of RMS speed V [m/s] within a band, on top of the ideal bound [W]."""
+        """P̄ [W] for a vibration of RMS speed V [m/s] within a band, including the ideal bound [W]."""
         return ideal + self.activity[band] * speed**2 + self.rounding * speed
 
 
 def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
     """E(ω) [N s/m] at frequencies [Hz] above 0 and up to the Nyquist frequency."""
     period, keep, omega = sampling.period, sampling.keep, 2.0 * np.pi * frequency
-    late = np.exp(-1j * omega * period)
-    hold = (1.0 - late) / (1j * omega * period) * np.exp(-1j * omega * sampling.delay)
-    stiffness = hold * (k + b * (1.0 - keep) * (1.0 - late) / (period * (1.0 - keep * late)))
+    unit_delay = np.exp(-1j * omega * period)
+    hold = (1.0 - unit_delay) / (1j * omega * period) * np.exp(-1j * omega * sampling.delay)
+    stiffness = hold * (k + b * (1.0 - keep) * (1.0 - unit_delay) / (period * (1.0 - keep * unit_delay)))
     return -stiffness.imag / omega
 
 
@@ -65,10 +65,10 @@ def injection(river: River, linear: LinearLoop) -> Injection:
     nyquist = 0.5 / river.sampling.period
     frequency = np.geomspace(0.1, nyquist, 2000)
     # Along the curve there is no spring.
-    found = np.maximum(*(activity(k, river.b_d, river.sampling, frequency) for k in (0.0, river.k_r)))
-    active = np.flatnonzero(found > 0.0)
+    envelope = np.maximum(*(activity(k, river.b_d, river.sampling, frequency) for k in (0.0, river.k_r)))
+    active = np.flatnonzero(envelope > 0.0)
     error = 0.5 * np.linalg.norm(linear.jacobian, axis=1) @ np.array(river.device.encoder_step)
     keep, period = river.sampling.keep, river.sampling.period
     rounding = float(error.max()) * (river.k_r + 2.0 * river.b_d * (1.0 - keep) / period)
-    most = tuple(max(0.0, float(found[frequency <= band].max())) for band in BANDS)
-    return Injection(float(frequency[active[0]]) if len(active) else nyquist, most, rounding)
+    band_activity = tuple(max(0.0, float(envelope[frequency <= band].max())) for band in BANDS)
+    return Injection(float(frequency[active[0]]) if len(active) else nyquist, band_activity, rounding)

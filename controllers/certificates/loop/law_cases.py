@@ -1,4 +1,4 @@
-"""Cases of a law of one's own: its function followed on symbols, with the conditions under which each case holds."""
+"""Cases of a user-defined law: symbolic execution of its function, with the conditions of each case."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,20 +24,19 @@ from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import FunctionLaw
 from controllers.state import Array, HandState, Mask
 
-MOST_CASES = 16  # ways through a function that are followed: as many as four comparisons have
-# Share of the largest force by which two orders of the same operations differ: rounding, with what it is magnified by
-# where numbers cancel.
-_AGREES = 1e-9
-_NO_FORCE = 1e-12  # [N] below any force
+MOST_CASES = 16  # largest number of paths through a function: that of four independent comparisons
+# Relative difference of two forces from the same operations in another order: rounding, magnified by cancellation.
+_FORCE_TOLERANCE = 1e-9
+_MIN_FORCE = 1e-12  # [N] smaller than any force
 # Operations of CasADi without a derivative somewhere in the middle of their domain.
-_BENT = frozenset(
+_NONSMOOTH_OPERATIONS = frozenset(
     (casadi.OP_FABS, casadi.OP_SIGN, casadi.OP_FMIN, casadi.OP_FMAX, casadi.OP_FLOOR, casadi.OP_CEIL, casadi.OP_FMOD,
      casadi.OP_IF_ELSE_ZERO, casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE, casadi.OP_COPYSIGN)
 )  # fmt: skip
 
 
 class Case(NamedTuple):
-    """Force F [N] and moment [N m] of a law as expressions (3,), under all of some conditions."""
+    """Force F [N] and moment [N m] of a law as expressions (3,), where all of the conditions hold."""
 
     force: Symbol
     moment: Symbol
@@ -46,7 +45,7 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """A law in the form that is certified: its cases, of which exactly one holds for any hand.
+    """A law in the form that is certified: its cases, exactly one of which holds for any hand.
 
     Attributes
     ----------
@@ -74,13 +73,13 @@ class Cases:
     @cached_property
     def chosen(self) -> Any:
         """CasADi function (p, v) → force (3,), NaN where no case holds, and the number of the case."""
-        force, which = casadi.SX(np.full(3, np.nan)), casadi.SX(-1.0)
+        force, case_number = casadi.SX(np.full(3, np.nan)), casadi.SX(-1.0)
         for number, case in enumerate(self.cases):
             holds = casadi.SX(1.0)
             for condition in case.conditions:
                 holds = casadi.logic_and(holds, condition.symbol())
-            force, which = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, which)
-        return casadi.Function("chosen", [self.p, self.v], [force, which])
+            force, case_number = casadi.if_else(holds, case.force, force), casadi.if_else(holds, number, case_number)
+        return casadi.Function("chosen", [self.p, self.v], [force, case_number])
 
     def scaled(self, factor: float) -> "Cases":
         """The law times a number, under the same conditions."""
@@ -93,7 +92,7 @@ class Cases:
         Raises
         ------
         ControllerError
-            If a derivative is not finite, as that of a distance is where it is zero.
+            If a derivative is not finite, such as that of a distance at zero.
         """
         x = casadi.vertcat(self.p, self.v)
         slope = casadi.Function("slope", [x], [casadi.densify(casadi.jacobian(self.cases[0].force, x))])
@@ -111,60 +110,60 @@ class Cases:
 
 
 def cases_of(law: FunctionLaw) -> Cases:
-    """Follow a law's function on symbols along every way that its comparisons leave.
+    """Execute a law's function on symbols along every path that its comparisons allow.
 
     Raises
     ------
     ControllerError
-        If it cannot be followed, has more than `MOST_CASES` ways, or its force depends on anything but the hand's
-        position and velocity.
+        If it cannot be executed on symbols, has more than `MOST_CASES` paths, or its force depends on anything but the
+        hand's position and velocity.
     """
     sym = casadi.SX.sym
     symbols = {name: sym(name, size) for name, size in (("t", 1), ("p", 3), ("q", 4), ("v", 3), ("w", 3), ("s", 1))}
-    found, left = list[Case](), [tuple[bool, ...]()]
-    while left:
-        given = left.pop()
+    found, pending = list[Case](), [tuple[bool, ...]()]
+    while pending:
+        given = pending.pop()
         if len(found) == MOST_CASES:
             raise ControllerError(
                 f"{law.place} has more than {MOST_CASES} cases; a certificate follows the comparisons of so many"
             )
-        way = Way(given)
-        wrench = _followed(law, way, symbols)
-        taken = [condition.holds for condition in way.conditions]
-        left += [(*taken[:at], not taken[at]) for at in range(len(given), len(taken))]
-        found.append(Case(vector(wrench[:3]), vector(wrench[3:]), tuple(way.conditions)))
+        path = Way(given)
+        wrench = _wrench_on_path(law, path, symbols)
+        decisions = [condition.holds for condition in path.conditions]
+        pending += [(*decisions[:at], not decisions[at]) for at in range(len(given), len(decisions))]
+        found.append(Case(vector(wrench[:3]), vector(wrench[3:]), tuple(path.conditions)))
     _check_inputs(law, found, symbols)
-    if any(_bends(case, casadi.vertcat(*symbols.values())) for case in found):
+    if any(_is_nonsmooth(case, casadi.vertcat(*symbols.values())) for case in found):
         raise ControllerError(f"the force of {law.place} bends where nothing is compared, as √x² does; expected abs(x)")
     return Cases(law, symbols["p"], symbols["v"], tuple(found))
 
 
-def _followed(law: FunctionLaw, way: Way, symbols: dict[str, Symbol]) -> list[Symbol]:
-    """The six numbers of a law along one way; as in a run, vectors of the hand are arrays, or tuples if compiled."""
+def _wrench_on_path(law: FunctionLaw, path: Way, symbols: dict[str, Symbol]) -> list[Symbol]:
+    """Six numbers of a law along one path; as in a run, vectors of the hand are arrays, or tuples if compiled."""
 
     def given(name: str) -> Any:
-        numbers = FollowedVector.of(symbols[name], way)
+        numbers = FollowedVector.of(symbols[name], path)
         return tuple(numbers) if isinstance(law, CompiledLaw) else numbers
 
-    t, switch = (FollowedNumber(symbols[name], way) for name in ("t", "s"))
+    t, switch = (FollowedNumber(symbols[name], path) for name in ("t", "s"))
     hand = HandState(t, given("p"), given("q"), given("v"), given("w"), switch)  # pyright: ignore[reportArgumentType]
     try:
-        # An entry may be an array of no dimension, as np.where gives.
+        # An entry may be an array without dimensions, as from np.where.
         numbers = [np.asarray(item, dtype=object).item() for item in law.function(hand, **law.parameters)]  # pyright: ignore[reportGeneralTypeIssues]
         wrench = [item.symbol if isinstance(item, FollowedNumber) else casadi.SX(float(item)) for item in numbers]
     except Exception as error:  # whatever a user's function raises
-        why = way.lost or (str(error) if isinstance(error, NotFollowed) else f"{type(error).__name__}: {error}")
+        why = path.lost or (str(error) if isinstance(error, NotFollowed) else f"{type(error).__name__}: {error}")
     else:
-        why = way.lost or (None if len(wrench) in (3, 6) else f"it gives {len(wrench)} numbers; expected three or six")
+        why = path.lost or (None if len(wrench) in (3, 6) else f"it gives {len(wrench)} numbers; expected three or six")
         if why is None:
             return wrench + [casadi.SX(0.0)] * (6 - len(wrench))
     raise ControllerError(f"{law.place} cannot be followed on symbols: {why}")
 
 
-def _bends(case: Case, x: Symbol) -> bool:
-    """Whether an expression of a case bends or jumps within it, as CasADi's simplification of √x² to |x| does."""
+def _is_nonsmooth(case: Case, x: Symbol) -> bool:
+    """Whether an expression of a case has a kink or jump, such as |x|, to which CasADi simplifies √x²."""
     function = casadi.Function("case", [x], [case.force])
-    return any(function.instruction_id(i) in _BENT for i in range(function.n_instructions()))
+    return any(function.instruction_id(i) in _NONSMOOTH_OPERATIONS for i in range(function.n_instructions()))
 
 
 def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol]) -> None:
@@ -181,12 +180,12 @@ def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol
 
 
 def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Array:
-    """Six numbers of a law as a run evaluates it, at the hands about a curve, the last one first if so asked, (n, 6).
+    """Six numbers of a law as a run evaluates it, at the hands about a curve, in reverse order if `backwards`, (n, 6).
 
     Raises
     ------
     NotFollowed
-        If the function gives a symbol with which it was followed before.
+        If the function returns a symbol from an earlier symbolic execution.
     ParameterError
         If the function raises, or does not return three or six numbers.
     """
@@ -216,28 +215,28 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
     Raises
     ------
     ControllerError
-        If the law cannot be followed (`cases_of`), or it gives numbers that are not finite, others when it is asked
-        again, or others than its cases.
+        If the law cannot be executed on symbols (`cases_of`), or its numbers are not finite, change when it is
+        evaluated again, or differ from those of its cases.
     ParameterError
         As `executed`.
     """
     force = executed(law, curve)[:, :3]
-    _refuse(law, curve, np.asarray(~np.isfinite(force).all(axis=1), dtype=np.bool_), "numbers that are not finite")
-    size = _AGREES * np.linalg.norm(force, axis=1) + _NO_FORCE
+    _refuse_if(law, curve, np.asarray(~np.isfinite(force).all(axis=1), dtype=np.bool_), "numbers that are not finite")
+    size = _FORCE_TOLERANCE * np.linalg.norm(force, axis=1) + _MIN_FORCE
 
     def differs(other: Array) -> Mask:
-        apart = np.linalg.norm(other - force, axis=1)
-        return np.isnan(apart) | (apart > size)
+        difference = np.linalg.norm(other - force, axis=1)
+        return np.isnan(difference) | (difference > size)
 
-    _refuse(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when it is asked again")
+    _refuse_if(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when it is asked again")
     cases, hands = cases_of(law), hands_about(curve)
     places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
     symbolic = np.array(cases.chosen.map(len(hands))(places, velocities)[0]).T
-    _refuse(law, curve, differs(symbolic), "another force in a run than on symbols")
+    _refuse_if(law, curve, differs(symbolic), "another force in a run than on symbols")
     return cases
 
 
-def _refuse(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> None:
+def _refuse_if(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> None:
     if wrong.any():
         hand = hands_about(curve)[int(np.argmax(wrong))]
         raise ControllerError(

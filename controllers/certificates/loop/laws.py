@@ -1,4 +1,4 @@
-"""Laws of force on CasADi symbols, built from the same kernels that the servo executes."""
+"""Force laws on CasADi symbols, built from the same kernels that the servo executes."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,7 +15,7 @@ from controllers.fields.stretchy_tubes import stretch_force
 
 
 class Law(NamedTuple):
-    """A law of force on symbols.
+    """A force law on symbols.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Law(NamedTuple):
         ``force(p, v, piece, u, k_r, b_d, width)`` in H: the curve's piece as 28 coefficients, the phase u in it [s],
         and `width` = 1/ε² or 1/δ² [1/m²]. Linear in k_r and b_d.
     slides : bool
-        Whether there are neutral displacements, to which the law gives no restoring force: for a law that carries, the
+        Whether there are neutral displacements, which cause no restoring force: for a law that carries the hand, the
         displacement along the curve.
     carries : bool
         Whether the hand is driven along the curve; otherwise it comes to rest.
@@ -46,7 +46,7 @@ def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
 def _follow(
     p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol, parallel: bool = False
 ) -> Symbol:
-    """FOLLOW, attracted by the nearest point; a parallel flow within the distance at which γ is not held."""
+    """FOLLOW, attracted by the nearest point; a parallel flow within the distance at which γ is not clamped."""
     nearest, pace = nearest_phase(p, piece, u), 1.0
     p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
     if parallel:
@@ -56,20 +56,20 @@ def _follow(
 
 
 def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-    """Bunny in its point form: the attractor does not depend on the hand."""
+    """Bunny in its point form, in which the attractor does not depend on the hand."""
     p_curve, v_curve = piece_point.py_func(piece, 0, u), piece_velocity.py_func(piece, 0, u)
     pull = gaussian.py_func(casadi.sumsqr(vector(p_curve) - p), width)
     return pull * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
 
 
 def _seek(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_f: Symbol, b: Symbol, width: Symbol) -> Symbol:
-    """Stretchy tubes with the switch open: attracted by the nearest point, and slowed down."""
+    """Stretchy tubes with the switch open: attracted by the nearest point, and damped."""
     target = piece_point.py_func(piece, 0, nearest_phase(p, piece, u))
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_f, b) for i in range(3)])
 
 
 def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol, width: Symbol) -> Symbol:
-    """Stretchy tubes while held: attracted by the grasped point, independently of the curve."""
+    """Stretchy tubes with the switch closed: attracted by the grasped point, independently of the curve."""
     target = piece_point.py_func(piece, 0, u)
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
 

@@ -1,13 +1,13 @@
-r"""LEADING on CasADi symbols, built from the executed kernels: its regimes, and the walker as part of the state.
+r"""LEADING on CasADi symbols, built from the executed kernels: linear regimes, with the walker as part of the state.
 
 The force is a spring outside dead bands, so it is piecewise linear. Each regime is one linear piece, linearised at the
 edge of the dead bands, where the force is zero; a constant force of the hand would not change the derivatives.
 
 .. math:: F = -k_l\,(\alpha\,t t^T + \beta\,n (n - c\,t)^T)\,\delta p - k_z\,\delta z\,e_z - b\,v
 
-α is 1 where the stylus is farther along the path than the figure follows; β is 1 where it is farther to the side than
-the path can reach; c is κ_max times the distance beyond the path's front, with which the room to the sides grows. k_z
-is scaled with k_l.
+α is 1 where the stylus is farther along the path than the figure can follow; β is 1 where it is farther to the side
+than the path can reach; c is κ_max times the distance beyond the path's front, by which the room to the sides grows.
+k_z is scaled with k_l.
 """
 
 from typing import NamedTuple
@@ -23,8 +23,8 @@ from controllers.fields.leading import leading_force
 from controllers.state import Array
 from controllers.walking.walker import walker_acceleration
 
-_INSIDE = 1e-9  # [m] on the floor: distance from the edge to the side where the spring acts
-_WIDE = 10.0  # [m] width of a dead band for a spring that does not act
+_EDGE_OFFSET = 1e-9  # [m] on the floor: distance from the edge, on the side where the spring acts
+_INACTIVE_WIDTH = 10.0  # [m] width of a dead band for a spring that does not act
 
 
 class Regime(NamedTuple):
@@ -37,7 +37,7 @@ class Regime(NamedTuple):
     beyond : bool
         Whether the stylus is beyond the path's front; otherwise it is on the path.
     turn : float
-        c, with the sign of the side: 1 m beyond the front and κ_max = 1/m give 1.
+        c, with the sign of the side; 1 m beyond the front and κ_max = 1/m give 1.
     heading : float
         Heading of the path relative to the curve along which the loop is linearised [rad].
     """
@@ -62,12 +62,12 @@ class Regime(NamedTuple):
             here = piece_point.py_func(piece, 0, u)
             c, s = self.tangent(piece_velocity.py_func(piece, 0, u))
             advance = scale * (c * (p[0] - here[0]) + s * (p[1] - here[1]))
-            # On the path the nearest point moves along with the stylus, and there is no room to the sides.
-            gone = 0.0 if self.beyond else advance
-            room = self.turn * advance - _INSIDE if self.aside else _WIDE
+            # On the path, the nearest point moves along with the stylus, and there is no room to the sides.
+            along = 0.0 if self.beyond else advance
+            room = self.turn * advance - _EDGE_OFFSET if self.aside else _INACTIVE_WIDTH
             pull = leading_force.py_func(
-                p[0], p[1], v[0], v[1], scale * here[0] + c * gone, scale * here[1] + s * gone, c, s, gone, _WIDE,
-                -_INSIDE if self.ahead else _WIDE, room, scale, k_l, b,
+                p[0], p[1], v[0], v[1], scale * here[0] + c * along, scale * here[1] + s * along, c, s, along,
+                _INACTIVE_WIDTH, -_EDGE_OFFSET if self.ahead else _INACTIVE_WIDTH, room, scale, k_l, b,
             )  # fmt: skip
             return vector([*pull, -upright * k_l * p[2] - b * v[2]])
 
@@ -93,25 +93,25 @@ def walking(loop: SampledLoop, regime: Regime, scale: float, rate: float, k_l: f
     """
     linear, period, size = loop.linear, loop.sampling.period, loop.size
     n = len(linear.phases)
-    way = np.zeros((n, 3))
-    way[:, 0], way[:, 1] = regime.tangent(linear.velocity.T)
-    goal = scale * np.einsum("ni,nij->nj", way, linear.jacobian)
+    direction = np.zeros((n, 3))
+    direction[:, 0], direction[:, 1] = regime.tangent(linear.velocity.T)
+    goal = scale * np.einsum("ni,nij->nj", direction, linear.jacobian)
     walker: Symbol = casadi.SX.sym("walker", 2)
     slope = casadi.jacobian(walker_acceleration.py_func(walker[0], walker[1], rate), walker)
     by_lag, by_speed = (float(value) for value in np.ravel(casadi.evalf(slope)))
-    faster = np.array([-period * by_lag, 1.0 + period * by_speed])
+    next_speed = np.array([-period * by_lag, 1.0 + period * by_speed])
     steps = np.zeros((n, 2, size + 2))
     steps[:, :, :3] = np.array([[period * period], [period]]) * by_lag * goal[:, None]
-    steps[:, :, size:] = np.array([1.0, 0.0]) + period * faster, faster
-    pull = loop.fresh @ (k_l / scale * np.einsum("nij,ni->nj", linear.jacobian, way))[:, :, None]
+    steps[:, :, size:] = np.array([1.0, 0.0]) + period * next_speed, next_speed
+    pull_response = loop.fresh @ (k_l / scale * np.einsum("nij,ni->nj", linear.jacobian, direction))[:, :, None]
     maps = np.zeros((n, size + 2, size + 2))
     maps[:, :size, :size] = loop.matrices(k_l, b)
-    maps[:, :size] += pull @ steps[:, :1]
+    maps[:, :size] += pull_response @ steps[:, :1]
     maps[:, size:] = steps
     if linear.held:
         return maps
     shift = np.zeros((n, size + 2, linear.shift.shape[2] + 1))
-    joints = np.linalg.solve(linear.jacobian, way[:, :, None])
+    joints = np.linalg.solve(linear.jacobian, direction[:, :, None])
     weight = np.tile(linear.weight_theta @ joints, (1, (size - KEPT) // 3, 1))
     shift[:, :size, :-1] = loop.shifts
     shift[:, 0:3, -1:], shift[:, 6:9, -1:], shift[:, KEPT:size, -1:] = joints, joints, weight

@@ -17,7 +17,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.state import Array
 
-_NOTHING = 1e-6  # share of a law's largest stiffness below which a stiffness counts as zero
+_STIFFNESS_TOLERANCE = 1e-6  # fraction of a law's largest stiffness below which a stiffness counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +86,12 @@ class LinearLoop:
 def linearise(
     device: Device, law: Law, curve: Trajectory, phases: Array, hand: HandImpedance, width: float = np.inf
 ) -> LinearLoop:
-    """Linearise the loop at phases of a curve, moving along it at its own pace.
+    """Linearise the loop at phases of a curve, about motion along it at its own speed.
 
     Parameters
     ----------
     device, law, curve, hand
-        The parts.
+        Parts of the loop.
     phases : Array, shape (n,)
         Phases [s]; they must lie inside an open curve, since t* is clamped at its ends.
     width : float
@@ -108,14 +108,14 @@ def linearise(
     points, velocity, acceleration = curve.point(phases), curve.velocity(phases), curve.acceleration(phases)
     theta = np.array([device.angles(point) for point in points])
     kinematics = kinematics_function(device).map(len(phases))
-    jacobian = _blocks(kinematics(theta.T, 0.0)[0])
+    jacobian = _stack_blocks(kinematics(theta.T, 0.0)[0])
     rate = joint_motion(jacobian, velocity)
-    bend = np.array(kinematics(theta.T, rate.T)[1]).T
-    turn = joint_motion(jacobian, acceleration - bend)
+    bias_acceleration = np.array(kinematics(theta.T, rate.T)[1]).T
+    joint_acceleration = joint_motion(jacobian, acceleration - bias_acceleration)
     mass, by_theta, by_rate, weight = (
-        _blocks(block)
+        _stack_blocks(block)
         for block in plant_function(device).map(len(phases))(
-            theta.T, rate.T, turn.T, points.T, velocity.T, np.tile(hand.numbers(), (len(phases), 1)).T
+            theta.T, rate.T, joint_acceleration.T, points.T, velocity.T, np.tile(hand.numbers(), (len(phases), 1)).T
         )
     )
     breaks = np.asarray(curve.times, dtype=np.float64)
@@ -123,16 +123,16 @@ def linearise(
     pieces, within = curve.coefficients[piece].reshape(len(phases), -1), phases - breaks[piece]
     torques = torque_function(device, law).map(len(phases))
     # τ is affine in the gains: derivatives for unit gains minus those for zero gains.
-    none, *units = (
-        [_blocks(block) for block in torques(theta.T, rate.T, pieces.T, within[None], k_r, b_d, width**-2)[1:]]
+    without_gains, *units = (
+        [_stack_blocks(block) for block in torques(theta.T, rate.T, pieces.T, within[None], k_r, b_d, width**-2)[1:]]
         for k_r, b_d in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
-    unit_theta = np.array([unit[0] - none[0] for unit in units])
+    unit_theta = np.array([unit[0] - without_gains[0] for unit in units])
     held = hand.stiffness > 0.0
     neutral = np.zeros((len(phases), 3, 0))
     if law.slides and not held:
-        neutral = velocity[:, :, None] if law.carries else _unanswered(jacobian, unit_theta[0])
-    turns = turn[:, :, None] if law.carries and neutral.shape[2] else 0.0 * neutral
+        neutral = velocity[:, :, None] if law.carries else _neutral_displacements(jacobian, unit_theta[0])
+    turns = joint_acceleration[:, :, None] if law.carries and neutral.shape[2] else 0.0 * neutral
     joints = np.linalg.solve(jacobian, neutral)
     shift = np.asarray(np.concatenate([joints, turns, joints, turns], axis=1), dtype=np.float64)
     return LinearLoop(
@@ -142,12 +142,12 @@ def linearise(
     )  # fmt: skip
 
 
-def _unanswered(jacobian: Array, by_theta: Array) -> Array:
+def _neutral_displacements(jacobian: Array, by_theta: Array) -> Array:
     """Orthonormal tip displacements without restoring force of a law at rest, (n, 3, m); m is equal at all phases."""
     stiffness = np.linalg.solve(jacobian.transpose(0, 2, 1), by_theta) @ np.linalg.inv(jacobian)
     _, sizes, rows = np.linalg.svd(stiffness)
-    answered = int(np.sum(sizes[0] > _NOTHING * sizes[0, 0]))
-    return rows[:, answered:].transpose(0, 2, 1)
+    rank = int(np.sum(sizes[0] > _STIFFNESS_TOLERANCE * sizes[0, 0]))
+    return rows[:, rank:].transpose(0, 2, 1)
 
 
 def joint_motion(jacobian: Array, tip: Array) -> Array:
@@ -155,6 +155,6 @@ def joint_motion(jacobian: Array, tip: Array) -> Array:
     return np.asarray(np.linalg.solve(jacobian, tip[..., None])[..., 0], dtype=np.float64)
 
 
-def _blocks(blocks: Any) -> Array:
-    """CasADi's matrices side by side, 3 × 3 n, as an array (n, 3, 3)."""
+def _stack_blocks(blocks: Any) -> Array:
+    """A CasADi matrix of n blocks side by side, 3 × 3 n, as an array (n, 3, 3)."""
     return np.ascontiguousarray(np.array(blocks).reshape(3, -1, 3).transpose(1, 0, 2))

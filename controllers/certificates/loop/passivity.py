@@ -21,8 +21,8 @@ from controllers.certificates.loop.stability import River, unstable_start
 from controllers.certificates.report import Verdict
 from controllers.state import Array
 
-DIRECTIONS = 24  # directions across the curve, over half a turn: half or four times as many need the same damping
-# Number of frequencies up to the Nyquist frequency, where most damping is needed; a quarter of them gives the same.
+DIRECTIONS = 24  # directions across the curve, over half a turn; half or four times as many need the same damping
+# Number of frequencies up to the Nyquist frequency, where most damping is needed; a quarter as many give the same.
 FREQUENCIES = 4000
 
 
@@ -30,7 +30,7 @@ def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]
     """The device's b [N s/m], f_c [N] and Δ [m] at the tip, in directions across the curve, each (n, DIRECTIONS).
 
     For a motion n of the tip the joints move by J⁻¹ n: b(n) = Σ D_i (J⁻¹n)_i², f_c(n) = Σ f_i |(J⁻¹n)_i|. A count
-    of encoder i moves the reading by nᵀJ_i Δ_i: Δ(n) is the largest.
+    of encoder i changes the measured position by nᵀJ_i Δ_i; Δ(n) is the largest of these.
     """
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
@@ -49,27 +49,27 @@ def damping_needed(k: float, b: float, sampling: Sampling) -> tuple[float, float
     The impedance is the servo's: backward difference, first-order low-pass, delay rounded up to whole periods.
     """
     period, keep = sampling.period, sampling.keep
-    turn = np.pi * (np.arange(FREQUENCIES) + 1.0) / FREQUENCIES
-    late = np.exp(-1j * turn)
-    delay = late ** (sampling.whole_delay + (sampling.rest_delay > 0.0))
-    impedance = delay * (k + b * (1.0 - keep) / (1.0 - keep * late) * (1.0 - late) / period)
-    needed = 0.5 * period * ((1.0 - late) * impedance).real / (1.0 - np.cos(turn))
+    angle = np.pi * (np.arange(FREQUENCIES) + 1.0) / FREQUENCIES
+    unit_delay = np.exp(-1j * angle)
+    delay = unit_delay ** (sampling.whole_delay + (sampling.rest_delay > 0.0))
+    impedance = delay * (k + b * (1.0 - keep) / (1.0 - keep * unit_delay) * (1.0 - unit_delay) / period)
+    needed = 0.5 * period * ((1.0 - unit_delay) * impedance).real / (1.0 - np.cos(angle))
     worst = int(np.argmax(needed))
-    return float(needed[worst]), float(turn[worst] / period)
+    return float(needed[worst]), float(angle[worst] / period)
 
 
 def passivity(river: River) -> Verdict:
     """Verdict on passivity across the curve, for any passive hand.
 
-    Certified by Colgate & Schenkel's general condition at every phase, in the worst direction; refuted by a spring on
-    the stylus, a passive hand, that makes the loop unstable; unknown otherwise. The margin is the least damping of the
-    device minus the needed one [N s/m].
+    Certified by Colgate & Schenkel's general condition at every phase, in the worst direction; refuted by a passive
+    hand, a spring on the stylus, that makes the loop unstable; unknown otherwise. The margin is the smallest damping of
+    the device minus the needed one [N s/m].
     """
     linear = river.still()
     damping, coulomb, resolution = tip_friction(river, linear)
     needed, frequency = damping_needed(river.k_r, river.b_d, river.sampling)
     period = river.sampling.period
-    walls = np.minimum(2.0 * damping / period, 2.0 * coulomb / resolution).min(axis=1)
+    wall_stiffness = np.minimum(2.0 * damping / period, 2.0 * coulomb / resolution).min(axis=1)
     margin = float(damping.min()) - needed
     figures: dict[str, object] = {
         "phases": river.phases(),
@@ -78,13 +78,13 @@ def passivity(river: River) -> Verdict:
         "damping_needed_unfiltered": 0.5 * river.k_r * period + river.b_d,
         "stiffness_colgate": 2.0 * damping.min(axis=1) / period,
         "stiffness_quantised": 2.0 * (coulomb / resolution).min(axis=1),
-        "stiffness_abbott_okamura": walls,
+        "stiffness_abbott_okamura": wall_stiffness,
         "frequency": frequency,
     }
     assumptions = ("one axis at a time, the worst direction across the curve", "viscous friction of the device alone")
     reason = (
         f"the device's damping is {damping.min():.3g} N s/m, {needed:.3g} N s/m are needed at {frequency:.0f} rad/s; "
-        f"springs alone are passive up to {walls.min():.3g} N/m (Abbott & Okamura)"
+        f"springs alone are passive up to {wall_stiffness.min():.3g} N/m (Abbott & Okamura)"
     )
     if margin > 0.0:
         return Verdict("certified", reason, margin, assumptions, {}, figures)

@@ -16,28 +16,28 @@ from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.state import Array
 
-_ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
+_PADE_ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
 PLANT, KEPT = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques
 
 
 def exponentials(matrices: Array) -> Array:
     """Exponentials of a stack of matrices (n, m, m), all at once: Padé's approximant, scaled and squared.
 
-    G. H. Golub and C. F. Van Loan, *Matrix Computations*, 4th ed. 2013, algorithm 9.3.1; `scipy.linalg.expm` takes one
-    matrix after the other, and is what it is tested against.
+    G. H. Golub and C. F. Van Loan, *Matrix Computations*, 4th ed. 2013, algorithm 9.3.1. `scipy.linalg.expm`, which the
+    tests compare it with, treats one matrix after the other.
     """
     squarings = max(0, 1 + int(np.ceil(np.log2(max(float(np.abs(matrices).sum(axis=2).max()), 1e-12)))))
     scaled = matrices / 2.0**squarings
-    power = above = below = np.broadcast_to(np.eye(matrices.shape[1], dtype=np.float64), matrices.shape)
-    share = 1.0
-    for k in range(1, _ORDER + 1):
-        share *= (_ORDER - k + 1) / (k * (2 * _ORDER - k + 1))
+    power = numerator = denominator = np.broadcast_to(np.eye(matrices.shape[1], dtype=np.float64), matrices.shape)
+    coefficient = 1.0
+    for k in range(1, _PADE_ORDER + 1):
+        coefficient *= (_PADE_ORDER - k + 1) / (k * (2 * _PADE_ORDER - k + 1))
         power = scaled @ power
-        above, below = above + share * power, below + (-1) ** k * share * power
-    found = np.asarray(np.linalg.solve(below, above), dtype=np.float64)
+        numerator, denominator = numerator + coefficient * power, denominator + (-1) ** k * coefficient * power
+    result = np.asarray(np.linalg.solve(denominator, numerator), dtype=np.float64)
     for _ in range(squarings):
-        found = found @ found
-    return found
+        result = result @ result
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +61,14 @@ class SampledLoop:
         return KEPT + 3 * (self.sampling.whole_delay + (self.sampling.rest_delay > 0.0))
 
     @cached_property
-    def _responses(self) -> dict[float, tuple[Array, Array]]:
+    def _response_cache(self) -> dict[float, tuple[Array, Array]]:
         return {}
 
     def plant(self, duration: float) -> tuple[Array, Array]:
         """Exact response over a duration [s]: Φ (n, 6, 6) to (δθ, δθ̇), Γ (n, 6, 3) to constant joint torques."""
-        if duration not in self._responses:
-            self._responses[duration] = self._response(duration)
-        return self._responses[duration]
+        if duration not in self._response_cache:
+            self._response_cache[duration] = self._response(duration)
+        return self._response_cache[duration]
 
     def _response(self, duration: float) -> tuple[Array, Array]:
         linear = self.linear
@@ -108,38 +108,38 @@ class SampledLoop:
         return np.linalg.solve(linear.jacobian.transpose(0, 2, 1), torque)
 
     @cached_property
-    def _affine(self) -> tuple[Array, Array, Array]:
+    def _gain_parts(self) -> tuple[Array, Array, Array]:
         """State matrices at zero gains, and their derivatives by k_r and by b_d."""
         linear = self.linear
-        none = np.zeros_like(linear.weight_theta)
+        zero = np.zeros_like(linear.weight_theta)
         return (
-            self._closed(linear.weight_theta, none, True),
-            self._closed(linear.unit_theta[0], linear.unit_omega[0], False),
-            self._closed(linear.unit_theta[1], linear.unit_omega[1], False),
+            self._state_matrices(linear.weight_theta, zero, True),
+            self._state_matrices(linear.unit_theta[0], linear.unit_omega[0], False),
+            self._state_matrices(linear.unit_theta[1], linear.unit_omega[1], False),
         )
 
-    def _closed(self, by_theta: Array, by_omega: Array, own: bool) -> Array:
-        """State matrices for torques with the derivatives `by_theta` and `by_omega`; with `own`, plus the open loop."""
+    def _state_matrices(self, by_theta: Array, by_omega: Array, open_loop: bool) -> Array:
+        """State matrices for torques with derivatives `by_theta`, `by_omega`; with `open_loop`, plus the open loop."""
         period, size = self.sampling.period, self.size
         whole, rest = self.sampling.whole_delay, self.sampling.rest_delay
         torque = by_omega @ self._omega
         torque[:, :, 0:3] += by_theta
-        late = np.eye(size)[KEPT:] if own else np.zeros((size - KEPT, size))
+        delayed_rows = np.eye(size)[KEPT:] if open_loop else np.zeros((size - KEPT, size))
 
-        def aged(age: int) -> Array:
-            """Torque of `age` ticks ago as a linear function of the state."""
-            return torque if age == 0 else np.broadcast_to(late[3 * age - 3 : 3 * age], torque.shape)
+        def delayed_torque(age: int) -> Array:
+            """Torque `age` ticks ago as a linear function of the state."""
+            return torque if age == 0 else np.broadcast_to(delayed_rows[3 * age - 3 : 3 * age], torque.shape)
 
         free, driven = self.plant(period - rest)
         matrices = np.zeros((len(self.linear.phases), size, size))
-        matrices[:, :PLANT] = driven @ aged(whole)
+        matrices[:, :PLANT] = driven @ delayed_torque(whole)
         if rest > 0.0:
             early_free, early_driven = self.plant(rest)
-            matrices[:, :PLANT] += free @ early_driven @ aged(whole + 1)
+            matrices[:, :PLANT] += free @ early_driven @ delayed_torque(whole + 1)
             free = free @ early_free
         for age in range(1, (size - KEPT) // 3 + 1):
-            matrices[:, KEPT + 3 * age - 3 : KEPT + 3 * age] = aged(age - 1)
-        if own:
+            matrices[:, KEPT + 3 * age - 3 : KEPT + 3 * age] = delayed_torque(age - 1)
+        if open_loop:
             matrices[:, :PLANT, :PLANT] += free
             matrices[:, 6:9, 0:3] = np.eye(3)
             matrices[:, 9:12] = self._omega
@@ -149,13 +149,13 @@ class SampledLoop:
     def fresh(self) -> Array:
         """Response of the state to the torques [N m] computed at a tick, shape (n, size, 3)."""
         unit = np.broadcast_to(np.eye(3), self.linear.weight_theta.shape)
-        return self._closed(unit, np.zeros(unit.shape), False)[:, :, :3]
+        return self._state_matrices(unit, np.zeros(unit.shape), False)[:, :, :3]
 
     @cached_property
     def shifts(self) -> Array:
         """Derivatives of the whole state by the neutral displacements, shape (n, size, m)."""
         linear = self.linear
-        # The delayed torques change by those of gravity compensation, neglecting the inertia of the lap.
+        # The delayed torques change by those of gravity compensation; the inertia along the lap is neglected.
         weight = linear.weight_theta @ linear.shift[:, :3]
         return np.concatenate([linear.shift, np.tile(weight, (1, (self.size - KEPT) // 3, 1))], axis=1)
 
@@ -179,18 +179,18 @@ class SampledLoop:
 
     def matrices(self, k_r: float, b_d: float) -> Array:
         """State matrices of one period, shape (n, size, size)."""
-        own, stiffness, damping = self._affine
+        own, stiffness, damping = self._gain_parts
         return own + k_r * stiffness + b_d * damping
 
     @cached_property
-    def _frozen(self) -> tuple[Array, Array, Array]:
+    def _frozen_parts(self) -> tuple[Array, Array, Array]:
         basis, projection = self.across
-        own, stiffness, damping = (projection @ part @ basis for part in self._affine)
+        own, stiffness, damping = (projection @ part @ basis for part in self._gain_parts)
         return own, stiffness, damping
 
     def frozen(self, k_r: float | Array, b_d: float | Array) -> Array:
         """Transverse state matrices with the phase frozen, shape (n, r, r); gains may be given per phase, (n,)."""
-        own, stiffness, damping = self._frozen
+        own, stiffness, damping = self._frozen_parts
         return own + np.reshape(k_r, (-1, 1, 1)) * stiffness + np.reshape(b_d, (-1, 1, 1)) * damping
 
     def radius(self, k_r: float | Array, b_d: float | Array) -> Array:
@@ -201,8 +201,8 @@ class SampledLoop:
         """Floquet multipliers of a lap transverse to the curve, complex, shape (r,), the largest first.
 
         For a closed curve with phases `periods` periods apart; between them the maps are those of the earlier phase.
-        Products of a thousand maps underflow, so they are rescaled on the way; multipliers below 1e-14 of the largest
-        are noise.
+        Products of a thousand maps would underflow, so they are rescaled; multipliers below 1e-14 of the largest are
+        noise.
         """
         basis, projection = self.across
         steps = np.roll(projection, -1, axis=0) @ np.linalg.matrix_power(self.matrices(k_r, b_d), periods) @ basis

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from controllers.errors import ParameterError
 
-MOST_PERIODS = 128  # of a delay: the loop has three states for each, and the time for its eigenvalues grows cubically
+MOST_PERIODS = 128  # of a delay: each adds three states to the loop, and the time for its eigenvalues grows cubically
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class Sampling:
     Raises
     ------
     ParameterError
-        If the period or the cutoff is not positive, the delay negative or longer than 128 periods, or one of them not
-        finite.
+        If the period or the cutoff is not positive, if the delay is negative or longer than 128 periods, or if one of
+        them is not finite.
     """
 
     period: float
@@ -39,12 +39,12 @@ class Sampling:
         if self.delay < 0.0:
             raise ParameterError(f"the delay of a loop must be at least 0 s, got {self.delay}")
         if self.delay > MOST_PERIODS * self.period:
-            most = f"{MOST_PERIODS} periods of {self.period:g} s"
-            raise ParameterError(f"the delay of a loop must be at most {most}, got {self.delay} s")
+            limit = f"{MOST_PERIODS} periods of {self.period:g} s"
+            raise ParameterError(f"the delay of a loop must be at most {limit}, got {self.delay} s")
 
     @property
     def keep(self) -> float:
-        """Share s of the old rate that the velocity filter keeps: e^{−2π f T}."""
+        """Fraction s of the previous rate that the velocity filter keeps: e^{−2π f T}."""
         return math.exp(-2.0 * math.pi * self.cutoff * self.period)
 
     @property

@@ -18,12 +18,12 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, Mask
 
-_LEAST_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
-GRID = 40  # gains on the grid before bisection: half or twice as many find the same critical gains along a bent curve
-# Phases of the curve at which the loop is examined: with eight times as many critical gains are 0.1 % lower.
+_MIN_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
+GRID = 40  # gains of the grid before bisection; half or twice as many find the same critical gains along a curved path
+# Phases of the curve at which the loop is examined; with eight times as many, critical gains are 0.1 % lower.
 PHASES = 48
-_FINE = 4000  # phases at which a curve's own figures are taken, as in `region.remainder`
-LAP_PHASES = 400  # phases for the Floquet multipliers of a lap: four times as many change their logarithm by 0.01 %
+_FINE_PHASE_COUNT = 4000  # phases at which properties of the curve alone are evaluated, as in `region.remainder`
+LAP_PHASES = 400  # phases for the Floquet multipliers of a lap; four times as many change their logarithm by 0.01 %
 CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may reduce a force
 LATEST = 16  # periods of delay at which the search for the delay margin ends
 
@@ -41,21 +41,21 @@ class River(NamedTuple):
 
     @property
     def shear(self) -> float:
-        """Largest change of the flow's speed across the curve [1/s]: |φ̇|κ of a parallel flow, 0 of any other."""
+        """Largest change of the flow's speed across the curve [1/s]: |φ̇|κ for a parallel flow, 0 for any other."""
         if not self.law.parallel:
             return 0.0
-        phases = self.phases(_FINE)
+        phases = self.phases(_FINE_PHASE_COUNT)
         speed = np.linalg.norm(self.curve.velocity(phases), axis=1)
         return float((speed * np.where(speed > 0.0, self.curve.curvature(phases), 0.0)).max())
 
     def phases(self, n: int = PHASES) -> Array:
-        """Equal phases of the curve [s]: all round if it is closed, else within its ends."""
+        """Equally spaced phases of the curve [s]: all around a closed curve, or inside the ends of an open one."""
         if self.curve.periodic:
             return self.curve.start + self.curve.duration * np.arange(n) / n
         return self.curve.start + self.curve.duration * (np.arange(n) + 0.5) / n
 
     def moving(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
-        """The loop linearised at `phases`, about motion along the curve at its own pace."""
+        """The loop linearised at `phases`, about motion along the curve at its own speed."""
         return linearise(self.device, self.law, self.curve, self.phases(), hand, self.width)
 
     def still(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
@@ -65,13 +65,13 @@ class River(NamedTuple):
     def still_at(self, phases: Array, hand: HandImpedance = NO_HAND) -> LinearLoop:
         """As `still`, at other phases [s]."""
         slow, curve = 1e6, self.curve
-        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * phases
-        standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
-        return linearise(self.device, self.law, standing, places, hand, self.width)
+        times, slow_phases = slow * np.asarray(curve.times, dtype=np.float64), slow * phases
+        slow_curve = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
+        return linearise(self.device, self.law, slow_curve, slow_phases, hand, self.width)
 
 
-def _onset(stable: Mask, grid: Array) -> tuple[Array, Array]:
-    """Neighbours of the grid between which each column of `stable`, (grid, n), first becomes false; inf if never."""
+def _bracket_onset(stable: Mask, grid: Array) -> tuple[Array, Array]:
+    """Grid neighbours between which each column of `stable`, (grid, n), first becomes false; inf if never."""
     first = np.where(np.all(stable, axis=0), len(grid), np.argmin(stable, axis=0))
     ends = np.append(grid, np.inf)
     return ends[np.maximum(first - 1, 0)], ends[first]
@@ -86,7 +86,7 @@ def neighbours(values: Array, periodic: bool) -> tuple[Array, Array]:
 def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
     """Smallest unstable k_r ≥ `least` [N/m] at every phase, with the phase frozen, shape (n,).
 
-    Infinite where the loop is stable up to `MOST_STIFFNESS`; `least` where it is unstable there already.
+    Infinite where the loop is stable up to `MOST_STIFFNESS`; `least` where it is unstable at `least` already.
     """
     return _smallest_unstable(lambda k_r: loop.radius(k_r, b_d), least, MOST_STIFFNESS)
 
@@ -99,7 +99,7 @@ def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
 def _smallest_unstable(radius: Callable[[float | Array], Array], least: float, most: float) -> Array:
     """First gain between `least` and `most` with a spectral radius of 1 at each phase: a grid, then 24 bisections."""
     grid = np.geomspace(least, most, GRID)
-    low, high = _onset(np.array([radius(gain) < 1.0 for gain in grid]), grid)
+    low, high = _bracket_onset(np.array([radius(gain) < 1.0 for gain in grid]), grid)
     for _ in range(24):
         middle = np.sqrt(low * np.minimum(high, most))
         stable = radius(middle) < 1.0
@@ -133,7 +133,7 @@ def lap_multipliers(river: River, linear: LinearLoop) -> Array:
     return SampledLoop(linear.lap(river.curve, n), river.sampling).multipliers(river.k_r, river.b_d, periods)
 
 
-class _WithHands(NamedTuple):
+class _HandResults(NamedTuple):
     """Results for the loop with each of several hands.
 
     Attributes
@@ -145,7 +145,7 @@ class _WithHands(NamedTuple):
     cut : float
         Largest spectral radius with the gains reduced to one of `CUTS`.
     multiplier : float or None
-        Largest modulus of a Floquet multiplier of a lap; None where the hand is not carried round a closed curve.
+        Largest modulus of a Floquet multiplier of a lap; None if the hand is not carried round a closed curve.
     """
 
     critical: Array
@@ -154,7 +154,7 @@ class _WithHands(NamedTuple):
     multiplier: float | None
 
     def worst(self, hands: Sequence[HandImpedance]) -> tuple[float, HandImpedance, int]:
-        """Least critical k_r [N/m], its hand, and the index of its phase."""
+        """Smallest critical k_r [N/m], its hand, and the index of its phase."""
         hand, at = divmod(int(self.critical.argmin()), self.critical.shape[1])
         least = float(self.critical[hand, at])
         return least, hands[hand] if np.isfinite(least) else NO_HAND, at
@@ -165,30 +165,30 @@ class _WithHands(NamedTuple):
         return float(np.abs(following - here).max())
 
 
-def _with_hands(river: River, hands: Sequence[HandImpedance]) -> _WithHands:
+def _evaluate_hands(river: River, hands: Sequence[HandImpedance]) -> _HandResults:
     """Evaluate the loop with every hand."""
     critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
-        critical.append(_critical_about(loop, river))
+        critical.append(_critical_stiffness_near(loop, river))
         cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
         here, following = neighbours(loop.radius(river.k_r, river.b_d), river.curve.periodic)
         bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
         if river.curve.periodic and river.law.carries:
             multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
-    return _WithHands(np.array(critical), max(bounds), cut, max(multipliers, default=None))
+    return _HandResults(np.array(critical), max(bounds), cut, max(multipliers, default=None))
 
 
-def _critical_about(loop: SampledLoop, river: River) -> Array:
-    """Critical k_r [N/m] at every phase: the next one above the river's own; where that is unstable, the first below.
+def _critical_stiffness_near(loop: SampledLoop, river: River) -> Array:
+    """Critical k_r [N/m] at every phase: the next above the river's own; where that is unstable, the smallest.
 
     Infinite where there is none.
     """
-    own = max(river.k_r, _LEAST_STIFFNESS)
+    own = max(river.k_r, _MIN_STIFFNESS)
     above = critical_stiffness(loop, river.b_d, own)
     if (above > own).all():
         return above
-    below = _smallest_unstable(lambda k_r: loop.radius(k_r, river.b_d), _LEAST_STIFFNESS, own)
+    below = _smallest_unstable(lambda k_r: loop.radius(k_r, river.b_d), _MIN_STIFFNESS, own)
     return np.where(above > own, above, np.minimum(below, own))
 
 
@@ -198,12 +198,12 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     Certified if, with every hand, three conditions hold. At every phase of a grid, k_r is below the critical value by
     more than the change of that value to the neighbouring phase; or, where the critical value jumps, the spectral
     radius is below 1 by more than its own change. Where the hand is carried round a closed curve, the Floquet
-    multipliers of the lap lie inside the unit circle. With all gains reduced alike, as by the limiter, the loop is
-    stable too. The margin is (critical k_r)/k_r − 1.
+    multipliers of the lap lie inside the unit circle. The loop is also stable with all gains reduced by the same
+    factor, as by the limiter. The margin is (critical k_r)/k_r − 1.
     """
-    found = _with_hands(river, hands)
+    found = _evaluate_hands(river, hands)
     least, hand, at = found.worst(hands)
-    own = max(river.k_r, _LEAST_STIFFNESS)
+    own = max(river.k_r, _MIN_STIFFNESS)
     margin = min(least, MOST_STIFFNESS) / own - 1.0
     figures = _figures(river, found)
     assumptions = (
@@ -212,17 +212,17 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
-    critical = f"critical k_r = {least:.4g} N/m" if least > _LEAST_STIFFNESS else "no k_r is low enough"
-    said = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; {critical} with {hand}"
+    critical = f"critical k_r = {least:.4g} N/m" if least > _MIN_STIFFNESS else "no k_r is low enough"
+    summary = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; {critical} with {hand}"
     if least <= own:
-        return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
+        return Verdict("refuted", f"unstable: {summary}", margin, assumptions, unstable_start(river, hand, at), figures)
     doubt = _doubt(river, found, least)
     if doubt is not None:
-        return Verdict("unknown", f"{doubt}; {said}", margin, assumptions, {}, figures)
-    return Verdict("certified", f"stable: {said}", margin, assumptions, {}, figures)
+        return Verdict("unknown", f"{doubt}; {summary}", margin, assumptions, {}, figures)
+    return Verdict("certified", f"stable: {summary}", margin, assumptions, {}, figures)
 
 
-def _doubt(river: River, found: _WithHands, least: float) -> str | None:
+def _doubt(river: River, found: _HandResults, least: float) -> str | None:
     """Reason why a river with k_r below the least critical value is not certified; None if it is."""
     if found.multiplier is not None and found.multiplier >= 1.0:
         return f"stable with the phase held, but a multiplier of the lap is {found.multiplier:.4g}"
@@ -234,18 +234,18 @@ def _doubt(river: River, found: _WithHands, least: float) -> str | None:
     return None
 
 
-def _figures(river: River, found: _WithHands) -> dict[str, object]:
+def _figures(river: River, found: _HandResults) -> dict[str, object]:
     """Figures of the verdict; radius, decay rate, critical damping and delay margin are for a stylus without a hand."""
-    bare = SampledLoop(river.still(), river.sampling)
-    radius = bare.radius(river.k_r, river.b_d)
+    unloaded = SampledLoop(river.still(), river.sampling)
+    radius = unloaded.radius(river.k_r, river.b_d)
     return {
         "phases": river.phases(),
         "radius": radius,
         "radius_bound": found.bound,
         "decay_rate": -np.log(np.maximum(radius, 1e-12)) / river.sampling.period,
         "critical_stiffness": found.critical.min(axis=0),
-        "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
-        "delay_margin": delay_margin(bare, river.k_r, river.b_d),
+        "critical_damping": float(critical_damping(unloaded, river.k_r, max(river.b_d, 1e-3)).min()),
+        "delay_margin": delay_margin(unloaded, river.k_r, river.b_d),
         "multiplier": found.multiplier,
         "radius_cut": found.cut,
     }
@@ -277,12 +277,12 @@ def slowest_mode(
     values, vectors = np.linalg.eig(loop.frozen(k_r, b_d)[at])
     largest = int(np.argmax(np.where(swings & (np.abs(np.angle(values)) < 1e-3), 0.0, np.abs(values))))
     mode = loop.across[0][at] @ vectors[:, largest]
-    # Its complex phase is chosen such that the real part is the moment of the largest displacement of the tip.
-    away = loop.linear.jacobian[at] @ mode[:3]
-    turns = np.exp(1j * np.linspace(0.0, np.pi, 64, endpoint=False))
-    reaches = np.linalg.norm((away * turns[:, None]).real, axis=1)
-    best = int(np.argmax(reaches))
-    return complex(values[largest]), mode * turns[best] / reaches[best]
+    # The complex phase is chosen so that the real part shows the tip at its largest displacement.
+    displacement = loop.linear.jacobian[at] @ mode[:3]
+    rotations = np.exp(1j * np.linspace(0.0, np.pi, 64, endpoint=False))
+    amplitudes = np.linalg.norm((displacement * rotations[:, None]).real, axis=1)
+    best = int(np.argmax(amplitudes))
+    return complex(values[largest]), mode * rotations[best] / amplitudes[best]
 
 
 def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Array, float]:
@@ -292,6 +292,6 @@ def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Ar
 
 
 def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
-    """Stability boundary: critical k_r [N/m], the least over the phases, for each b_d in `damping` [N s/m]."""
+    """Stability boundary: critical k_r [N/m], the smallest over the phases, for each b_d in `damping` [N s/m]."""
     loop = SampledLoop(river.still(hand), river.sampling)
     return np.array([critical_stiffness(loop, float(b_d)).min() for b_d in damping])

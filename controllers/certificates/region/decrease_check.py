@@ -17,11 +17,11 @@ class Checked(NamedTuple):
     Attributes
     ----------
     cells : int
-        Number of parts that the cell was divided into.
+        Number of parts into which the cell was divided.
     slack : float
-        Largest bound of the interpolation error of a matrix within a part [1/s].
+        Largest bound on the interpolation error of the matrix within a part [1/s].
     least : float
-        Least eigenvalue at corners minus slack [1/s]; the decrease is proved if it is positive.
+        Smallest eigenvalue at the corners, minus slack [1/s]; the decrease is proved if this is positive.
     """
 
     cells: int
@@ -39,7 +39,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
     """
     z = ca.SX.sym("z", PARAMETERS + 1)
     a, p = axis.matrix(z), form.matrix(z)
-    # The mass μ, which comes first, is divided in equal ratios.
+    # The mass μ, the first parameter, is divided geometrically.
     edges = [
         (np.geomspace if i == 0 else np.linspace)(cell.low[i], cell.high[i], counts[i] + 1)
         if cell.high[i] > cell.low[i] else np.array([cell.low[i]] * 2)
@@ -48,7 +48,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
     parts = np.stack(np.meshgrid(*(np.arange(len(edge) - 1) for edge in edges), indexing="ij"), axis=-1)
     parts = parts.reshape(-1, PARAMETERS)
     low, high = (np.stack([edges[i][parts[:, i] + k] for i in range(PARAMETERS)], axis=1) for k in (0, 1))
-    # A larger lever only makes the columns of the forces longer, so each part uses its largest lever.
+    # A larger lever only lengthens the columns of the forces, so each part uses its largest lever.
     levers = cell.lever(high[:, :1])
     low, high = np.hstack([low, levers]), np.hstack([high, levers])
     checked = [
@@ -59,7 +59,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
 
 
 def _check_parts(rows: list[list[Any]], z: Any, low: Array, high: Array) -> tuple[float, float]:
-    """Largest slack over the parts, and least value of (least eigenvalue at corners − slack)."""
+    """Largest slack over the parts, and smallest value of (smallest eigenvalue at corners − slack)."""
     matrix = ca.vertcat(*(ca.horzcat(*row) for row in rows))
     curvature = np.zeros((len(low), len(rows), len(rows)))
     for i in range(PARAMETERS):

@@ -17,40 +17,40 @@ class Interval(NamedTuple):
     high: Array
 
 
-def _outwards(low: Array, high: Array) -> Interval:
+def _round_outwards(low: Array, high: Array) -> Interval:
     """Interval widened by two units in the last place, more than the rounding error of any operation here."""
     return Interval(low - 4e-16 * np.abs(low) - 1e-300, high + 4e-16 * np.abs(high) + 1e-300)
 
 
 def _add(a: Interval, b: Interval) -> Interval:
-    return _outwards(a.low + b.low, a.high + b.high)
+    return _round_outwards(a.low + b.low, a.high + b.high)
 
 
 def _subtract(a: Interval, b: Interval) -> Interval:
-    return _outwards(a.low - b.high, a.high - b.low)
+    return _round_outwards(a.low - b.high, a.high - b.low)
 
 
 def _multiply(a: Interval, b: Interval) -> Interval:
     ends = (a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
-    return _outwards(np.minimum.reduce(ends), np.maximum.reduce(ends))
+    return _round_outwards(np.minimum.reduce(ends), np.maximum.reduce(ends))
 
 
 def _divide(a: Interval, b: Interval) -> Interval:
     if np.any((b.low <= 0.0) & (b.high >= 0.0)):
         raise CertificateError("an interval is divided by one that holds zero: the boxes are too large")
-    return _multiply(a, _outwards(1.0 / b.high, 1.0 / b.low))
+    return _multiply(a, _round_outwards(1.0 / b.high, 1.0 / b.low))
 
 
 def _square(a: Interval) -> Interval:
     ends = (a.low * a.low, a.high * a.high)
     holds_zero = (a.low <= 0.0) & (a.high >= 0.0)
-    return _outwards(np.where(holds_zero, 0.0, np.minimum(*ends)), np.maximum(*ends))
+    return _round_outwards(np.where(holds_zero, 0.0, np.minimum(*ends)), np.maximum(*ends))
 
 
-def _root(a: Interval) -> Interval:
+def _square_root(a: Interval) -> Interval:
     if np.any(a.low < 0.0):
         raise CertificateError("the root of an interval below zero: the boxes are too large")
-    return _outwards(np.sqrt(a.low), np.sqrt(a.high))
+    return _round_outwards(np.sqrt(a.low), np.sqrt(a.high))
 
 
 def _cosine(a: Interval) -> Interval:
@@ -63,11 +63,11 @@ def _cosine(a: Interval) -> Interval:
     both = (turns + 1.0) * np.pi <= a.high + 1e-12
     high = np.where(inside & (even | both), 1.0, high)
     low = np.where(inside & (~even | both), -1.0, low)
-    return _outwards(low - 1e-15, high + 1e-15)
+    return _round_outwards(low - 1e-15, high + 1e-15)
 
 
 def _sine(a: Interval) -> Interval:
-    return _cosine(_outwards(a.low - 0.5 * np.pi, a.high - 0.5 * np.pi))
+    return _cosine(_round_outwards(a.low - 0.5 * np.pi, a.high - 0.5 * np.pi))
 
 
 def _negate(a: Interval) -> Interval:
@@ -75,7 +75,7 @@ def _negate(a: Interval) -> Interval:
 
 
 _UNARY: dict[int, Callable[[Interval], Interval]] = {
-    ca.OP_NEG: _negate, ca.OP_SIN: _sine, ca.OP_COS: _cosine, ca.OP_SQ: _square, ca.OP_SQRT: _root,
+    ca.OP_NEG: _negate, ca.OP_SIN: _sine, ca.OP_COS: _cosine, ca.OP_SQ: _square, ca.OP_SQRT: _square_root,
     ca.OP_TWICE: lambda a: _add(a, a), ca.OP_ASSIGN: lambda a: a,
 }  # fmt: skip
 _BINARY: dict[int, Callable[[Interval, Interval], Interval]] = {
@@ -96,7 +96,7 @@ def bounds(function: Any, low: Array, high: Array) -> tuple[Array, Array]:
     Returns
     -------
     low, high : Array, shape (n, r, c)
-        No value lies outside these; how tight they are depends on how the expression is written.
+        Every value lies within these; how tight they are depends on how the expression is written.
 
     Raises
     ------
@@ -109,26 +109,26 @@ def bounds(function: Any, low: Array, high: Array) -> tuple[Array, Array]:
     result = np.zeros((2, n, shape[0] * shape[1]))
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
-        given, kept = function.instruction_input(k), function.instruction_output(k)
+        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
         if operation == ca.OP_INPUT:
-            work[kept[0]] = Interval(low[:, given[1]], high[:, given[1]])
+            work[outputs[0]] = Interval(low[:, inputs[1]], high[:, inputs[1]])
         elif operation == ca.OP_CONST:
             value = np.full(n, function.instruction_constant(k))
-            work[kept[0]] = Interval(value, value)
+            work[outputs[0]] = Interval(value, value)
         elif operation == ca.OP_OUTPUT:
-            result[0, :, kept[1]], result[1, :, kept[1]] = work[given[0]]
+            result[0, :, outputs[1]], result[1, :, outputs[1]] = work[inputs[0]]
         elif operation in _UNARY:
-            work[kept[0]] = _UNARY[operation](work[given[0]])
+            work[outputs[0]] = _UNARY[operation](work[inputs[0]])
         elif operation in _BINARY:
-            work[kept[0]] = _BINARY[operation](work[given[0]], work[given[1]])
+            work[outputs[0]] = _BINARY[operation](work[inputs[0]], work[inputs[1]])
         elif operation == ca.OP_INV:
             one = np.ones(n)
-            work[kept[0]] = _divide(Interval(one, one), work[given[0]])
+            work[outputs[0]] = _divide(Interval(one, one), work[inputs[0]])
         else:
             raise CertificateError(f"no interval arithmetic for operation {operation} of CasADi")
     # CasADi stores matrices column by column.
-    least, most = (part.reshape(n, shape[1], shape[0]).transpose(0, 2, 1) for part in result)
-    return least, most
+    lower, upper = (part.reshape(n, shape[1], shape[0]).transpose(0, 2, 1) for part in result)
+    return lower, upper
 
 
 def spectral_bound(low: Array, high: Array) -> Array:

@@ -37,23 +37,23 @@ import numpy as np
 from controllers.certificates.interrupts import heeding_interrupts
 from controllers.state import Array
 
-SERIES = 12  # terms of the exponential of a period: the remainder is below 1e-9 while b_h T/μ < 1
+SERIES = 12  # terms of the exponential series over a period: the remainder is below 1e-9 while b_h T/μ < 1
 LENGTH = 0.01  # [m] scale of the forms, for conditioning
-# Masses at which the optimisation imposes the decrease, with 2 or 6 as well; the check imposes it everywhere.
+# Masses at which the optimisation requires the decrease (2 or 6 work too); the check requires it everywhere.
 MASSES = 3
-_HEAVY, _VISCOUS, _STIFF = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
-# Weights. From 5.0 mm off the demo's curve, or 0.125 m/s, a hand comes within 1.8 mm. Half or twice of the first: 5.0
-# or 4.4 mm and 1.8 or 2.2 mm; of the second: 5.0 or 5.4 and 1.65 or 1.8; half of the third: the same, with twice no
-# form suits all hands.
-FILTER_WEIGHT = 10.0  # weight of the size in the filter's state, which decays in a period or two
-SPEED_WEIGHT = 0.25  # weight of the size in velocity relative to that in position
-PUSH_WEIGHT = 10.0  # weight of the level sustained by the neglected forces relative to size
+_MASS_SCALE, _DAMPING_SCALE, _STIFFNESS_SCALE = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
+# Weights. With these, a hand 5.0 mm off the demo's curve, or with an error of 0.125 m/s, comes within 1.8 mm. Half or
+# twice the first: from 5.0 or 4.4 mm to 1.8 or 2.2 mm. Half or twice the second: from 5.0 or 5.4 mm to 1.65 or 1.8 mm.
+# Half the third: the same; with twice the third, no form suits all hands.
+FILTER_WEIGHT = 10.0  # weight of the extent in the filter's state, which decays in a period or two
+SPEED_WEIGHT = 0.25  # weight of the extent in velocity relative to that in position
+PUSH_WEIGHT = 10.0  # weight of the level that the neglected forces sustain, relative to the extent
 PARAMETERS = 4  # of an axis: μ, b_h, k_h, w
 CHANNELS = 2  # of neglected forces: in newtons, and in the metric
 
 
 class Axis(NamedTuple):
-    """One axis of the loop: gains k [N/m], b [N s/m], period T [s], the filter's s, delay in periods, `Law.slides`."""
+    """One axis of the loop: gains k [N/m], b [N s/m], period T [s], filter coefficient s, delay in periods, slides."""
 
     stiffness: float
     damping: float
@@ -86,15 +86,15 @@ class Axis(NamedTuple):
                 term_e, term_v = term_v * t / order, (push - spring * term_e - drag * term_v) * t / (order * mass)
                 e, v = e + term_e, v + term_v
             columns.append([e, v])
-        felt = [-share * self.stiffness, 0.0, -share * self.damping] + [0.0] * self.delay
-        applied = felt if self.delay == 0 else [0.0] * (n - 1) + [1.0]
+        law_force = [-share * self.stiffness, 0.0, -share * self.damping] + [0.0] * self.delay
+        applied = law_force if self.delay == 0 else [0.0] * (n - 1) + [1.0]
         rows = [[(columns[j][i] if j < 2 else 0.0) + columns[2][i] * applied[j] for j in range(n)] for i in range(2)]
         filtered = [(1.0 - self.keep) / t * (rows[0][j] - (j == 0)) + self.keep * (j == 2) for j in range(n)]
-        late = [felt] + [[float(j == 3 + i) for j in range(n)] for i in range(self.delay - 1)]
+        delayed_rows = [law_force] + [[float(j == 3 + i) for j in range(n)] for i in range(self.delay - 1)]
         scale = self.scale
         return [
             [row[j] * (scale[j] / scale[i]) for j in range(n)]
-            for i, row in enumerate([*rows, filtered, *late[: self.delay]])
+            for i, row in enumerate([*rows, filtered, *delayed_rows[: self.delay]])
         ]
 
     def numbers(self, z: Any) -> Array:
@@ -102,17 +102,17 @@ class Axis(NamedTuple):
         return np.array(self.matrix(z), dtype=np.float64)
 
     def pushes(self, a: Any, mass: Any, lever: Any, units: Sequence[float], early: bool) -> list[list[Any]]:
-        """B as rows, for A(μ), in units of `scale` and of the forces' `units`: impulses at the period's begin or end.
+        """B as rows, for A(μ), in units of `scale` and of the forces' `units`: impulses at the period's start or end.
 
-        An impulse at the beginning is a change of ν. `lever` is √(the device's own share of μ) [√kg].
+        An impulse at the beginning is a change of ν. `lever` is √(the device's own part of μ) [√kg].
         """
-        kick = [a[i][1] if early else float(i == 1) for i in range(self.size)]
+        impulse_response = [a[i][1] if early else float(i == 1) for i in range(self.size)]
         size = [self.period * unit / (mass * self.scale[1]) for unit in units]
-        return [[kick[i] * size[0], kick[i] * size[1] * lever] for i in range(self.size)]
+        return [[impulse_response[i] * size[0], impulse_response[i] * size[1] * lever] for i in range(self.size)]
 
 
 class Cell(NamedTuple):
-    """Intervals of μ [kg], b_h [N s/m], k_h [N/m] and w for one form, and the device's largest and least mass [kg]."""
+    """Intervals of μ [kg], b_h [N s/m], k_h [N/m], w for one form, and the device's largest and smallest mass [kg]."""
 
     low: Array
     high: Array
@@ -120,11 +120,11 @@ class Cell(NamedTuple):
     lightest: float
 
     def lever(self, mass: Any) -> Any:
-        """Bound of √(the device's own share of μ) [√kg], shape as `mass`."""
+        """Bound on √(the device's own part of μ) [√kg], of the same shape as `mass`."""
         return np.sqrt(np.minimum(self.own, mass - (self.low[0] - self.lightest)))
 
     def corners(self, masses: int = MASSES) -> Array:
-        """A number of masses, combined with every corner of the other parameters, shape (n, 4)."""
+        """A grid of masses, combined with every corner of the other parameters, shape (n, 4)."""
         grid = np.geomspace(self.low[0], self.high[0], masses)
         ends = [np.unique([self.low[i], self.high[i]]) for i in range(1, PARAMETERS)]
         return np.stack(np.meshgrid(grid, *ends, indexing="ij"), axis=-1).reshape(-1, PARAMETERS)
@@ -172,7 +172,7 @@ class Limits(NamedTuple):
     pushes: tuple[float, float]
 
 
-def _symmetric(numbers: Any, size: int) -> list[list[Any]]:
+def _symmetric_matrix(numbers: Any, size: int) -> list[list[Any]]:
     return [[numbers[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(size)] for i in range(size)]
 
 
@@ -184,9 +184,9 @@ def _congruent(a: Any, p: Any) -> list[list[Any]]:
 
 
 def decrease(axis: Axis, a: Any, pushes: Any, p: Any, form: Form) -> list[list[Any]]:
-    """The matrix of the module, divided by T, from A, B and P as lists of lists; its last row is scaled.
+    """The matrix of the module docstring, divided by T, from A, B and P as lists of lists; its last row is scaled.
 
-    For an axis that does not slide there is no row h.
+    For an axis that does not slide, the row h is missing.
     """
     n, t = axis.size, axis.period
     whole = [[*a[i], *pushes[i]] for i in range(n)]
@@ -223,11 +223,11 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     x, s = ca.SX.sym("x", 2 * entries + 6 + CHANNELS), ca.SX.sym("s")
 
     def form_of(values: Any) -> Form:
-        low, slope = (_symmetric([values[k * entries + i] for i in range(entries)], n) for k in range(2))
+        low, slope = (_symmetric_matrix([values[k * entries + i] for i in range(entries)], n) for k in range(2))
         rest = [values[2 * entries + i] for i in range(5)]
         gains = [values[2 * entries + 6 + i] for i in range(CHANNELS)]
-        slope = [[value / _HEAVY for value in row] for row in slope]
-        hand, (sigma, bound, gauge) = [rest[0] / _VISCOUS, rest[1] / _STIFF], rest[2:]
+        slope = [[value / _MASS_SCALE for value in row] for row in slope]
+        hand, (sigma, bound, gauge) = [rest[0] / _DAMPING_SCALE, rest[1] / _STIFFNESS_SCALE], rest[2:]
         return Form(low, slope, hand, rate, sigma, bound, gauge, gains, limits.pushes)  # pyright: ignore[reportArgumentType]
 
     form, size = form_of(x), x[2 * entries + 5]
@@ -242,14 +242,14 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     with heeding_interrupts():
         first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(
-        [_first_guess(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
+        [_initial_form(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
     )
     with heeding_interrupts():
         found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
     if found[-1] > -1e-3:
         return None
-    held_up = sum(form.gains) / (2.0 * rate)
-    goal = ca.substitute(size + PUSH_WEIGHT * held_up + 0.3 * barrier, s, ca.SX(0.0))
+    sustained_level = sum(form.gains) / (2.0 * rate)
+    goal = ca.substitute(size + PUSH_WEIGHT * sustained_level + 0.3 * barrier, s, ca.SX(0.0))
     with heeding_interrupts():
         second = ca.nlpsol("second", "ipopt", {"x": x, "f": goal}, options)
     with heeding_interrupts():
@@ -261,7 +261,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
 
 
 def _barrier(axis: Axis, cell: Cell, limits: Limits, form: Form, size: Any, s: Any) -> Any:
-    """−Σ log det(M + s I), as a mean: for the decrease, the limits, and the size of a form of symbols."""
+    """Mean of −log det(M + s I) over the conditions on a symbolic form: its decrease, its limits and its extent."""
     n, scale, sigma, bound = axis.size, axis.scale, form.sigma, form.bound
     force = np.array([axis.stiffness, 0.0, axis.damping] + [0.0] * axis.delay) * scale / limits.force
     reach = [force, np.eye(n)[0] * scale / limits.distance, np.eye(n)[1] * scale / limits.speed]
@@ -271,17 +271,17 @@ def _barrier(axis: Axis, cell: Cell, limits: Limits, form: Form, size: Any, s: A
         a, p = axis.numbers(z).tolist(), form.matrix(z)
         for early in (True, False):
             pushes = axis.pushes(a, z[0], cell.lever(z[0]), limits.pushes, early)
-            logs += _pivots(decrease(axis, a, pushes, p, form), s)
+            logs += _log_pivots(decrease(axis, a, pushes, p, form), s)
     for z in cell.corners(2):
         p = form.matrix(z)
         logs.append(ca.log(size - FILTER_WEIGHT * p[2][2] + s))
         logs += [ca.log(value + s) for value in (bound - p[0][0], size - p[0][0], size - SPEED_WEIGHT * p[1][1])]
         for row in reach:
-            logs += _pivots([[p[i][j] - row[i] * row[j] for j in range(n)] for i in range(n)], s)
+            logs += _log_pivots([[p[i][j] - row[i] * row[j] for j in range(n)] for i in range(n)], s)
     return -ca.sum1(ca.vertcat(*logs)) / len(logs)
 
 
-def _pivots(matrix: Any, shift: Any) -> list[Any]:
+def _log_pivots(matrix: Any, shift: Any) -> list[Any]:
     """Logarithms of the pivots of M + s I, which sum to log det; not finite unless it is positive definite."""
     rows = [[matrix[i][j] + (shift if i == j else 0.0) for j in range(len(matrix))] for i in range(len(matrix))]
     logs: list[Any] = []
@@ -294,6 +294,6 @@ def _pivots(matrix: Any, shift: Any) -> list[Any]:
     return logs
 
 
-def _first_guess(n: int) -> Array:
+def _initial_form(n: int) -> Array:
     rows, columns = np.tril_indices(n)
     return np.where(rows == columns, 1.0, 0.0)

@@ -1,13 +1,13 @@
 r"""Certified region of attraction about the curve, for the executed loop, by a Lyapunov function.
 
 `lyapunov` finds V, `decrease_check` checks its decrease, `tube_bounds` bounds the device's kinematics and dynamics in a
-tube, `remainder` bounds what the decoupled axes with frozen inertia neglect. With these, on {√V ≤ ℓ},
+tube, and `remainder` bounds what the decoupled axes with frozen inertia neglect. With these, on {√V ≤ ℓ},
 
 .. math:: \|x^+\| \le f_\ell(\|x\|), \qquad
           f_\ell(v) = \sqrt{e^{-2rT} v^2 + T \textstyle\sum_c s_c w_c^2(\ell)} + T\,(r_0(\ell)\,v + \delta(\ell)),
 
-so the set is invariant if f_ℓ(ℓ) < ℓ. From it √V falls to a level ℓ' if, for all neighbours ℓ_i < ℓ_{i+1} of a grid
-down to ℓ', f(v) < v at v = ℓ_i with the remainder of ℓ_{i+1}, since v − f(v) increases with v.
+so the set is invariant if f_ℓ(ℓ) < ℓ. From ℓ, √V falls to a level ℓ' if f(v) < v at v = ℓ_i, with the remainder of
+ℓ_{i+1}, for all neighbours ℓ_i < ℓ_{i+1} of a grid down to ℓ', since v − f(v) increases with v.
 """
 
 from itertools import product
@@ -26,20 +26,20 @@ from controllers.certificates.report import CertificateError, Verdict
 from controllers.fields.algebra.window import window
 from controllers.state import Array
 
-# [m], [m/s] limits of a region: beyond, the bounds of the remainder grow too fast. The demo's region reaches 5.0 mm and
-# 0.125 m/s; with twice the first, or half the second, no form suits all its hands; with half the first it reaches 2.7
-# mm.
+# [m], [m/s] limits of a region, beyond which the bounds on the remainder grow too fast. The demo's region reaches
+# 5.0 mm and 0.125 m/s. With twice the first, or half the second, no form suits all its hands; with half the first it
+# reaches 2.7 mm.
 RADIUS, SPEED = 0.006, 0.25
-# Required rates of a form, as shares of the slowest axis' own rate: with 0.7 alone the demo's region reaches 5.3 mm,
-# but the hand comes within 2.2 mm only, instead of 1.8.
+# Required rates of a form, as fractions of the slowest axis' own rate. With 0.7 alone the demo's region reaches 5.3 mm,
+# but the hand comes only within 2.2 mm, instead of 1.8.
 SHARES = (0.82, 0.6)
-# Share of the hands' intervals that is the firm part: the most mass and damping, the least stiffness. It counts where
-# no form suits all hands.
+# Fraction of the hands' intervals that is the firm part: the largest mass and damping, the smallest stiffness. It is
+# examined where no form suits all hands.
 FIRM = 0.2
-LEVELS = 40  # grid of √V between 0 and 1: with 80 the demo's hand comes within 1.65 mm instead of 1.8
+LEVELS = 40  # grid of √V between 0 and 1; with 80 the demo's hand comes within 1.65 mm instead of 1.8
 HALF = 0.5  # level at which the remainder is reported if there is no region
 PARTS = (160, 8, 4, 1)  # parts of a cell of hands along μ, b_h, k_h, w
-# Shares of the required rate that are tried, since the check needs some margin: the demo's region needs the first only.
+# Fractions of the required rate that are tried, since the check needs a margin; the demo's region needs only the first.
 BACKED_OFF = (0.97, 0.93, 0.85)
 
 
@@ -55,51 +55,51 @@ class Found(NamedTuple):
 
     @property
     def held_up(self) -> float:
-        """Level at which the neglected forces alone would sustain √V."""
-        return float(np.sqrt(_lifted(self.form, self.rest) / (2.0 * self.form.rate)))
+        """Level of √V that the neglected forces alone would sustain."""
+        return float(np.sqrt(_force_term(self.form, self.rest) / (2.0 * self.form.rate)))
 
     def offsets(self, axis: Axis) -> tuple[float, float]:
-        """Largest offset at the curve's pace [m] and largest speed error on the curve [m/s] surely in the region."""
+        """Largest offset at the curve's pace [m] and speed error on the curve [m/s] that are surely in the region."""
         blocks = np.array([np.diag(self.form.numbers(z)) for z in self.cell.corners(2)]).max(axis=0)
         inside = max(0.0, self.level - self.rest.shift)
         both = np.array([self.form.numbers(z)[1:3, 1:3].sum() for z in self.cell.corners(2)]).max()
         return float(inside * axis.scale[0] / np.sqrt(blocks[0])), float(inside * axis.scale[1] / np.sqrt(both))
 
 
-def _lifted(form: Form, rest: Remainder) -> float:
+def _force_term(form: Form, rest: Remainder) -> float:
     """Σ s_c w_c² [1/s]."""
     pushes = (rest.newtons, rest.metric)
     return sum(s * (w / unit) ** 2 for s, w, unit in zip(form.gains, pushes, form.units, strict=True))
 
 
-def _levels(
+def _find_levels(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, limits: Limits
 ) -> tuple[float, float]:
     """Largest invariant level ℓ, and the level of the ball that is reached; zeros if there is none."""
     grid = np.arange(LEVELS + 1) / LEVELS
-    held, falls = [False], [False]
+    invariant, decreases = [False], [False]
     for i in range(1, LEVELS + 1):
         rest = remainder(axis, form, cell, tube, course, share, float(grid[i]))
         inside = grid[i] * rest.distance <= limits.distance and grid[i] * rest.force <= limits.force
-        lifted = _lifted(form, rest)
+        force_term = _force_term(form, rest)
 
-        def after(v: float, rest: Remainder = rest, lifted: float = lifted) -> float:
-            kept = np.sqrt(np.exp(-2.0 * form.rate * axis.period) * v * v + axis.period * lifted)
-            return float(kept + axis.period * (rest.rate * v + rest.drift))
+        def after(v: float, rest: Remainder = rest, force_term: float = force_term) -> float:
+            decayed = np.sqrt(np.exp(-2.0 * form.rate * axis.period) * v * v + axis.period * force_term)
+            return float(decayed + axis.period * (rest.rate * v + rest.drift))
 
-        held.append(inside and np.isfinite(lifted) and after(float(grid[i])) < grid[i])
-        falls.append(held[i] and after(float(grid[i - 1])) < grid[i - 1])
-    if not any(held):
+        invariant.append(inside and np.isfinite(force_term) and after(float(grid[i])) < grid[i])
+        decreases.append(invariant[i] and after(float(grid[i - 1])) < grid[i - 1])
+    if not any(invariant):
         return 0.0, 0.0
-    top = max(i for i in range(LEVELS + 1) if held[i])
+    top = max(i for i in range(LEVELS + 1) if invariant[i])
     ball = top
-    while falls[ball]:
+    while decreases[ball]:
         ball -= 1
     return float(grid[top]), float(grid[ball])
 
 
-def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
-    """The form with the largest of a few reduced rates (and raised gains s_c) at which all parts of the cell pass."""
+def _check_reduced_rates(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
+    """The form with the largest of several reduced rates (and raised gains s_c) at which all parts of the cell pass."""
     for share in BACKED_OFF:
         gains = tuple(gain / share for gain in form.gains)
         slower = form._replace(rate=share * form.rate, gains=gains)
@@ -110,19 +110,19 @@ def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
 
 
 class Search(NamedTuple):
-    """Result: a form with an invariant set, and one that decreases for frozen inertia; None where there is none."""
+    """Result: a form with an invariant set, and one that decreases for frozen inertia; None if there is none."""
 
     found: Found | None
     frozen: Found | None
 
 
 def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
-    """Search for one form for all hands of given intervals.
+    """Search for one form for all hands in given intervals.
 
     Parameters
     ----------
     river, axis
-        The loop.
+        The river, and one axis of its loop.
     tube : TubeBounds
         Bounds of the device within `RADIUS`.
     hands : HandRange
@@ -137,17 +137,17 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
     low = np.array([tube.mass_low + hands.mass[0], hands.damping[0], hands.stiffness[0], share])
     high = np.array([tube.mass_high + hands.mass[1], hands.damping[1], hands.stiffness[1], 1.0])
     cell = Cell(low, high, tube.mass_high, tube.mass_low)
-    slowest = max(_radius(axis, z) for z in cell.corners())
+    slowest = max(_spectral_radius(axis, z) for z in cell.corners())
     if slowest >= 1.0:
         return Search(None, None)
     steady = axis.damping * course.pace * hands.damping[1] / (axis.damping + hands.damping[1])
-    limits = Limits(min(ceiling, tube.motor_force) - steady, RADIUS, SPEED, _expected(axis, cell, tube, course))
+    limits = Limits(min(ceiling, tube.motor_force) - steady, RADIUS, SPEED, _expected_forces(axis, cell, tube, course))
     for part in SHARES:
         form = find_form(axis, cell, limits, -part * np.log(slowest) / axis.period)
-        passed = None if form is None else _checked(axis, form, cell)
+        passed = None if form is None else _check_reduced_rates(axis, form, cell)
         if passed is None:
             continue
-        level, ball = _levels(axis, passed[0], cell, tube, course, share, limits)
+        level, ball = _find_levels(axis, passed[0], cell, tube, course, share, limits)
         rest = remainder(axis, passed[0], cell, tube, course, share, level or HALF)
         if level > 0.0:
             return Search(Found(*passed, cell, level, ball, rest), Found(*passed, cell, 1.0, 0.0, rest))
@@ -155,12 +155,12 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
     return Search(None, frozen)
 
 
-def _radius(axis: Axis, z: Array) -> float:
+def _spectral_radius(axis: Axis, z: Array) -> float:
     """Spectral radius of an axis."""
     return float(np.abs(np.linalg.eigvals(axis.numbers(z))).max())
 
 
-def _expected(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple[float, float]:
+def _expected_forces(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple[float, float]:
     """Estimates of the neglected forces near the curve [N], [N/√kg]."""
     shift = axis.damping / cell.low[0] * tube.rounding
     friction = tube.coulomb + (axis.damping + cell.high[1]) * shift + axis.stiffness * tube.rounding
@@ -169,19 +169,19 @@ def _expected(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple
     return friction, float(momentum * (tube.coriolis * pace + tube.drag))
 
 
-def _loosest(axis: Axis, tube: TubeBounds, hands: HandRange) -> HandRange:
-    """The corner of the intervals whose hand returns to the curve the slowest."""
+def _loosest_hand(axis: Axis, tube: TubeBounds, hands: HandRange) -> HandRange:
+    """The corner of the intervals whose hand returns to the curve most slowly."""
 
     def radius(hand: tuple[float, float, float]) -> float:
         masses = (hand[0] + tube.mass_low, hand[0] + tube.mass_high)
-        return max(_radius(axis, np.array([mass, *hand[1:], 1.0])) for mass in masses)
+        return max(_spectral_radius(axis, np.array([mass, *hand[1:], 1.0])) for mass in masses)
 
     m, b, k = max(product(hands.mass, hands.damping, hands.stiffness), key=radius)
     return HandRange((m, m), (b, b), (k, k))
 
 
-def _firm(hands: HandRange) -> HandRange:
-    """The part of the intervals with the most mass and damping and the least stiffness."""
+def _firm_part(hands: HandRange) -> HandRange:
+    """The part of the intervals with the largest mass and damping and the smallest stiffness."""
 
     def upper(low: float, high: float) -> tuple[float, float]:
         return high - FIRM * (high - low), high
@@ -191,11 +191,11 @@ def _firm(hands: HandRange) -> HandRange:
 
 
 def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
-    """Verdict on a region about the curve that is attracted to a smaller ball about it, for every hand of intervals.
+    """Verdict on a region about the curve that is attracted to a smaller ball about it, for every hand in intervals.
 
-    Certified: V decreases on the whole region in spite of the remainder; the margin is the offset [m] from which a hand
-    that moves at the curve's own pace surely converges to the ball. Refuted if the loop is not even stable along the
-    curve. If it is unknown because of the loosest hand, the intervals' firm part is tried and its result is reported.
+    Certified if V decreases on the whole region in spite of the remainder; the margin is the offset [m] from which a
+    hand at the curve's pace is certain to converge to the ball. Refuted if the loop is not even stable along the curve.
+    If the result is unknown because of the loosest hand, the firm part of the intervals is tried and reported.
 
     Parameters
     ----------
@@ -223,33 +223,33 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
         tube = tube_bounds(river.device, river.curve, RADIUS)
     except CertificateError as error:
         return Verdict("unknown", str(error))
-    loosest = _loosest(axis, tube, hands)
+    loosest = _loosest_hand(axis, tube, hands)
     alone = search(river, axis, tube, loosest, ceiling)
     tried = alone if alone.found is None or hands == loosest else search(river, axis, tube, hands, ceiling)
     if tried.found is not None:
         figures = _figures(axis, tried.found)
         return Verdict(
-            "certified", _described(axis, tried.found), tried.found.offsets(axis)[0], ASSUMPTIONS, {}, figures
+            "certified", _description(axis, tried.found), tried.found.offsets(axis)[0], ASSUMPTIONS, {}, figures
         )
-    reason = _why(alone.frozen, loosest) if alone.found is None else "no one Lyapunov function suits all these hands"
-    firm = _firm(hands)
+    reason = _reason(alone.frozen, loosest) if alone.found is None else "no one Lyapunov function suits all these hands"
+    firm = _firm_part(hands)
     part = Search(None, None) if hands == loosest else search(river, axis, tube, firm, ceiling)
     if part.found is None:
         return Verdict("unknown", f"{reason}; narrow their intervals", None, ASSUMPTIONS)
     figures = _figures(axis, part.found) | {"firm_hands": firm}
-    reason = f"{reason}. Certain for {_named(firm)}: {_described(axis, part.found)}"
+    reason = f"{reason}. Certain for {_hands_text(firm)}: {_description(axis, part.found)}"
     return Verdict("unknown", reason, None, ASSUMPTIONS, {}, figures)
 
 
-def _described(axis: Axis, found: Found) -> str:
-    offset, wrong = found.offsets(axis)
+def _description(axis: Axis, found: Found) -> str:
+    offset, speed = found.offsets(axis)
     return (
-        f"from {1e3 * offset:.3g} mm off the curve, or {wrong:.3g} m/s from its pace, the hand comes within "
+        f"from {1e3 * offset:.3g} mm off the curve, or {speed:.3g} m/s from its pace, the hand comes within "
         f"{1e3 * found.rest.distance * found.ball:.3g} mm and stays there"
     )
 
 
-def _named(hands: HandRange) -> str:
+def _hands_text(hands: HandRange) -> str:
     """Text for intervals; one number where an interval is a point."""
     intervals = ((hands.mass, "kg"), (hands.damping, "N s/m"), (hands.stiffness, "N/m"))
     return "hands of " + ", ".join(
@@ -257,12 +257,12 @@ def _named(hands: HandRange) -> str:
     )
 
 
-def _why(frozen: Found | None, loosest: HandRange) -> str:
+def _reason(frozen: Found | None, hands: HandRange) -> str:
     """Reason why the loosest hand alone has no certified region."""
     if frozen is None:
-        return f"no Lyapunov function was found for {_named(loosest)} alone"
+        return f"no Lyapunov function was found for {_hands_text(hands)} alone"
     return (
-        f"with {_named(loosest)} alone V falls at {frozen.form.rate:.3g}/s with the inertia frozen, but half way in "
+        f"with {_hands_text(hands)} alone V falls at {frozen.form.rate:.3g}/s with the inertia frozen, but half way in "
         f"what that leaves out may take {frozen.rest.rate:.3g}/s, push by {frozen.rest.drift:.3g}/s, and with "
         f"{frozen.rest.newtons:.2g} N hold it at {frozen.held_up:.2g} of its edge: too much to be certain"
     )

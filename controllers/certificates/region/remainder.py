@@ -1,12 +1,12 @@
-r"""Remainder: bounds of what the decoupled axes of `lyapunov` with frozen inertia neglect, as rates and forces.
+r"""Remainder: bounds on what the decoupled axes of `lyapunov` with frozen inertia neglect, as rates and forces.
 
 It gives an input-to-state estimate of the whole loop. With ‖x‖ = √V ≤ ℓ, the executed loop obeys
 
 .. math:: \|x^+\| \le \sqrt{e^{-2rT} \|x\|^2 + T \textstyle\sum_c s_c w_c^2} + T\,(r_0 \|x\| + \delta)
 
-r is the form's rate and s_c its gains for the forces w_c; r_0 is the loss of rate by the nonlinearity, δ the terms that
-neither vanish on the curve nor are forces. All of them grow with ℓ. Every term is an upper bound in the tube, for the
-form's worst mass and hand. Terms of second order in T are covered by the factor `SAFE`.
+r is the form's rate and s_c its gains for the forces w_c; r_0 is the loss of rate due to the nonlinearity, δ the terms
+that neither vanish on the curve nor are forces. All of them grow with ℓ. Every term is an upper bound in the tube, for
+the form's worst mass and hand. Terms of second order in T are covered by the factor `SAFE`.
 """
 
 from typing import NamedTuple
@@ -19,17 +19,17 @@ from controllers.certificates.region.tube_bounds import TubeBounds
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
-# Factor for terms of second order in T: from 5 mm off the demo's curve a hand comes within 1.8 mm, with 1.1 as well,
-# with 1 within 1.65.
+# Factor for terms of second order in T. From 5 mm off the demo's curve a hand comes within 1.8 mm, with 1.1 too; with
+# 1 it comes within 1.65 mm.
 SAFE = 1.05
-DENSE = 120  # masses at which terms that are not convex in the mass are evaluated: half or twice certifies the same
+DENSE = 120  # masses at which terms that are not convex in the mass are evaluated; half or twice certifies the same
 
 
 class Course(NamedTuple):
-    """Curve data: largest and least pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
+    """Curve data: largest and smallest pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
 
     For a law that does not carry the hand, largest pace and |φ̈| are zero. The last is the largest change of the flow's
-    speed across the curve [1/s]: of a parallel flow |φ̇|κ, else 0.
+    speed across the curve [1/s]: |φ̇|κ for a parallel flow, else 0.
     """
 
     pace: float
@@ -55,7 +55,7 @@ class Course(NamedTuple):
 
 
 class Remainder(NamedTuple):
-    """Bounds of the remainder on a level set, and the extent of √V = 1.
+    """Bounds on the remainder over a level set, and the extent of √V = 1.
 
     Attributes
     ----------
@@ -87,13 +87,13 @@ def remainder(
     Parameters
     ----------
     axis, form, cell
-        The loop, its form and the hands.
+        The loop's axis, its form and the hands.
     tube : TubeBounds
         Bounds of the device, in a tube that contains the level set.
     course : Course
         Data of the curve.
     share : float
-        Least value w of the window in the tube.
+        Smallest value w of the window in the tube.
     level : float
         ℓ, at most 1.
     """
@@ -112,67 +112,67 @@ def remainder(
     total = largest(k + spring, viscous, b)
     pace_share, slow_share = b / (b + cell.low[1]), b / (b + viscous)
     pace = pace_share * course.pace
-    swing = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
-    speed = pace + swing * v * level
-    near = course.curvature * e * level
-    if near >= 0.7:
+    overshoot = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
+    speed = pace + overshoot * v * level
+    curved_distance = course.curvature * e * level
+    if curved_distance >= 0.7:
         return Remainder(np.inf, np.inf, np.inf, np.inf, np.inf, e, v, force)
-    bend = course.curvature / (1.0 - near)
+    bend = course.curvature / (1.0 - curved_distance)
 
     # Terms that are not convex in μ, on a dense grid of masses with the corners of the other parameters.
     z = cell.corners(DENSE)
     dense = np.array([form.numbers(row) for row in z])
     back = np.linalg.inv(dense)
     lever = cell.lever(z[:, 0])
-    motion = float((lever * np.sqrt(back[:, 1, 1])).max()) * scale[1] * swing * level
-    swap = np.linalg.eigh(form.beta)
-    size = (swap[1] * np.abs(swap[0])) @ swap[1].T
+    motion = float((lever * np.sqrt(back[:, 1, 1])).max()) * scale[1] * overshoot * level
+    eigen = np.linalg.eigh(form.beta)
+    size = (eigen[1] * np.abs(eigen[0])) @ eigen[1].T
     roots = np.linalg.cholesky(back)
     drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * lever**2
     blocks = np.sqrt(np.einsum("nii->ni", dense)) / scale
     shift = b / z[:, 0] * tube.rounding
-    late = (1 + axis.delay) * t * speed
+    delay_travel = (1 + axis.delay) * t * speed
 
     newtons = (
-        tube.jacobian_slope * late * (force * level + b * course.pace * (1.0 - slow_share))
-        + tube.weight_slope * late
+        tube.jacobian_slope * delay_travel * (force * level + b * course.pace * (1.0 - slow_share))
+        + tube.weight_slope * delay_travel
         + (1.0 - share) * b * course.pace
         + b * course.shear * e * level
         + tube.coulomb
         + (b + viscous) * float(shift.max()) + (k + tube.mass_slope * speed * b) * tube.rounding
-        + axis.slides * 0.5 * t * spring * v * swing * level
+        + axis.slides * 0.5 * t * spring * v * overshoot * level
     )  # fmt: skip
     metric = (
         tube.drag * (motion + np.sqrt(tube.mass_high) * pace)
         + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
         + tube.mass_slope * t * speed * float((lever / z[:, 0]).max()) * total * level
     )
-    slowest = _least(forms, 2, scale)
+    slowest = _min_extent(forms, 2, scale)
     rate = 0.5 * tube.mass_slope * float(drifts.max()) * speed
-    rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * swing) / slowest * speed
+    rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * overshoot) / slowest * speed
     drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
     if axis.slides:
-        turn, cross = _turn(forms, scale), _cross(form, forms, inverses, tube, e, scale)
-        again = 0.5 * bend * bend / max(course.curvature, 1e-9)
-        rate += bend * (pace * e + swing * _pair(inverses, scale, e, v) * level) * cross
-        rate += (bend + again) * v * swing * t * speed * cross
+        turn, cross = _velocity_level(forms, scale), _slide_level(form, forms, inverses, tube, e, scale)
+        second_bend = 0.5 * bend * bend / max(course.curvature, 1e-9)
+        rate += bend * (pace * e + overshoot * _max_product(inverses, scale, e, v) * level) * cross
+        rate += (bend + second_bend) * v * overshoot * t * speed * cross
         rate += 0.5 * course.acceleration * pace_share / course.slowest * (v * turn + course.cosine)
         drift += pace_share**2 * course.acceleration * turn
-        drift += again * t * speed * pace * cross
+        drift += second_bend * t * speed * pace * cross
     return Remainder(
         rate=SAFE * rate, drift=SAFE * drift, newtons=SAFE * newtons, metric=SAFE * metric,
         shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
     )  # fmt: skip
 
 
-def _turn(forms: Array, scale: Array) -> float:
-    """√V of a change by 1 m/s of the velocity and the filtered velocity, as where φ̇ turns."""
+def _velocity_level(forms: Array, scale: Array) -> float:
+    """√V of a change of velocity and filtered velocity by 1 m/s, as where φ̇ changes its direction."""
     row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(len(scale) - 3)])
     return float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
 
 
-def _cross(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e: float, scale: Array) -> float:
-    """Largest change of √V, on √V = 1, for each metre by which e moves along the curve."""
+def _slide_level(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e: float, scale: Array) -> float:
+    """Largest change of √V, on √V = 1, per metre by which e moves along the curve."""
     part = forms[:, 0].copy()
     part[:, 0] = 0.0
     spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
@@ -181,12 +181,12 @@ def _cross(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e: float
     return cross
 
 
-def _least(forms: Array, i: int, scale: Array) -> float:
+def _min_extent(forms: Array, i: int, scale: Array) -> float:
     """1/√p_ii for the largest p_ii of the forms, in SI units."""
     return float(scale[i] / np.sqrt(forms[:, i, i].max()))
 
 
-def _pair(inverses: Array, scale: Array, e: float, v: float) -> float:
+def _max_product(inverses: Array, scale: Array, e: float, v: float) -> float:
     """Largest |e| |ν| on ‖x‖ ≤ 1, by ½(σ|e|² + |ν|²/σ)."""
     weight = np.diag([0.5 * v / e * scale[0] ** 2, 0.5 * e / v * scale[1] ** 2])
     roots = np.linalg.cholesky(inverses[:, :2, :2])

@@ -18,8 +18,8 @@ from controllers.certificates.report import CertificateError
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
-SEGMENTS = 48  # of the curve: the bound on the demo's largest mass is 0.151 kg, with 24 segments 0.179, with 96 0.145
-PARTS = 8  # of a segment's box along each joint: with 4 that bound is 0.184, with 16, in five times the time, 0.143
+SEGMENTS = 48  # of the curve: with 48 the bound on the demo's largest mass is 0.151 kg, with 24 0.179, with 96 0.145
+PARTS = 8  # of a segment's box along each joint: with 4 this bound is 0.184 kg, with 16 0.143 at five times the time
 
 
 class TubeBounds(NamedTuple):
@@ -41,7 +41,7 @@ class TubeBounds(NamedTuple):
     rounding : float
         Largest error of the tip's position by encoder quantisation [m].
     motor_force : float
-        Force that the motors can give in every direction while they carry the weight [N].
+        Force that the motors can apply in every direction while they carry the weight [N].
     """
 
     mass_low: float
@@ -63,7 +63,7 @@ def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
     Raises
     ------
     CertificateError
-        If the tube is so near to a singular configuration that its boxes contain one.
+        If a box that covers the tube contains a singular configuration.
     """
     theta = ca.SX.sym("theta", 3)
     jacobian, mass = matrix(device.jacobian(theta)), matrix(device.mass(theta))
@@ -82,15 +82,15 @@ def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
         """Bound of Σ X_i θ̇_i per metre of tip motion; the Frobenius norm bounds the spectral norm."""
         return sup(ca.horzcat(*(ca.vec(part) for part in parts)) @ back)
 
-    turns = [ca.reshape(ca.jacobian(ca.vec(jacobian), theta[i]), 3, 3) for i in range(3)]
-    masses = [ca.reshape(ca.jacobian(ca.vec(mass), theta[i]), 3, 3) for i in range(3)]
+    jacobian_slopes = [ca.reshape(ca.jacobian(ca.vec(jacobian), theta[i]), 3, 3) for i in range(3)]
+    mass_slopes = [ca.reshape(ca.jacobian(ca.vec(mass), theta[i]), 3, 3) for i in range(3)]
     by_mass: list[Any] = []
     by_coriolis: list[Any] = []
     for i in range(3):
-        side = unit @ (back @ turns[i]).T @ lower
-        by_mass.append(unit @ masses[i] @ unit.T - side - side.T)
+        side = unit @ (back @ jacobian_slopes[i]).T @ lower
+        by_mass.append(unit @ mass_slopes[i] @ unit.T - side - side.T)
         axis = [float(i == j) for j in range(3)]
-        by_coriolis.append((unit @ matrix(device.coriolis(theta, axis)) - lower.T @ back @ turns[i]) @ unit.T)
+        by_coriolis.append((unit @ matrix(device.coriolis(theta, axis)) - lower.T @ back @ jacobian_slopes[i]) @ unit.T)
     tip = jacobian @ unit.T
     mobility = bounds(ca.Function("f", [theta], [tip @ tip.T]), low, high)
     middle, spread = 0.5 * (mobility[0] + mobility[1]), 0.5 * (mobility[1] - mobility[0])
@@ -98,19 +98,19 @@ def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
     if np.any(eigenvalues[:, 0] <= loose):
         raise CertificateError("the tube comes too near to a singular configuration of the arm")
     weight, levers = magnitude(vector(device.gravity(theta)))[:, :, 0], magnitude(jacobian)
-    room = np.array(device.peak_torque) - weight.max(axis=0)
+    spare_torque = np.array(device.peak_torque) - weight.max(axis=0)
     friction = np.array(device.coulomb)
     return TubeBounds(
         mass_low=float(1.0 / (eigenvalues[:, -1] + loose).max()),
         mass_high=float(1.0 / (eigenvalues[:, 0] - loose).min()),
         mass_slope=slope(by_mass),
-        jacobian_slope=slope([turn @ back for turn in turns]),
+        jacobian_slope=slope([jacobian_slope @ back for jacobian_slope in jacobian_slopes]),
         coriolis=slope(by_coriolis),
         weight_slope=sup(back.T @ ca.jacobian(vector(device.gravity(theta)), theta) @ back),
         drag=sup(unit @ ca.diag(ca.DM(device.viscous)) @ unit.T),
         coulomb=float(np.linalg.norm(magnitude(back.T) @ friction, axis=1).max()),
         rounding=float(np.linalg.norm(levers @ (0.5 * np.array(device.encoder_step)), axis=1).max()),
-        motor_force=float((room / np.linalg.norm(levers, axis=1).max(axis=0)).min()),
+        motor_force=float((spare_torque / np.linalg.norm(levers, axis=1).max(axis=0)).min()),
     )
 
 
@@ -127,7 +127,7 @@ def _boxes(device: Device, curve: Trajectory, radius: float, back: Any) -> tuple
     """Boxes of θ that cover the tube, low and high (n, 3): one about each segment's middle, divided into parts.
 
     A straight path of the tip from the middle stays in the box if the joint motion along it, bounded by the rows of J⁻¹
-    over the box, does; this is checked.
+    over the box, stays in it; this is checked.
     """
     phases = curve.start + curve.duration * (np.arange(SEGMENTS) + 0.5) / SEGMENTS
     fine = curve.velocity(np.linspace(curve.start, curve.end, 16 * SEGMENTS))
@@ -135,8 +135,8 @@ def _boxes(device: Device, curve: Trajectory, radius: float, back: Any) -> tuple
     middles = np.array([device.angles(point) for point in curve.point(phases)])
     rows = np.linalg.norm(bounds(back, middles, middles)[1], axis=2)
     cuts = np.array(list(itertools.product(range(PARTS), repeat=3)))
-    for room in (1.1, 1.3, 1.6):
-        half = room * rows * reach
+    for enlargement in (1.1, 1.3, 1.6):
+        half = enlargement * rows * reach
         corner = (middles - half)[:, None] + 2.0 * half[:, None] * cuts / PARTS
         low, high = corner.reshape(-1, 3), (corner + 2.0 * half[:, None] / PARTS).reshape(-1, 3)
         ends = bounds(back, low, high)

@@ -1,4 +1,4 @@
-r"""Switching of crossing rivers: conditions under which the active river keeps the hand, and bounds of the dwell time.
+r"""Switching of crossing rivers: conditions under which the active river keeps the hand, and bounds on the dwell time.
 
 On river i, with a loop that is linear transverse to the curve, the hand's distance is at most D and the error of its
 measured velocity at most E,
@@ -8,10 +8,10 @@ measured velocity at most E,
 
 with G the peak gains of the sampled loop; U_max the hand's force, U_0 that of inertia and friction (`own_force`), U_q
 and ν the effects of encoder quantisation on the law's force and on the measured velocity. The velocity that selects a
-river is low-passed with the time constant τ_s, which lags behind that of the current by at most τ_s |φ̈| and increases
-no bound: its error is at most E_s = E + τ_s |φ̈|. So the mismatch of `HigherOrder` obeys s_i² ≤ S² = E_s² + g_i(D) with
-g = −2σ² ln w, as long as the river is active. The discount of a rival river's mismatch (see `mismatch`) removes at most
-the part of e across its tangent, so with u_j its unit tangent
+river is low-passed with the time constant τ_s. The filter amplifies no error, and lags behind the current's velocity by
+at most τ_s |φ̈|, so the error is at most E_s = E + τ_s |φ̈|. Hence, as long as the river is active, the mismatch of
+`HigherOrder` obeys s_i² ≤ S² = E_s² + g_i(D) with g = −2σ² ln w. The discount of a rival river's mismatch (see
+`mismatch`) removes at most the part of e across its tangent, so with u_j its unit tangent
 
 .. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E_s)^2 + g_j(d_j - D)
 
@@ -40,8 +40,9 @@ from controllers.curves.closest_point import closest_phases
 from controllers.fields.algebra.window import window
 from controllers.state import Array
 
-CORE = 0.1  # share of a tube's radius within which the hysteresis bounds the dwell time
-_RISE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))  # steepest ε/σ · d√g/dd in the core
+CORE = 0.1  # fraction of a tube's radius within which the hysteresis bounds the dwell time
+# Steepest ε/σ · d√g/dd in the core.
+_MAX_COST_SLOPE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Sharing:
     form : {"smooth", "discrete"}
         See `HigherOrder`.
     look : float
-        τ_s, time constant of the low-pass of the selecting velocity [s]; 0 for none.
+        τ_s, time constant of the low-pass on the selecting velocity [s]; 0 for none.
     """
 
     admission: float
@@ -79,7 +80,7 @@ class Rival:
     distance : Array, shape (n,)
         Distance of the curves [m].
     least : Array, shape (n,)
-        |φ̇_i · u_j − |φ̇_j||, the mismatch after the largest possible discount [m/s].
+        |φ̇_i · u_j − |φ̇_j||, the smallest possible mismatch: after the largest discount [m/s].
     angle : Array, shape (n,)
         Angle between the curves [rad].
     width : float
@@ -96,9 +97,9 @@ def rival(held: River, other: River) -> Rival:
     """Another river relative to `held`, at the phases of `held`."""
     points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
     phases, distance = closest_phases(other.curve.packed(), points)
-    theirs = other.curve.velocity(phases)
-    speed = np.linalg.norm(theirs, axis=1)
-    along = np.einsum("ni,ni->n", velocity, theirs) / speed
+    other_velocity = other.curve.velocity(phases)
+    speed = np.linalg.norm(other_velocity, axis=1)
+    along = np.einsum("ni,ni->n", velocity, other_velocity) / speed
     return Rival(
         distance=distance, least=np.abs(along - speed), width=other.width,
         angle=np.arccos(np.clip(along / np.linalg.norm(velocity, axis=1), -1.0, 1.0)),
@@ -107,7 +108,7 @@ def rival(held: River, other: River) -> Rival:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of the hand's deviation from the state in which its river carries it, under a bounded force.
+    """Bounds on the hand's deviation from the state in which its river carries it, under a bounded force.
 
     Attributes
     ----------
@@ -116,7 +117,7 @@ class Bounds:
     score : float
         S [m/s].
     room : float
-        Smaller of r + h − S and h + s_j − S [m/s]; the river keeps the hand if it is positive.
+        The smaller of r + h − S and h + s_j − S [m/s]; the river keeps the hand if this is positive.
     """
 
     distance: float
@@ -145,14 +146,14 @@ class Keeping:
         return self.sharing.look * float(turning.max())
 
     @cached_property
-    def _still(self) -> LinearLoop:
+    def _still_loop(self) -> LinearLoop:
         return self.held.still()
 
     @cached_property
     def reading(self) -> float:
         """Largest error of the tip's position by encoder quantisation [m]."""
         half = 0.5 * np.array(self.held.device.encoder_step)
-        return float(np.linalg.norm(np.abs(self._still.jacobian) @ half, axis=1).max())
+        return float(np.linalg.norm(np.abs(self._still_loop.jacobian) @ half, axis=1).max())
 
     @property
     def noise(self) -> float:
@@ -164,41 +165,41 @@ class Keeping:
     def _gains(self) -> tuple[float, float, float]:
         """G_d [m/N], G_e [m/(N s)], U_0 + U_q [N]."""
         river = self.held
-        loop = SampledLoop(self._still, river.sampling)
+        loop = SampledLoop(self._still_loop, river.sampling)
         own = float(own_force(river, river.moving()).max()) + river.k_r * self.reading + river.b_d * self.noise
         return peak_gain(loop, river.k_r, river.b_d).distance, _speed_gain(loop, river), own
 
     def bounds(self, push: float) -> Bounds:
-        """D, E and S for |U| ≤ push [N]: the least solution, by iteration from zero."""
+        """D, E and S for |U| ≤ push [N]: the smallest solution, by iteration from zero."""
         river, sharing = self.held, self.sharing
         by_force, by_speed, own = self._gains
-        lost = Bounds(math.inf, math.inf, math.inf, -math.inf)
+        unbounded = Bounds(math.inf, math.inf, math.inf, -math.inf)
         distance = speed = 0.0
         for _ in range(2000):
             if not (math.isfinite(distance + speed) and distance < river.width):
-                return lost
+                return unbounded
             share = float(window((distance / river.width) ** 2))
-            own_law = river.k_r * distance + river.b_d * speed
-            force = push + own + own_law * (1.0 - share)
-            after = by_force * force, by_speed * force + self.noise
-            if abs(after[0] - distance) < 1e-12 and abs(after[1] - speed) < 1e-12:
+            law_force = river.k_r * distance + river.b_d * speed
+            force = push + own + law_force * (1.0 - share)
+            updated = by_force * force, by_speed * force + self.noise
+            if abs(updated[0] - distance) < 1e-12 and abs(updated[1] - speed) < 1e-12:
                 break
-            distance, speed = after
+            distance, speed = updated
         else:
-            return lost
-        seen = speed + self.lag
-        score = math.sqrt(seen**2 + sharing.cost(distance, river.width))
-        return Bounds(distance, speed, score, self._room(distance, seen, score))
+            return unbounded
+        speed_error = speed + self.lag
+        score = math.sqrt(speed_error**2 + sharing.cost(distance, river.width))
+        return Bounds(distance, speed, score, self._keeping_margin(distance, speed_error, score))
 
-    def _room(self, distance: float, seen: float, score: float) -> float:
+    def _keeping_margin(self, distance: float, speed_error: float, score: float) -> float:
         """Distance of S from the values at which the river would lose the hand [m/s], for an error of at most E_s."""
         least = self.sharing.admission + self.sharing.hysteresis - score
         for other in self.rivals:
             inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
-            near = inside > 0.0
-            place = -6.0 * self.sharing.sigma**2 * np.log(inside[near])
-            theirs = np.sqrt(np.maximum(0.0, other.least[near] - seen) ** 2 + place)
-            least = min(least, float(np.min(self.sharing.hysteresis + theirs - score, initial=math.inf)))
+            inside_tube = inside > 0.0
+            distance_cost = -6.0 * self.sharing.sigma**2 * np.log(inside[inside_tube])
+            rival_score = np.sqrt(np.maximum(0.0, other.least[inside_tube] - speed_error) ** 2 + distance_cost)
+            least = min(least, float(np.min(self.sharing.hysteresis + rival_score - score, initial=math.inf)))
         return least
 
     def allowed(self, ceiling: float) -> float:
@@ -236,27 +237,27 @@ def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
               c = \frac{|e|}{\tau |\dot\varphi|} + \kappa\frac{\sigma}{\varepsilon}, \qquad
               |e| \le (r + h)\sqrt{1 + (d/\tau|\dot\varphi|)^2}
 
-    with a the largest acceleration, (U + f_c + k d + b |e|) over the least inertia felt at the tip; |e| also the
-    largest transverse speed; κ the steepest slope of √g in the core; ν and δ the quantisation errors of velocity and
-    position. A larger h admits faster hands, so that the bound does not grow without limit. It is at least one period,
-    since the field is evaluated once per period; for h ≤ 2(ν + c δ) it is no more than that.
+    with a the largest acceleration, (U + f_c + k d + b |e|) over the smallest inertia at the tip; |e| also bounds the
+    transverse speed; κ is the steepest slope of √g in the core; ν and δ are the quantisation errors of velocity and
+    position. A larger h admits faster hands, so the bound does not grow without limit. It is at least one period, since
+    the field is evaluated once per period, and exactly one period for h ≤ 2(ν + c δ).
     """
-    longest, period = math.inf, keepings[0].held.sampling.period
+    dwell, period = math.inf, keepings[0].held.sampling.period
     for keeping in keepings:
         river, sharing = keeping.held, keeping.sharing
         linear = river.still()
         inertia = np.linalg.eigvalsh(linear.jacobian @ np.linalg.inv(linear.mass) @ linear.jacobian.transpose(0, 2, 1))
         speeds = np.linalg.norm(river.curve.velocity(river.phases()), axis=1)
-        drawn = CORE * river.width * river.k_r / river.b_d
-        off = (sharing.admission + sharing.hysteresis) * math.sqrt(1.0 + (drawn / speeds.min()) ** 2)
+        spring_speed = CORE * river.width * river.k_r / river.b_d
+        error = (sharing.admission + sharing.hysteresis) * math.sqrt(1.0 + (spring_speed / speeds.min()) ** 2)
         joints = np.linalg.norm(np.linalg.inv(linear.jacobian), 2, axis=(1, 2)).max()
         friction = float(joints * np.linalg.norm(river.device.coulomb))
-        force = push + friction + river.k_r * CORE * river.width + river.b_d * off
-        by_place = off * river.k_r / river.b_d / float(speeds.min()) + _RISE * sharing.sigma / river.width
+        force = push + friction + river.k_r * CORE * river.width + river.b_d * error
+        by_place = error * river.k_r / river.b_d / float(speeds.min()) + _MAX_COST_SLOPE * sharing.sigma / river.width
         rounding = keeping.noise + by_place * keeping.reading
-        rate = float(inertia.max()) * force + by_place * off
-        longest = min(longest, max(0.0, sharing.hysteresis - 2.0 * rounding) / rate)
-    return max(period, longest)
+        rate = float(inertia.max()) * force + by_place * error
+        dwell = min(dwell, max(0.0, sharing.hysteresis - 2.0 * rounding) / rate)
+    return max(period, dwell)
 
 
 def switching(
@@ -264,7 +265,7 @@ def switching(
 ) -> Verdict:
     """Verdict on the switching of a bundle's rivers, for hands that push with at most `push` newtons.
 
-    Certified: every river keeps its hand, so that the active river never changes. Refuted: by the counterexample of a
+    Certified if every river keeps its hand, so that the active river never changes; refuted by the counterexample of a
     search. The margin is the additional push that would be allowed [N].
 
     Parameters
@@ -276,7 +277,7 @@ def switching(
     found : mapping
         Counterexample; empty if there is none.
     common : Common, optional
-        Common Lyapunov function of the rivers and of no river, for a hand that holds the stylus where rivers meet.
+        Common Lyapunov function of the rivers and of no river, for a hand on the stylus where rivers meet.
     """
     sharing = keepings[0].sharing
     allowed = min((keeping.allowed(ceiling) for keeping in keepings), default=-1.0)
@@ -301,15 +302,15 @@ def switching(
         "phases: a grid of the curves; forces below the limiter's",
     )
     if found:
-        said = f"a hand {found['kind']} at {found['time']:.3g} s, pushed with {found['force']} N"
-        return Verdict("refuted", said, -push, assumptions, found, figures)
+        summary = f"a hand {found['kind']} at {found['time']:.3g} s, pushed with {found['force']} N"
+        return Verdict("refuted", summary, -push, assumptions, found, figures)
     if sharing.form == "discrete" and allowed > push:
-        said = f"|U| ≤ {push:g} N never changes the river (up to {allowed:.3g} N): the dwell time is infinite"
-        return Verdict("certified", said, allowed - push, assumptions, {}, figures)
-    said = (
+        summary = f"|U| ≤ {push:g} N never changes the river (up to {allowed:.3g} N): the dwell time is infinite"
+        return Verdict("certified", summary, allowed - push, assumptions, {}, figures)
+    summary = (
         f"the bounds let a hand go that pushes with {push:g} N, and a search found none that is lost"
         if sharing.form == "discrete"
         else "smooth weights have no hysteresis and so no dwell time, and a search found no hand that is lost"
     )
-    said += f"; a rival weighs up to {figures['rival_weight']:.2g}"
-    return Verdict("unknown", said, None, assumptions, {}, figures)
+    summary += f"; a rival weighs up to {figures['rival_weight']:.2g}"
+    return Verdict("unknown", summary, None, assumptions, {}, figures)

@@ -1,6 +1,6 @@
-"""Search for counterexamples of switching: hands that crossing rivers lose or that chatter, on the linearised device.
+"""Search for counterexamples of switching: hands that crossing rivers lose, or chatter, on the linearised device.
 
-The device is linearised about one place: kinematics, inertia and weight are those there; the zero-order hold is exact;
+The device is linearised about one place, with its kinematics, inertia and weight there; the zero-order hold is exact;
 encoder quantisation and velocity filter are those of the servo. Coulomb friction is the torque that would stop a joint
 within the period, at most f_c. The law is the executed kernel.
 """
@@ -20,7 +20,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.state import Array, HandState
 
 LOST = 0.02  # [s] without an active river after which a hand counts as thrown out
-EARLIER, SECONDS = 0.6, 1.3  # [s] start of a hand before the rivers meet, and duration of its simulation
+EARLIER, SECONDS = 0.6, 1.3  # [s] time by which a hand starts before the rivers meet, and duration of its simulation
 CHANGES = 3  # changes of river within `LOST` that count as chattering
 
 
@@ -32,7 +32,7 @@ class Push(NamedTuple):
     force : tuple of float
         Force in H [N].
     start, duration : float
-        Begin and duration [s].
+        Start and duration [s].
     """
 
     force: tuple[float, float, float]
@@ -95,14 +95,14 @@ def course(field: HigherOrder, loop: SampledLoop, place: Array, start: Array, ve
     program, step = field.program(), np.array(device.encoder_step)
     memory, wrench = program.fresh_memory(), np.zeros(6)
     x = np.concatenate([np.linalg.solve(jacobian, start - place), np.linalg.solve(jacobian, velocity)])
-    last, rate = _rounded(x[:3], linear.theta[0], step), x[3:].copy()
+    previous, rate = _quantise(x[:3], linear.theta[0], step), x[3:].copy()
     points, river = np.zeros((n, 3)), np.zeros(n)
     for k in range(n):
-        read = _rounded(x[:3], linear.theta[0], step)
-        rate = sampling.keep * rate + (1.0 - sampling.keep) * (read - last) / sampling.period
-        last = read
+        measured = _quantise(x[:3], linear.theta[0], step)
+        rate = sampling.keep * rate + (1.0 - sampling.keep) * (measured - previous) / sampling.period
+        previous = measured
         points[k] = place + jacobian @ x[:3]
-        hand = HandState.at(place + jacobian @ read, jacobian @ rate, k * sampling.period)
+        hand = HandState.at(place + jacobian @ measured, jacobian @ rate, k * sampling.period)
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
         river[k] = memory[TRACE_RIVER]
         force = wrench[:3].copy()
@@ -111,16 +111,16 @@ def course(field: HigherOrder, loop: SampledLoop, place: Array, start: Array, ve
         torque = jacobian.T @ force
         stopping = linear.mass[0] @ x[3:] / sampling.period + torque
         torque -= np.clip(stopping, -np.array(device.coulomb), np.array(device.coulomb))
-        x = free @ x + driven @ (torque + linear.weight_theta[0] @ read)
+        x = free @ x + driven @ (torque + linear.weight_theta[0] @ measured)
     return Course(points, river)
 
 
-def _rounded(x: Array, theta: Array, step: Array) -> Array:
+def _quantise(x: Array, theta: Array, step: Array) -> Array:
     return np.asarray(step * np.rint((theta + x) / step) - theta, dtype=np.float64)
 
 
 def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = False) -> Failure | None:
-    """First failure of river `own` to keep its hand, or None; a hand that it never had cannot be taken over.
+    """First failure of river `own` to keep its hand, or None; only a hand that it once had can be taken over.
 
     Parameters
     ----------
@@ -133,10 +133,10 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
     pushed : bool
         Whether the hand pushes: then it may be taken over by another river.
     smooth : bool
-        Whether the form is smooth, with a force that does not jump: then only the final river and being lost count.
+        Whether the form is smooth, with a force that does not jump: then only the last river and a loss count.
     """
     window = max(CHANGES + 1, round(LOST / period))
-    had = np.logical_or.accumulate(river == own)
+    owned = np.logical_or.accumulate(river == own)
     changed = np.concatenate([[0.0], np.cumsum(np.diff(river) != 0.0)])
     lost = np.concatenate([[0.0], np.cumsum(river < 0.0)])
     for k in range(len(river)):
@@ -145,7 +145,7 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
             return Failure("chatters", k * period)
         if k >= window and lost[k + 1] - lost[k + 1 - window] >= window:
             return Failure("thrown out", k * period)
-        if not pushed and had[k] and river[k] >= 0.0 and river[k] != own and (not smooth or k == len(river) - 1):
+        if not pushed and owned[k] and river[k] >= 0.0 and river[k] != own and (not smooth or k == len(river) - 1):
             return Failure("taken over", k * period)
     return None
 
@@ -163,7 +163,7 @@ def counterexample(
     pushes: Iterable[float],
     simulate: Simulation,
 ) -> dict[str, object]:
-    """First hand that the field fails to keep, in the same way also in a simulation: initial state, force and times.
+    """First hand that the field fails to keep, confirmed by a simulation: initial state, force and times.
 
     The hands tried start on the river 0.6 s before the phase, at rest, or at the river's pace if a hand at rest would
     belong to another river. They are pushed towards the other river, away from it, along the river and against it, for
@@ -184,7 +184,7 @@ def counterexample(
     pushes : iterable of float
         Forces [N], tried in this order.
     simulate : callable
-        Simulation that confirms a failure; one that it does not show in the same way is no counterexample.
+        Simulation that confirms a failure; a failure that it does not reproduce is no counterexample.
 
     Returns
     -------
@@ -195,46 +195,46 @@ def counterexample(
     before = max(phase - EARLIER, river.curve.start + 1e-3) if not river.curve.periodic else phase - EARLIER
     linear = river.still()
     at = int(np.argmin(np.abs(river.phases() - phase)))
-    loop = _at(SampledLoop(linear, river.sampling), at)
+    loop = _at_phase(SampledLoop(linear, river.sampling), at)
     here = river.curve.point(river.phases()[at])
     ahead = along / np.linalg.norm(along)
     aside = towards - ahead * (ahead @ towards)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-12)
     smooth = field.form == "smooth"
     for newtons in pushes:
-        ways = [0.0 * ahead] if newtons == 0.0 else [aside, -aside, ahead, -ahead]
+        directions = [0.0 * ahead] if newtons == 0.0 else [aside, -aside, ahead, -ahead]
         starts = [(river.curve.point(before), 0.0 * ahead)]
         if newtons == 0.0 and not smooth:
             starts.append((place, 0.5 * (along + towards)))
         for start, velocity in starts:
-            for way in ways:
-                push = Push(tuple((newtons * way).tolist()), EARLIER - 0.15, 0.2)
-                led = start is place
-                went = course(field, loop, here, start, velocity, SECONDS, river.device, push)
-                if not led and went.river[0] not in (-1.0, own):
+            for direction in directions:
+                push = Push(tuple((newtons * direction).tolist()), EARLIER - 0.15, 0.2)
+                at_meeting = start is place
+                simulated = course(field, loop, here, start, velocity, SECONDS, river.device, push)
+                if not at_meeting and simulated.river[0] not in (-1.0, own):
                     velocity = river.curve.velocity(before)
-                    went = course(field, loop, here, start, velocity, SECONDS, river.device, push)
-                ended = failure(went.river, river.sampling.period, own, newtons > 0.0 or led, smooth)
-                if ended is None:
+                    simulated = course(field, loop, here, start, velocity, SECONDS, river.device, push)
+                outcome = failure(simulated.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
+                if outcome is None:
                     continue
-                again = simulate(start, velocity, SECONDS, push)
-                judged = failure(again.river, river.sampling.period, own, newtons > 0.0 or led, smooth)
-                if judged is not None and judged.kind == ended.kind:
+                confirmation = simulate(start, velocity, SECONDS, push)
+                confirmed = failure(confirmation.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
+                if confirmed is not None and confirmed.kind == outcome.kind:
                     return {
-                        "kind": ended.kind, "time": ended.time, "simulated_time": judged.time,
+                        "kind": outcome.kind, "time": outcome.time, "simulated_time": confirmed.time,
                         "force": [float(f) for f in push.force], "push_start": push.start,
                         "push_duration": push.duration, "river": own, "p": start, "v": velocity,
                     }  # fmt: skip
     return {}
 
 
-def _at(loop: SampledLoop, at: int) -> SampledLoop:
+def _at_phase(loop: SampledLoop, at: int) -> SampledLoop:
     """The loop restricted to one of its phases."""
-    linear, one = loop.linear, slice(at, at + 1)
-    cut = {
-        name: getattr(linear, name)[one]
+    linear, selection = loop.linear, slice(at, at + 1)
+    restricted = {
+        name: getattr(linear, name)[selection]
         for name in ("phases", "theta", "rate", "jacobian", "mass", "inverse_theta", "inverse_rate", "weight_theta",
                      "velocity", "shift")
     }  # fmt: skip
-    cut |= {name: getattr(linear, name)[:, one] for name in ("unit_theta", "unit_omega")}
-    return SampledLoop(replace(linear, **cut), loop.sampling)
+    restricted |= {name: getattr(linear, name)[:, selection] for name in ("unit_theta", "unit_omega")}
+    return SampledLoop(replace(linear, **restricted), loop.sampling)

@@ -1,1 +1,1 @@
-"""Laws of force as values: what every law can do, sums and weights of laws, and how a composition is evaluated."""
+"""Force laws as values: their common interface, sums and weights of laws, and the evaluation of a composition."""

@@ -15,7 +15,7 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import kernels_of
 from controllers.state import Array
 
-_SHORT = 16  # an array of more numbers than this is described by a hash
+_MAX_LISTED = 16  # largest array that is listed; a larger one is described by a hash
 
 
 def digest(*parts: Array | bytes) -> str:
@@ -41,7 +41,7 @@ def described(value: object) -> object:
         return {"map": type(value).__name__, "kernels": kernels, "numbers": digest(params, memory)}
     if isinstance(value, np.ndarray):
         array = np.asarray(value, dtype=np.float64)
-        return array.tolist() if array.size <= _SHORT else {"shape": list(array.shape), "numbers": digest(array)}
+        return array.tolist() if array.size <= _MAX_LISTED else {"shape": list(array.shape), "numbers": digest(array)}
     if hasattr(value, "description"):
         return cast(Any, value).description()
     if is_dataclass(value) and not isinstance(value, type):
@@ -59,36 +59,36 @@ def parts_of(value: Any) -> dict[str, object]:
 def code_digest(function: object) -> str:
     """Hash of what a function computes: its code, the constants that it reads, and the functions that it calls.
 
-    Python functions enter with their code, modules, classes and built-in functions with their names, every other value
-    with its content, as pickled. A value that cannot be pickled, as an open file, makes the hash another one each time:
-    what was found out about such a law is never taken for what runs.
+    Python functions contribute their code; modules, classes and built-in functions their names; every other value its
+    pickled content. A value that cannot be pickled, such as an open file, changes the hash each time, so that no
+    earlier result for such a law is ever reused.
     """
-    return digest(*_identity(function, set()))
+    return digest(*_content_parts(function, set()))
 
 
-def _identity(value: object, seen: set[int]) -> Iterator[bytes]:
+def _content_parts(value: object, seen: set[int]) -> Iterator[bytes]:
     value = getattr(value, "py_func", value)
     if isinstance(value, CodeType):
         yield value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode()
         for constant in value.co_consts:
-            yield from _identity(constant, seen)
+            yield from _content_parts(constant, seen)
     elif isinstance(value, FunctionType):
         if id(value) not in seen:
             seen.add(id(value))
-            yield from _identity(value.__code__, seen)
+            yield from _content_parts(value.__code__, seen)
             read = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
             for cell in (*(value.__defaults__ or ()), *(c.cell_contents for c in value.__closure__ or ()), *read):
-                yield from _identity(cell, seen)
-    elif isinstance(value, _NAMED):
+                yield from _content_parts(cell, seen)
+    elif isinstance(value, _IDENTIFIED_BY_NAME):
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
     else:
-        yield _content(value)
+        yield _pickled(value)
 
 
-_NAMED = (ModuleType, type, BuiltinFunctionType, np.ufunc)
+_IDENTIFIED_BY_NAME = (ModuleType, type, BuiltinFunctionType, np.ufunc)
 
 
-def _content(value: object) -> bytes:
+def _pickled(value: object) -> bytes:
     try:
         return pickle.dumps(value, protocol=4)
     except (pickle.PicklingError, TypeError, AttributeError, ValueError):

@@ -5,9 +5,9 @@ that of an operation a `Join`; the last number is the offset of a packed `Trajec
 push wrenches on a stack (postfix notation), so that sums and blends of fields are instructions too.
 
 The first `TRACE_SIZE` numbers of the memory are the trace of the last evaluation, which is recorded: ``[t*, c (3), d,
-row, attractor, river]``: phase, point and distance of the nearest curve, the row of its law, and the phase of the
-attracting point (t* itself, or the bunny's). With no curve near, d is infinite. The last is the number of the active
-river of a higher-order field, −1 for none or without such a field.
+row, attractor, river]``: phase, point and distance of the nearest curve, the row of its law, the phase of the
+attracting point (t* itself, or the bunny's), and the number of the active river of a higher-order field (−1 for none,
+or without such a field). With no curve near, d is infinite.
 """
 
 from collections.abc import Callable
@@ -35,8 +35,8 @@ class Join(IntEnum):
 
 
 OP_CODE, OP_PARAMETERS, OP_MEMORY, OP_CURVE = range(4)
-"""Places in a row of instructions."""
-STACK = 16  # depth of the stack: most wrenches that may be pending at once
+"""Columns of a row of instructions."""
+STACK = 16  # depth of the stack: largest number of pending wrenches
 
 TRACE_PHASE, TRACE_POINT, TRACE_DISTANCE, TRACE_ROW, TRACE_ATTRACTOR, TRACE_RIVER, TRACE_SIZE = 0, 1, 4, 5, 6, 7, 8
 
@@ -58,7 +58,7 @@ def empty_trace() -> Array:
 
 @njit
 def leave_trace(params: Array, curve: int, memory: Array, phase: float, distance: float, attractor: float) -> None:
-    """Write the closest point of a curve to the trace, unless a nearer one stands there."""
+    """Write the closest point of a curve to the trace, unless the trace has a nearer one."""
     if distance < memory[TRACE_DISTANCE]:
         leave_place(memory, phase, curve_point(params, curve, phase), distance, attractor)
 
@@ -67,7 +67,7 @@ def leave_trace(params: Array, curve: int, memory: Array, phase: float, distance
 def leave_place(
     memory: Array, phase: float, place: tuple[float, float, float], distance: float, attractor: float
 ) -> None:
-    """Write the nearest point of a law [m] to the trace, unless a nearer one stands there."""
+    """Write the nearest point of a law [m] to the trace, unless the trace has a nearer one."""
     if distance < memory[TRACE_DISTANCE]:
         memory[TRACE_PHASE], memory[TRACE_DISTANCE], memory[TRACE_ATTRACTOR] = phase, distance, attractor
         memory[TRACE_POINT], memory[TRACE_POINT + 1], memory[TRACE_POINT + 2] = place

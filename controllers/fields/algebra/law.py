@@ -1,4 +1,4 @@
-"""Laws of force and their algebra: the interface shared by built-in, composed and user-defined fields."""
+"""Force laws and their algebra: the interface shared by built-in, composed and user-defined fields."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +33,7 @@ from controllers.walking.walking import follow_hand
 
 
 class Law(ABC):
-    r"""A field of force F(hand), and the algebra of fields.
+    r"""A force field F(hand), and the algebra of fields.
 
     .. math:: F \pm F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
 
@@ -41,12 +41,12 @@ class Law(ABC):
     """
 
     @abstractmethod
-    def _composed(self) -> "Program":
-        """The field as it is executed, for `program`, which asks for it once."""
+    def _compose(self) -> "Program":
+        """The field as it is executed; called once, by `program`."""
 
     @cached_property
     def _program(self) -> "Program":
-        return self._composed()
+        return self._compose()
 
     def program(self) -> "Program":
         """Compiled form of the field, which the servo runs."""
@@ -54,7 +54,7 @@ class Law(ABC):
 
     @property
     def curves(self) -> tuple[Trajectory, ...]:
-        """Curves along which the field leads, in the order of its laws; none of a law without a curve."""
+        """Curves along which the field leads, in the order of its laws; empty for a law without a curve."""
         curve = getattr(self, "curve", None)
         return (curve,) if isinstance(curve, Trajectory) else ()
 
@@ -77,7 +77,7 @@ class Law(ABC):
         """Sum of two fields."""
         of_kind("the other field", other, Law)
         first, second = self.program(), other.program()
-        if second.depth == STACK > first.depth:  # one wrench more would be pending below it: it goes first
+        if second.depth == STACK > first.depth:  # evaluated second, it would overflow the stack
             first, second = second, first
         return first.joined(second, Join.ADD)
 
@@ -167,7 +167,7 @@ class MapFeed(NamedTuple):
 
 
 class LawPlace(NamedTuple):
-    """Where a law of a program has its numbers.
+    """Offsets of the numbers of a law in a program.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class LawPlace(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Program(Law):
-    """Field of force in the form that the servo runs.
+    """Force field in the form that the servo runs.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class Program(Law):
     Raises
     ------
     ParameterError
-        If the instructions do not leave exactly one wrench, need a stack deeper than `STACK`, or a law has no kernel.
+        If the instructions do not leave exactly one wrench or need a stack deeper than `STACK`, or a law has no kernel.
     """
 
     ops: IntArray
@@ -236,7 +236,7 @@ class Program(Law):
 
     @property
     def depth(self) -> int:
-        """The most wrenches that are pending at once."""
+        """Largest number of wrenches that are pending at once."""
         return int(self._depths.max())
 
     @property
@@ -272,19 +272,19 @@ class Program(Law):
     def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
         """Both programs one after the other, then an operation that combines their two wrenches into one."""
         kernels = (*self.kernels, *(kernel for kernel in other.kernels if kernel not in self.kernels))
-        gap, kept = len(self.params), len(self.memory) - TRACE_SIZE
-        moved = other.ops + np.array([0, gap, kept, gap])
-        laws = moved[:, OP_CODE] >= 0
-        moved[laws, OP_CODE] = [kernels.index(other.kernels[code]) for code in moved[laws, OP_CODE]]
+        params_shift, memory_shift = len(self.params), len(self.memory) - TRACE_SIZE
+        shifted_ops = other.ops + np.array([0, params_shift, memory_shift, params_shift])
+        laws = shifted_ops[:, OP_CODE] >= 0
+        shifted_ops[laws, OP_CODE] = [kernels.index(other.kernels[code]) for code in shifted_ops[laws, OP_CODE]]
         return Program(
-            np.vstack([self.ops, moved, [[join, gap + len(other.params), 0, 0]]]),
+            np.vstack([self.ops, shifted_ops, [[join, params_shift + len(other.params), 0, 0]]]),
             np.concatenate([self.params, other.params, params]),
             np.concatenate([self.memory, other.memory[TRACE_SIZE:]]),
             kernels,
             self.laws + other.laws,
-            self.python_feeds + tuple(feed.moved(gap, kept) for feed in other.python_feeds),
-            self.map_feeds + tuple(feed.moved(gap, kept) for feed in other.map_feeds),
-            self.walker_feeds + tuple(feed.moved(gap, kept) for feed in other.walker_feeds),
+            self.python_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.python_feeds),
+            self.map_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.map_feeds),
+            self.walker_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.walker_feeds),
         )
 
     def followed(self, join: Join, params: Sequence[float]) -> "Program":
@@ -292,7 +292,7 @@ class Program(Law):
         ops = np.vstack([self.ops, [[join, len(self.params), 0, 0]]])
         return replace(self, ops=ops, params=np.concatenate([self.params, params]))
 
-    def _composed(self) -> "Program":
+    def _compose(self) -> "Program":
         return self
 
     @cached_property
@@ -314,7 +314,7 @@ class Program(Law):
         return self.memory.copy()
 
     def fresh_walkers(self) -> Walkers:
-        """Walkers for a new run; their kernel is compiled in this process, unless it is."""
+        """Walkers for a new run; their kernel is compiled in this process if it is not compiled yet."""
         walkers = fresh_walkers(self.walker_feeds)
         return walkers.linked(address_of(follow_hand, LAW_ARGUMENTS)) if self.walker_feeds else walkers
 
@@ -327,12 +327,12 @@ class Program(Law):
         stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
         for slot, _, haptic_map in self.map_feeds:
             first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT
-            kept = memory[last : last + len(haptic_map.compiled().memory)]
-            memory[slot:first] = haptic_map.pose(stylus, kept)
-            memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
+            map_memory = memory[last : last + len(haptic_map.compiled().memory)]
+            memory[slot:first] = haptic_map.pose(stylus, map_memory)
+            memory[first:last] = haptic_map.jacobian(stylus, map_memory).ravel()
 
     def places(self) -> tuple[LawPlace, ...]:
-        """Where the laws have their parameters and their memory, in the order of their instructions."""
+        """Offsets of the laws' parameters and memory, in the order of their instructions."""
         rows = self.ops[self.ops[:, OP_CODE] >= 0].tolist()
         return tuple(
             LawPlace(law, row[OP_PARAMETERS], row[OP_MEMORY]) for law, row in zip(self.laws, rows, strict=True)
@@ -351,24 +351,24 @@ class Program(Law):
     def with_law(self, law: Law, other: Law) -> "Program":
         """The same composition with `law` replaced by `other`."""
         stack: list[Program] = []
-        for what, numbers in self.composition():
-            if isinstance(what, Law):
-                stack.append((other if what is law else what).program())
+        for item, numbers in self.composition():
+            if isinstance(item, Law):
+                stack.append((other if item is law else item).program())
                 continue
             last = stack.pop()
             stack.append(
-                last.followed(what, list(numbers)) if what.takes == 1
-                else stack.pop().joined(last, what, list(numbers))
+                last.followed(item, list(numbers)) if item.takes == 1
+                else stack.pop().joined(last, item, list(numbers))
             )  # fmt: skip
         return stack[0]
 
     def description(self) -> dict[str, object]:
         """Composition of the field: operations, and laws with their parameters by name."""
         stack: list[dict[str, object]] = []
-        for what, numbers in self.composition():
-            if isinstance(what, Law):
-                stack.append(what.description())
+        for item, numbers in self.composition():
+            if isinstance(item, Law):
+                stack.append(item.description())
                 continue
-            taken, stack = stack[len(stack) - what.takes :], stack[: len(stack) - what.takes]
-            stack.append({what.name.lower(): taken, "parameters": numbers.tolist()})
+            taken, stack = stack[len(stack) - item.takes :], stack[: len(stack) - item.takes]
+            stack.append({item.name.lower(): taken, "parameters": numbers.tolist()})
         return stack[0]

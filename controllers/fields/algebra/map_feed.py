@@ -1,4 +1,4 @@
-"""Inputs of laws from a haptic map: its pose and derivative at the stylus, written to their memory in each tick.
+"""Inputs of laws from a haptic map: its pose and derivative at the stylus, written to their memory at each tick.
 
 The servo calls `feed_maps` before `evaluate`, so the kernels of the laws do not depend on those of the maps.
 """
@@ -15,8 +15,8 @@ from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HAND_POSITION, Array, IntArray
 
 
-class _Row(IntEnum):
-    """Places in a row of `Maps.feeds`."""
+class _Column(IntEnum):
+    """Columns of `Maps.feeds`."""
 
     SLOT = 0
     AT = 1
@@ -32,7 +32,7 @@ class Maps(NamedTuple):
     Attributes
     ----------
     feeds : IntArray, shape (n, 6)
-        A row each: `slot`, `at`, its first stage in `stages` and the one after its last, nq, nv.
+        One row per map: `slot`, `at`, its first stage in `stages` and the one after its last, nq, nv.
     stages : IntArray, shape (m, 3)
         Stages of all maps, linked or not (`controllers.haptic_map.map_stages`).
     """
@@ -43,7 +43,7 @@ class Maps(NamedTuple):
 
 def unlinked_maps(feeds: tuple[MapFeed, ...]) -> Maps:
     """The maps of a field's `map_feeds`, without the addresses of their kernels."""
-    rows, stages = np.zeros((len(feeds), len(_Row)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
+    rows, stages = np.zeros((len(feeds), len(_Column)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
     for row, (slot, at, haptic_map) in zip(rows, feeds, strict=True):
         first, stages = len(stages), np.concatenate([stages, haptic_map.compiled().stages])
         row[:] = slot, at, first, len(stages), haptic_map.nq, haptic_map.nv
@@ -64,8 +64,8 @@ def feed_maps(maps: Maps, params: Array, memory: Array, hand: Array) -> None:
     stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
     for n in range(maps.feeds.shape[0]):
         row = maps.feeds[n]
-        slot, nq, nv = row[_Row.SLOT], row[_Row.NQ], row[_Row.NV]
+        slot, nq, nv = row[_Column.SLOT], row[_Column.NQ], row[_Column.NV]
         first, last = slot + nq, slot + nq + nv * STYLUS_TANGENT
         pose, jacobian = memory[slot:first], memory[first:last].reshape((nv, STYLUS_TANGENT))
-        stages = maps.stages[row[_Row.FIRST] : row[_Row.LAST]]
-        evaluate_map_jacobian(stages, params[row[_Row.AT] :], stylus, memory[last:], pose, jacobian)
+        stages = maps.stages[row[_Column.FIRST] : row[_Column.LAST]]
+        evaluate_map_jacobian(stages, params[row[_Column.AT] :], stylus, memory[last:], pose, jacobian)

@@ -1,6 +1,6 @@
 """Evaluation of a field: one compiled interpreter of its instructions, the same for every composition.
 
-Every law has a kernel with the same signature, called by its address: so only kernels that are used are compiled, and
+Every law has a kernel with the same signature, called by its address. So only kernels that are used are compiled, and
 a user-defined law is called like a built-in one.
 """
 

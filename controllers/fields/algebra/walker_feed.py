@@ -1,7 +1,7 @@
-"""Inputs of laws from a walker: it is advanced, and what they read of it is written to their memory, in each tick.
+"""Inputs of laws from a walker: at each tick it is advanced, and its state is written to the memory of the laws.
 
-The servo calls `feed_walkers` before `evaluate`. The walkers of a field are a state beside its memory: laws only read
-what they are told of them (`controllers.walking.walking.Followed`), and a haptic map may read them, too.
+The servo calls `feed_walkers` before `evaluate`. The walkers of a field are a state separate from its memory: laws only
+read their copy of it (`controllers.walking.walking.Followed`). A haptic map may read the walkers, too.
 """
 
 from enum import IntEnum
@@ -18,8 +18,8 @@ from controllers.walking.walking import Walking
 _call = kernel_call(LAW_ARGUMENTS)
 
 
-class _Row(IntEnum):
-    """Places in a row of `Walkers.feeds`."""
+class _Column(IntEnum):
+    """Columns of `Walkers.feeds`."""
 
     KERNEL = 0
     SLOT = 1
@@ -28,7 +28,7 @@ class _Row(IntEnum):
 
 
 class WalkerFeed(NamedTuple):
-    """What a law reads of a walker, written into its memory.
+    """The part of a walker's state that a law reads, written into its memory.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class Walkers(NamedTuple):
     Attributes
     ----------
     feeds : IntArray, shape (n, 4)
-        A row each: address of the kernel (0 until linked), `slot`, `at`, and offset of its walker in `state`.
+        One row per feed: address of the kernel (0 until linked), `slot`, `at`, and offset of its walker in `state`.
     state : Array
-        Numbers of the walkers, one after the other; written.
+        State of the walkers, one after the other; written.
     """
 
     feeds: IntArray
@@ -65,25 +65,25 @@ class Walkers(NamedTuple):
     def linked(self, kernel: int) -> "Walkers":
         """The same walkers with the address of the kernel `controllers.walking.walking.follow_hand`."""
         feeds = self.feeds.copy()
-        feeds[:, _Row.KERNEL] = kernel
+        feeds[:, _Column.KERNEL] = kernel
         return self._replace(feeds=feeds)
 
 
 def fresh_walkers(feeds: tuple[WalkerFeed, ...]) -> Walkers:
-    """Walkers for a new run, one for each walking that the feeds name; not linked."""
+    """Walkers for a new run, one for each `Walking` of the feeds; not linked."""
     states: list[Array] = []
-    places: dict[int, int] = {}
+    offsets: dict[int, int] = {}
     for feed in feeds:
-        if id(feed.walking) not in places:
-            places[id(feed.walking)] = sum(map(len, states))
+        if id(feed.walking) not in offsets:
+            offsets[id(feed.walking)] = sum(map(len, states))
             states.append(feed.walking.fresh())
-    rows = np.array([[0, slot, at, places[id(walking)]] for slot, at, walking in feeds], dtype=np.int64)
-    return Walkers(rows.reshape(-1, len(_Row)), np.concatenate([np.zeros(0), *states]))
+    rows = np.array([[0, slot, at, offsets[id(walking)]] for slot, at, walking in feeds], dtype=np.int64)
+    return Walkers(rows.reshape(-1, len(_Column)), np.concatenate([np.zeros(0), *states]))
 
 
 @njit
 def feed_walkers(walkers: Walkers, params: Array, memory: Array, hand: Array) -> None:
-    """Advance the walkers of a field to the hand's time, and write what its laws read of them into its memory.
+    """Advance the walkers of a field to the hand's time, and write the state that its laws read into its memory.
 
     Parameters
     ----------
@@ -95,6 +95,6 @@ def feed_walkers(walkers: Walkers, params: Array, memory: Array, hand: Array) ->
     rows = walkers.feeds
     for n in range(rows.shape[0]):
         _call(
-            rows[n, _Row.KERNEL],
-            (params, rows[n, _Row.AT], rows[n, _Row.SLOT], walkers.state, rows[n, _Row.PLACE], hand, memory),
+            rows[n, _Column.KERNEL],
+            (params, rows[n, _Column.AT], rows[n, _Column.SLOT], walkers.state, rows[n, _Column.PLACE], hand, memory),
         )

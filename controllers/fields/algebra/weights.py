@@ -13,9 +13,9 @@ from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
-_POINT = 1e-9  # [m] a ball that no hand meets
+_MIN_RADIUS = 1e-9  # [m] smallest radius of a ball; a smaller one would never contain a hand
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
-_KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # row of a weight: kind, flag for 1 − s, four numbers
+_KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # layout of a weight's row: kind, flag for 1 − s, four numbers
 
 
 @njit
@@ -89,7 +89,7 @@ class Weight:
         place = numbers_of("centre", centre)
         if place.shape != (3,):
             raise ParameterError(f"the centre of a ball is {place.tolist()}; expected three numbers")
-        return _weight(_BALL, *place.tolist(), checked("radius", radius, "m", _POINT, infinite=True) ** -2)
+        return _weight(_BALL, *place.tolist(), checked("radius", radius, "m", _MIN_RADIUS, infinite=True) ** -2)
 
     @staticmethod
     def speed(low: float, high: float) -> "Weight":

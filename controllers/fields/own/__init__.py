@@ -1,1 +1,1 @@
-"""Laws of one's own: a function, interpreted or compiled, made into a law of force."""
+"""User-defined laws: a function, interpreted or compiled, as a force law."""

@@ -1,4 +1,4 @@
-"""User-defined laws of force compiled by numba: as cheap to evaluate as the built-in ones."""
+"""User-defined force laws compiled by numba: as cheap to evaluate as the built-in ones."""
 
 import re
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class CompiledLaw(FunctionLaw):
         Raises
         ------
         ParameterError
-            If they are not finite, or the function raises: compiled code does not say whose error it is.
+            If they are not finite, or the function raises: compiled code does not name the source of an error.
         """
         try:
             return super().wrench(hand)
@@ -64,7 +64,7 @@ class CompiledLaw(FunctionLaw):
                 f"{self.place} raised {type(error).__name__}: {error}; for a hand at p = {np.round(hand.p, 4).tolist()}"
             ) from error
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         numbers = [float(value) for value in self.parameters.values()]
         return Program.of(self, _kernel(self.function, len(numbers)), numbers, [])
 
@@ -76,26 +76,26 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
     signature = (_HAND, *[_NUMBER] * count)
     try:
         compiled.compile(signature)
-    except Exception as error:  # NumbaError, and whatever the modules raise that the function names
+    except Exception as error:  # NumbaError, and whatever the modules that the function uses raise
         at = re.findall(r'File "[^"]*", line (\d+)', str(error))
         where = f"in line {at[-1]}: " if at else ""
         raise ParameterError(
             f"{place_of(function)} cannot be compiled: {where}{_reason(str(error))}. Expected a function of numbers, "
             "see docs/tutorials/your-own-law.md"
         ) from None
-    given: Any = compiled.overloads[signature].signature.return_type
-    tupled = isinstance(given, types.BaseTuple)
-    if not tupled or len(given) not in (3, 6) or not all(_is_number(kind) for kind in given):  # pyright: ignore[reportGeneralTypeIssues]
+    return_type: Any = compiled.overloads[signature].signature.return_type
+    is_tuple = isinstance(return_type, types.BaseTuple)
+    if not is_tuple or len(return_type) not in (3, 6) or not all(_is_number(kind) for kind in return_type):  # pyright: ignore[reportGeneralTypeIssues]
         raise ParameterError(
-            f"{place_of(function)} returns {given}; expected a tuple of three numbers, the force [N], or of six, "
+            f"{place_of(function)} returns {return_type}; expected a tuple of three numbers, the force [N], or of six, "
             "with the moment [N m]"
         )
-    if len(given) == 6 and _count_in_python(function) == 3:  # pyright: ignore[reportUnknownArgumentType]
+    if len(return_type) == 6 and _count_in_python(function) == 3:  # pyright: ignore[reportUnknownArgumentType]
         raise ParameterError(
             f"{place_of(function)} gives six numbers compiled and three in Python: vectors of a hand are tuples in a "
             "compiled law, which + joins; expected sums of their components"
         )
-    write, numbers_of = _write_force if len(given) == 3 else _write_wrench, _reader(count)
+    write, numbers_of = _write_force if len(return_type) == 3 else _write_wrench, _make_reader(count)
 
     @njit
     def own_law(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
@@ -105,21 +105,21 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
 
 
 def _count_in_python(function: Callable[..., Any]) -> int | None:
-    """How many numbers a function gives of a hand whose vectors are arrays; None if it raises."""
+    """How many numbers a function returns for a hand whose vectors are arrays; None if it raises."""
     try:
         return int(np.size(function(HandState.at(np.full(3, 0.01), np.full(3, 0.01), 0.0))))
-    except Exception:  # whatever it does not do outside compiled code
+    except Exception:  # whatever fails outside compiled code
         return None
 
 
-def _reason(said: str) -> str:
-    """What numba says of a function in one line."""
-    lines = [line.strip() for line in said.splitlines()]
+def _reason(message: str) -> str:
+    """Numba's message about a function, in one line."""
+    lines = [line.strip() for line in message.splitlines()]
     first = next((line for line in lines if line and not line.startswith("Failed in")), "no reason given")
     if field := re.match(r"Unknown attribute '(\w+)' of type HandState", first):
         return f"a hand has no {field[1]}; it has {', '.join(HandState._fields)}"
     calls = [line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")]
-    if first.startswith("No implementation of function") and calls:  # the call comes some lines below
+    if first.startswith("No implementation of function") and calls:  # the call is some lines below
         return f"there is no {calls[0]} for arguments of these types"
     return first.rstrip(".:")
 
@@ -128,7 +128,7 @@ def _is_number(kind: Any) -> bool:
     return isinstance(types.unliteral(kind), types.Float | types.Integer | types.Boolean)
 
 
-def _reader(count: int) -> Callable[[Array, int], tuple[float, ...]]:
+def _make_reader(count: int) -> Callable[[Array, int], tuple[float, ...]]:
     """Compiled function that reads `count` consecutive numbers of an array as a tuple."""
     if count == 0:
 

@@ -1,4 +1,4 @@
-"""Laws of force given by a user's Python function with named parameters."""
+"""Force laws given by a user's Python function with named parameters."""
 
 import math
 import reprlib
@@ -22,7 +22,7 @@ from controllers.state import Array, HandState, Wrench
 class FunctionLaw(Law):
     """Field F(hand; parameters), computed by a function; made by `controllers.fields.own.own_law.law`.
 
-    The object is a law with its current parameters; calling it with keyword arguments gives the same law with those
+    The object is a law with its current parameters; a call with keyword arguments returns the same law with those
     parameters replaced.
 
     Parameters
@@ -48,7 +48,7 @@ class FunctionLaw(Law):
                 raise ParameterError(f"{name} of {self.place} must be a finite number, got {reprlib.repr(value)}")
         given: Mapping[str, Any] = self.parameters
         plain = {name: float(value) if isinstance(value, Fraction) else value for name, value in given.items()}
-        object.__setattr__(self, "parameters", plain)  # a fraction is no number to NumPy
+        object.__setattr__(self, "parameters", plain)  # NumPy does not accept a Fraction as a number
 
     def __call__(self, **parameters: float) -> Self:
         """The same law with other parameters.
@@ -80,22 +80,22 @@ class FunctionLaw(Law):
 
     def six_numbers(self, hand: HandState) -> Array:
         """Force [N] and moment [N m] of the function at a hand state, shape (6,); a moment not returned is zero."""
-        given: Any = self.function(hand, **self.parameters)
-        if given is None:
+        result: Any = self.function(hand, **self.parameters)
+        if result is None:
             raise ParameterError(
                 f"{self.place} returned None; expected a return statement with three numbers, the force [N], or six, "
                 "with the moment [N m]"
             )
         try:
-            numbers = np.asarray(given)
-            if numbers.dtype.kind not in "biufO" or np.ma.is_masked(given):  # text, complex; masked: no number
+            numbers = np.asarray(result)
+            if numbers.dtype.kind not in "biufO" or np.ma.is_masked(result):  # text, complex; masked: no number
                 raise TypeError
             numbers = numbers.astype(np.float64)
-        except ControllerError:  # of a certificate's symbol, which says itself why it is no number
+        except ControllerError:  # from a certificate's symbol, whose message says why it is not a number
             raise
         except (TypeError, ValueError, OverflowError):
             raise ParameterError(
-                f"{self.place} gave {reprlib.repr(given)}; expected a force of three numbers [N], or six with the "
+                f"{self.place} gave {reprlib.repr(result)}; expected a force of three numbers [N], or six with the "
                 "moment [N m]"
             ) from None
         if numbers.shape not in ((3,), (6,)):

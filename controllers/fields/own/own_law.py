@@ -1,4 +1,4 @@
-"""User-defined laws of force: the decorator `law` turns a function into a field."""
+"""User-defined force laws: the decorator `law` turns a function into a field."""
 
 import inspect
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
     Raises
     ------
     ParameterError
-        If the function is called ``limited``, its first argument is not ``hand``, another one has no number as its
+        If the function is called ``limited``, its first argument is not ``hand``, another argument has no number as its
         default, or it cannot be compiled.
     """
     of_kind("compiled", compiled, bool)
@@ -51,7 +51,7 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
         raise ParameterError(f"a law is made from a function law(hand, …); got {function!r}")
     make = CompiledLaw if compiled else PythonLaw
 
-    def made(function: _Function) -> PythonLaw | CompiledLaw:
+    def decorate(function: _Function) -> PythonLaw | CompiledLaw:
         plain = getattr(function, "py_func", function)
         if getattr(plain, "__name__", "") == Law.limited.__name__:
             raise ParameterError(
@@ -60,13 +60,13 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
             )
         return make(plain, _parameters(plain))
 
-    return made if function is None else made(function)
+    return decorate if function is None else decorate(function)
 
 
 def _parameters(function: _Function) -> dict[str, float]:
     try:
         given = list(inspect.signature(function).parameters.values())
-    except ValueError:  # of some types and functions in C, which do not tell
+    except ValueError:  # some types and functions in C have no signature
         raise ParameterError(f"a law is made from a function law(hand, …); got {function!r}") from None
     if alone := [one.name for one in given if one.kind is one.POSITIONAL_ONLY]:
         raise ParameterError(

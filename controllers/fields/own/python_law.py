@@ -1,4 +1,4 @@
-"""Laws of force in plain Python, usable wherever a compiled law is."""
+"""Force laws in plain Python, usable wherever a compiled law is."""
 
 from dataclasses import dataclass
 
@@ -25,6 +25,6 @@ class PythonLaw(FunctionLaw):
     that the function keeps between ticks is not part of the field's memory. Parameters are those of `FunctionLaw`.
     """
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         feed = PythonFeed(TRACE_SIZE, self.six_numbers)
         return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))

@@ -114,5 +114,5 @@ class Governed(Law):
     field: Law
     governor: Governor
 
-    def _composed(self) -> Program:
+    def _compose(self) -> Program:
         return self.field + self.governor
