@@ -12,14 +12,14 @@ from numba import njit
 from controllers.checks import check_kinds, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ControllerError
 from controllers.fields.admissible import checked_speeds
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.fields.follow import Follow
 from controllers.state import Array
 
-__all__ = ["Course", "River", "integrate", "settling_time", "window"]
+__all__ = ["Course", "River", "integrate", "window"]
 
 Flow = Callable[[float, Array], Array]
 """A flow V(t, p): time [s] and p_H [m], shape (3,), to a velocity [m/s], shape (3,)."""
@@ -143,32 +143,3 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Course:
     if not solution.success:
         raise ControllerError(f"the flow could not be integrated from {start}: {solution.message}")
     return Course(output_times, np.ascontiguousarray(solution.y.T))
-
-
-def settling_time(start: float, end: float, epsilon: float, tau: float) -> float:
-    r"""Time [s] in which the flow of a river carries a point from one distance from its curve to a smaller one.
-
-    Within the reach the gradient of d is normal to φ̇, so ḋ = −w(d/ε) d/τ whatever the curve, and with q = (d/ε)²
-
-    .. math:: T = \tfrac{\tau}{2}\,\bigl(G(q_0) - G(q_1)\bigr), \qquad
-              G(q) = \ln\frac{q}{1 - q} + \frac{1}{1 - q} + \frac{1}{2 (1 - q)^2}
-
-    Parameters
-    ----------
-    start, end : float
-        Distances d [m], 0 < end ≤ start < ε.
-    epsilon, tau : float
-        Radius [m] and time constant [s] of the river.
-
-    Raises
-    ------
-    ParameterError
-        If the distances are not in order within the tube.
-    """
-    if not 0.0 < end <= start < epsilon:
-        raise ParameterError(
-            f"a river of radius {epsilon} m draws from {start} m to {end} m only if 0 < end ≤ start < ε"
-        )
-    q = np.array([start, end]) ** 2 / epsilon**2
-    primitive = np.log(q / (1.0 - q)) + 1.0 / (1.0 - q) + 0.5 / (1.0 - q) ** 2
-    return float(0.5 * tau * (primitive[0] - primitive[1]))

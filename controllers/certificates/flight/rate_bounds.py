@@ -172,8 +172,3 @@ def _window_counterexample(motion: BodyMotion, frame: int, friction: float) -> d
         "start": start, "end": start + window - 1, "com": motion.com[start], "velocity": velocity, "acceleration": a,
         "distance": float(outside) / per_metre,
     }  # fmt: skip
-
-
-def turn_rate(speed: Array, friction: float) -> Array:
-    """Greatest rate of turning [rad/s] at speeds [m/s] of any shape: μ g / v, infinite at rest."""
-    return np.where(speed > 0.0, friction * GRAVITY / np.maximum(speed, 1e-12), np.inf)

@@ -52,21 +52,28 @@ def terminal_speed(river: River, linear: LinearLoop) -> Array:
 
 
 class PeakGain(NamedTuple):
-    """Largest effect of a force of up to 1 N with any time course: displacement [m/N] and the river's force [N/N]."""
+    """Largest effect of a force of up to 1 N with any time course.
+
+    Attributes
+    ----------
+    distance, force, speed : float
+        Displacement [m/N], the river's force [N/N], and error of the measured velocity [m/(N s)].
+    """
 
     distance: float
     force: float
+    speed: float
 
 
 def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
-    """Peak gains [m/N], [N/N], the largest over the phases; infinite if the loop is unstable at any of them."""
+    """Peak gains, the largest over the phases; infinite if the loop is unstable at any of them."""
     maps = loop.frozen(k_r, b_d)
     if np.abs(np.linalg.eigvals(maps)).max() >= 1.0:
-        return PeakGain(float("inf"), float("inf"))
+        return PeakGain(*[float("inf")] * 3)
     basis, projection = loop.across
     force = projection @ loop.push
-    rows = [loop.linear.jacobian @ basis[:, :3], loop.force(k_r, b_d) @ basis]
-    gains = np.zeros((2, len(maps)))
+    rows = [loop.linear.jacobian @ basis[:, :3], loop.force(k_r, b_d) @ basis, loop.measured_velocity @ basis]
+    gains = np.zeros((3, len(maps)))
     for _ in range(200_000):
         term = np.array([np.linalg.norm(row @ force, ord=2, axis=(1, 2)) for row in rows])
         gains += term

@@ -167,7 +167,8 @@ class Keeping:
         river = self.held
         loop = SampledLoop(self._still_loop, river.sampling)
         own = float(own_force(river, river.moving()).max()) + river.k_r * self.reading + river.b_d * self.noise
-        return peak_gain(loop, river.k_r, river.b_d).distance, _speed_gain(loop, river), own
+        gain = peak_gain(loop, river.k_r, river.b_d)
+        return gain.distance, gain.speed, own
 
     def bounds(self, push: float) -> Bounds:
         """D, E and S for |U| ≤ push [N]: the smallest solution, by iteration from zero."""
@@ -211,23 +212,6 @@ class Keeping:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.bounds(middle).room > 0.0 else (low, middle)
         return low
-
-
-def _speed_gain(loop: SampledLoop, river: River) -> float:
-    """Peak gain [m/(N s)] from a force to the measured velocity's error."""
-    maps = loop.frozen(river.k_r, river.b_d)
-    if np.abs(np.linalg.eigvals(maps)).max() >= 1.0:
-        return math.inf
-    basis, projection = loop.across
-    force = projection @ loop.push
-    row, gain = loop.measured_velocity @ basis, np.zeros(len(maps))
-    for _ in range(200_000):
-        part = np.linalg.norm(row @ force, ord=2, axis=(1, 2))
-        gain += part
-        if np.all(part < 1e-9 * gain):
-            break
-        row = row @ maps
-    return float(gain.max())
 
 
 def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
