@@ -226,8 +226,9 @@ class Walking:
             rate=self.rate, pull=self.pull, forward=self.forward * gait.speed, backward=self.backward * gait.speed,
             turn=self.turn_two, lateral=self.lateral, curvature=self.curvature,
             take_off=self.take_off * gait.speed, landing=self.landing * gait.speed,
-            haste=self.haste if gait.flies else np.inf, ahead=self.ahead, decay=float(np.exp(-STEP / self._lean_length)),
-            stride=gait.stride, shares=self.shares, stances=gait.stances,
+            haste=self.haste if gait.flies else np.inf, ahead=self.ahead,
+            decay=float(np.exp(-STEP / self._lean_length)), stride=gait.stride, shares=self.shares,
+            stances=gait.stances,
         )  # fmt: skip
         return np.concatenate([[self.scale], packed_following(follow)])
 
