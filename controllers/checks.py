@@ -75,14 +75,14 @@ def takes(name: str, function: object, *arguments: str) -> None:
     if not callable(function):
         raise ParameterError(f"{name} is {reprlib.repr(function)}; {expected}")
     try:
-        found = inspect.signature(function)
+        signature = inspect.signature(function)
     except ValueError:  # raised for some functions in C, whose signature is unknown
         return
     try:
-        found.bind(*arguments)
+        signature.bind(*arguments)
     except TypeError:
         called = getattr(function, "__name__", type(function).__name__)
-        raise ParameterError(f"{name} is {called}{found}; {expected}") from None
+        raise ParameterError(f"{name} is {called}{signature}; {expected}") from None
 
 
 def numbers_of(name: str, values: npt.ArrayLike) -> Array:

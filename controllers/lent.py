@@ -67,10 +67,10 @@ class _LentFields(AttributeTemplate):
 
 @lower_getattr_generic(Lent)
 def _read_field(context: Any, builder: Any, lent: Lent, whole: Any, name: str) -> Any:
-    at = lent.kind.fields.index(name)
-    place = builder.gep(whole, [_INDEX_TYPE(0), _INDEX_TYPE(at)], inbounds=True)
-    field = lent.kind.types[at]
-    return place if _is_named_tuple(field) else without_owner(context, builder, field, builder.load(place))
+    index = lent.kind.fields.index(name)
+    pointer = builder.gep(whole, [_INDEX_TYPE(0), _INDEX_TYPE(index)], inbounds=True)
+    field = lent.kind.types[index]
+    return pointer if _is_named_tuple(field) else without_owner(context, builder, field, builder.load(pointer))
 
 
 @intrinsic

@@ -66,9 +66,9 @@ def packed_pairs(channels: Array, drifts: Array, limbs: Sequence[Limb], pairs: S
     for n, (i, j) in enumerate(pairs):
         index[i, j] = n
         weights[n, :, i], weights[n, :, j] = 1.0 - second, second
-    found = foot_corrections(channels, drifts, limbs, weights.reshape(-1, clips))
+    corrections = foot_corrections(channels, drifts, limbs, weights.reshape(-1, clips))
     powers = (second * (1.0 - second))[:, None] * (1.0 - 2.0 * second)[:, None] ** np.arange(_TERMS)
-    table = np.einsum("kt,nptc->npkc", np.linalg.inv(powers), found.reshape(rows, len(pairs), _TERMS, size))
+    table = np.einsum("kt,nptc->npkc", np.linalg.inv(powers), corrections.reshape(rows, len(pairs), _TERMS, size))
     return np.concatenate([[rows, clips, len(pairs), size], index.ravel(), control_points(table, np.ones(1)).ravel()])
 
 

@@ -319,8 +319,8 @@ class Trajectory:
         """Length [m] of the curve from its start to φ(t), t in [start, end], shape (...) for phases of shape (...)."""
         times, phase = cast("Array", self.times), np.clip(np.asarray(t, dtype=float), self.start, self.end)
         piece = np.clip(np.searchsorted(times, phase, side="right") - 1, 0, len(times) - 2)
-        whole = np.concatenate(([0.0], np.cumsum(self._arc_within_piece(times[:-1], np.diff(times)))))
-        return whole[piece] + self._arc_within_piece(times[piece], phase - times[piece])
+        cumulative = np.concatenate(([0.0], np.cumsum(self._arc_within_piece(times[:-1], np.diff(times)))))
+        return cumulative[piece] + self._arc_within_piece(times[piece], phase - times[piece])
 
     def _arc_within_piece(self, t: Array, step: Array) -> Array:
         """Integral of |φ̇| over [t, t + step] within a piece, by Gauss-Legendre quadrature."""

@@ -84,8 +84,8 @@ def gate_behind(
 
     Phases count from the start of the lap [s]. The number is −1 if no gate was passed.
     """
-    way = now - before
-    way -= lap * np.round(way / lap)
+    step = now - before
+    step -= lap * np.round(step / lap)
     for k in range(int(changes[0])):
         entry = changes[1 + k * _ENTRY_SIZE :]
         if entry[_FIRST] == first and entry[_SECOND] == second:
@@ -93,7 +93,7 @@ def gate_behind(
             for i in range(gates, gates + int(entry[_GATE_COUNT])):
                 behind = now - changes[i]
                 behind -= lap * np.floor(behind / lap)
-                if behind < way:
+                if behind < step:
                     return k, float(changes[i])
     return -1, 0.0
 

@@ -131,5 +131,5 @@ class Composite(AnimationMap):
         r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
         upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
         share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        made = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
-        return made.with_share(share)
+        result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
+        return result.with_share(share)

@@ -259,7 +259,7 @@ class Cylindrical(AnimationMap):
         clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
         owner = int(kept(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
         share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        made = Cylindrical(
+        result = Cylindrical(
             clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints, owner
         )  # fmt: skip
-        return made.with_share(share) if joints else made
+        return result.with_share(share) if joints else result

@@ -180,9 +180,9 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
         last, at = int(limb[LAST]), 3 + 4 * rotations + END * i
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
-        there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
-        _carry_along(path, there, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
-        _carry_along(path, there, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
+        s_end, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
+        _carry_along(path, s_end, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
+        _carry_along(path, s_end, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
         place_limb(limb, q, spins, root, end, tangents)
     pose[:3] = root[0]
     for joint in range(rotations):

@@ -167,8 +167,8 @@ class Lifted(ClipMap):
         if self.legs_of is None:
             return ()
         owner, arms = self.names[self.legs_of], "the others' arms"
-        bears = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
-        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {bears}",)
+        what = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
+        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {what}",)
 
     def with_legs_of(self, clip: int, upper: Sequence[int], share: float) -> "Lifted":
         """The same map with root and all joints but `upper` (counted from 1) from one clip, and a share λ of the rest.
@@ -179,8 +179,8 @@ class Lifted(ClipMap):
             If there is no such clip, a joint is none of the poses' or a limb's, or the share is not from 0 to 1.
         """
         joints = (self.nq - 3) // 4
-        taken = {joint for limb in self.limbs for joint in limb.joints}
-        if not (0 <= clip < len(self.names) and 0.0 <= share <= 1.0 and set(upper) <= {*range(1, joints)} - taken):
+        legs = {joint for limb in self.limbs for joint in limb.joints}
+        if not (0 <= clip < len(self.names) and 0.0 <= share <= 1.0 and set(upper) <= {*range(1, joints)} - legs):
             raise ParameterError(
                 f"a lifted map takes the legs of clip 0 to {len(self.names) - 1}, other joints from 1 to "
                 f"{joints - 1} that are no limb's, and a share from 0 to 1; got {clip}, {list(upper)} and {share}"

@@ -81,9 +81,9 @@ def kernels_of(stages: IntArray) -> tuple[Kernel, ...]:
 
 def linked(stages: IntArray, address: Callable[[Kernel], int]) -> IntArray:
     """The same stages with the addresses of their kernels."""
-    found = stages.copy()
-    found[:, _ADDRESS] = [address(kernel) for kernel in kernels_of(stages)]
-    return found
+    result = stages.copy()
+    result[:, _ADDRESS] = [address(kernel) for kernel in kernels_of(stages)]
+    return result
 
 
 @njit

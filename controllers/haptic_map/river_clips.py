@@ -58,16 +58,16 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     if change >= 0:
         since = after(shown - start, memory[GATE], period)
         memory[CHANGE] = memory[CHANGE] if since < change_lasts(known, change) else -1.0
-    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend = curve_acceleration(params, curve, phase)
     # Differentiating (φ − p)·φ̇ = 0 at the nearest point gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
     slope = 0.0
     for i in range(3):
-        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
+        slope += tangent[i] ** 2 + (point[i] - x[i]) * bend[i]
     chain = work_array((3, 6))
     chain[:] = 0.0
     for i in range(3):
-        chain[0, i] = rate * pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
+        chain[0, i] = rate * pace * tangent[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
     weights, changes = work_array((1, rivers)), work_array((1, 3, rivers))
     weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0

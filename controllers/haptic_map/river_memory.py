@@ -97,15 +97,15 @@ def changes_of(params: Array) -> Array:
 @njit
 def after(phase: float, moment: float, period: float) -> float:
     """Time of a phase after a moment of the round [s]; negative up to a quarter of the round before it."""
-    way = phase - moment
-    return way - period * np.floor(way / period + _PAST_FRACTION)
+    elapsed = phase - moment
+    return elapsed - period * np.floor(elapsed / period + _PAST_FRACTION)
 
 
 @njit
 def lead_of(params: Array, memory: Array, phase: float) -> tuple[float, float]:
     """Lead [s] of the clip over a hand at a phase [s], which decays with the phase, and its derivative by the phase."""
-    went = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCH_UP_TIME
-    return memory[AHEAD] * (1.0 - smooth_step(went)), -memory[AHEAD] * smooth_step_slope(went) / _CATCH_UP_TIME
+    progress = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCH_UP_TIME
+    return memory[AHEAD] * (1.0 - smooth_step(progress)), -memory[AHEAD] * smooth_step_slope(progress) / _CATCH_UP_TIME
 
 
 @njit
@@ -139,9 +139,9 @@ def even_pace(params: Array, memory: Array, x: Array, way: float, changed: Array
         A copy of the memory, or the memory itself; updated for the hand at x.
     """
     curve = timing_curve(params, memory)
-    phase, whole = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
+    phase, period = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
     step = phase - memory[PHASE]
-    step -= whole * np.round(step / whole)
+    step -= period * np.round(step / period)
     off = step - min(max(step, way - _PACE_TOLERANCE * abs(way)), way + _PACE_TOLERANCE * abs(way))
     # Not if the clip is held, or the phase of the hand is not known yet.
     if memory[STILL] == 0.0 and abs(off) > 0.0:
@@ -163,8 +163,8 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
 @njit
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
-    whole, way = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
-    return (way - whole * np.round(way / whole)) / period
+    round_duration, step = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
+    return (step - round_duration * np.round(step / round_duration)) / period
 
 
 @njit
@@ -186,12 +186,12 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
         x[i] = hand[0, i] + _PREDICTION_TIME * hand[1, i] + 0.5 * _PREDICTION_TIME**2 * hand[2, i]
         v[i] = hand[1, i] + _PREDICTION_TIME * hand[2, i]
     phase = phase_near(params, curve, x, memory[PHASE])
-    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend, gain, slope, square = curve_acceleration(params, curve, phase), 0.0, 0.0, 0.0
     for i in range(3):
-        gain += v[i] * along[i]
-        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
-        square += along[i] ** 2
+        gain += v[i] * tangent[i]
+        slope += tangent[i] ** 2 + (point[i] - x[i]) * bend[i]
+        square += tangent[i] ** 2
     return slope < 0.5 * square or abs(gain) > _MAX_PACE * slope
 
 
@@ -232,8 +232,8 @@ def take_course(params: Array, memory: Array, river: float, x: Array, shown: flo
     memory[COURSE] = river
     curve = timing_curve(params, memory)
     phase = phase_near(params, curve, x, shown)
-    period, away = round_of(params, curve), shown - phase
-    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, away - period * np.round(away / period)
+    period, lead = round_of(params, curve), shown - phase
+    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, lead - period * np.round(lead / period)
 
 
 @njit

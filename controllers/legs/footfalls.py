@@ -97,17 +97,17 @@ def gap(slips: Array, hold: Array, turn: Array) -> Array:
     -------
     Array, shape (n, ..., 3)
     """
-    n, held = len(slips), hold[..., None]
+    n, decay = len(slips), hold[..., None]
     ahead, behind = np.empty_like(slips), np.empty_like(slips)
     front, back, angle = np.zeros_like(slips[0]), np.zeros_like(slips[0]), np.broadcast_to(turn, slips.shape[1:-1])
     for _ in range(_INTEGRATION_LAPS):
         for k in range(n):
             ahead[k] = front
-            front = held[k] * front + slips[k]
+            front = decay[k] * front + slips[k]
         for k in range(n - 1, -1, -1):
             if k == n - 1:
                 back[..., :2] = turned(angle, back[..., :2])
-            back = held[k] * back - slips[k]
+            back = decay[k] * back - slips[k]
             behind[k] = back
         front[..., :2] = turned(-angle, front[..., :2])
     return 0.5 * (ahead + behind)

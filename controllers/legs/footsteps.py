@@ -151,14 +151,14 @@ def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, 
     for i, pose in enumerate((shown, ahead[0], ahead[1])):
         ground = min(ground, _end_heights(limbs, pose, heights[i]))
     low = heights < ground + _HEIGHT_TOLERANCE
-    found, row, best, equal = -1, 1, 0, 0
+    best_limb, row, best_score, equal = -1, 1, 0, 0
     for n in range(count):
         stands[n] = 1.0 if low[1, n] and low[2, n] else 0.0
         score = 0 if not low[0, n] else 2 * int(low[1, n]) + int(low[2, n])
-        equal = 1 if score > best else equal + int(score == best)
-        if score > best:
-            found, row, best = n, 1 if low[2, n] else 0, score
-    return (-1, 1) if equal > 1 else (found, row)
+        equal = 1 if score > best_score else equal + int(score == best_score)
+        if score > best_score:
+            best_limb, row, best_score = n, 1 if low[2, n] else 0, score
+    return (-1, 1) if equal > 1 else (best_limb, row)
 
 
 @njit
@@ -183,7 +183,7 @@ def plan_steps(
         The limb that steps second (−1: any), and the stance of the new motion, from `pivot`.
     """
     half = 0.5 * seconds
-    ends, turns, way = np.empty((3, 7)), np.empty((3, 3)), np.empty(3)
+    ends, turns, rest = np.empty((3, 7)), np.empty((3, 3)), np.empty(3)
     urgency, heights = np.empty(limbs.shape[0]), np.empty(limbs.shape[0])
     ground = _end_heights(limbs, shown[0], heights)
     for n in range(limbs.shape[0]):
@@ -202,13 +202,13 @@ def plan_steps(
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
         change = step[_TURN_SHIFT:_STOP].reshape(3, 3)
-        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, way, change)
-        step[_TURN:_SHIFT] = multiply(w, x, y, z, *exponential(way[0], way[1], way[2]))
+        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
+        step[_TURN:_SHIFT] = multiply(w, x, y, z, *exponential(rest[0], rest[1], rest[2]))
         # Again relative to the rest orientation, since rotation vectors do not add exactly.
         w, x, y, z = step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
-        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, way, change)
+        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
         change[0] = turns[0]
         limb_end(limbs[n], asked, ends[1])
         urgency[n] = np.floor(height / _HEIGHT_TOLERANCE) + np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])
@@ -229,12 +229,12 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     share = smooth_step(x)
     left, floor = work_array(3), min(step[FLOOR], sole_height(limb, end))
     # The remaining motion of the old swing counts as length of the step too, or the foot would scrape the floor.
-    way = step[_SHIFT] ** 2 + step[_SHIFT + 1] ** 2
+    square = step[_SHIFT] ** 2 + step[_SHIFT + 1] ** 2
     offset_left(step[_SHIFT:_TURN_SHIFT].reshape(3, 3), stop, min(s, stop), left)
     for i in range(3):
         old = step[_POSITION + i] + left[i]
         ahead = end[i] - old
-        way += ahead * ahead if i < 2 else 0.0
+        square += ahead * ahead if i < 2 else 0.0
         end[i] = old + share * ahead
     offset_left(step[_TURN_SHIFT:_STOP].reshape(3, 3), stop, min(s, stop), left)
     w, a, b, c = multiply(
@@ -244,8 +244,8 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     end[3], end[4], end[5], end[6] = multiply(
         w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2])
     )
-    way += _TURN_LEVER**2 * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    square += _TURN_LEVER**2 * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
     # Rounded at zero, where the square root has no derivative.
-    lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT_RATIO * (np.sqrt(way + _ROUNDING_LENGTH**2) - _ROUNDING_LENGTH)
+    lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT_RATIO * (np.sqrt(square + _ROUNDING_LENGTH**2) - _ROUNDING_LENGTH)
     # Without this, a foot that comes down fast, or turns, would penetrate the floor.
     end[2] += max(0.0, floor - sole_height(limb, end)) + lift

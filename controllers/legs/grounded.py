@@ -96,11 +96,11 @@ def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array
         return None
     before = {end % n: end - start for start, end in flights}
     after = {start: end - start for start, end in flights}
-    here, there = list[float](), list[float]()
+    phases, clip_phases = list[float](), list[float]()
     for start, end in own:
-        here += [start - _SHARE_BEFORE * before.get(start, 0), end + _SHARE_AFTER * after.get(end % n, 0)]
-        there += [float(start), float(end)]
-    if np.any(np.diff([*here, here[0] + n]) <= 0.0):
+        phases += [start - _SHARE_BEFORE * before.get(start, 0), end + _SHARE_AFTER * after.get(end % n, 0)]
+        clip_phases += [float(start), float(end)]
+    if np.any(np.diff([*phases, phases[0] + n]) <= 0.0):
         return None
     laps = np.arange(-2, 3) * n
-    return PchipInterpolator(np.add.outer(laps, here).ravel(), np.add.outer(laps, there).ravel())(np.arange(n))
+    return PchipInterpolator(np.add.outer(laps, phases).ravel(), np.add.outer(laps, clip_phases).ravel())(np.arange(n))

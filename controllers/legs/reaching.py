@@ -42,8 +42,8 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
     """
     longest = max(_MAX_EXTENSION * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
     line = _limb_vector(rows, stride, limb, at)
-    away = np.linalg.norm(line[:, :2], axis=1)
-    return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))
+    horizontal = np.linalg.norm(line[:, :2], axis=1)
+    return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - horizontal**2, 0.0)))
 
 
 def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:

@@ -83,10 +83,10 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     """Lowering of the root [m] with which a limb reaches its end `end` (7,) unstretched, if that is near the floor."""
     line = work_array(3)
     longest = _EASY_EXTENSION_RATIO * _limb_vector(limb, pose, end, line)
-    way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
-    short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FADE_START_RATIO) ** 2))
+    horizontal = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
+    short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(horizontal, _FADE_START_RATIO) ** 2))
     # The root is not lowered for a foot that is far behind.
-    short *= 1.0 - min(max((way - _FADE_START_RATIO) / (_FADE_END_RATIO - _FADE_START_RATIO), 0.0), 1.0) ** 2
+    short *= 1.0 - min(max((horizontal - _FADE_START_RATIO) / (_FADE_END_RATIO - _FADE_START_RATIO), 0.0), 1.0) ** 2
     return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _MAX_LOWERING_HEIGHT)
 
 
@@ -101,11 +101,11 @@ def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
         weight = np.exp((x * along[0] + y * along[1]) / _EDGE_ROUNDING)
         total += weight
         point[0], point[1] = point[0] + weight * x, point[1] + weight * y
-    away = (point[0] * along[0] + point[1] * along[1]) / total
+    edge = (point[0] * along[0] + point[1] * along[1]) / total
     w, x, y, z = exponential(-angle * along[1], angle * along[0], 0.0)
     end[3], end[4], end[5], end[6] = multiply(w, x, y, z, end[3], end[4], end[5], end[6])
     for i in range(2):
-        end[i] += (1.0 - np.cos(angle)) * away * along[i]
+        end[i] += (1.0 - np.cos(angle)) * edge * along[i]
     end[2] += low - sole_height(limb, end)
 
 

@@ -202,12 +202,12 @@ class Energy:
             return 0.0, np.zeros_like(q)
         step = q[:, i] - q[:, j]
         distance = np.sqrt((step**2).sum(axis=2) + 1e-12)
-        missed = distance - self._target[:, i, j]
+        error = distance - self._target[:, i, j]
         weight = self._weight[:, i, j] / self._mean_square
         short = np.maximum(1.0 - distance / self._min_distance[:, i, j], 0.0)
         share = 1.0 / SAMPLES
-        total = share * (weight * missed**2).sum() / q.shape[1] + share * _SEPARATION_WEIGHT * (short**2).sum()
-        slope = share * 2.0 * (weight * missed / q.shape[1] - _SEPARATION_WEIGHT * short / self._min_distance[:, i, j])
+        total = share * (weight * error**2).sum() / q.shape[1] + share * _SEPARATION_WEIGHT * (short**2).sum()
+        slope = share * 2.0 * (weight * error / q.shape[1] - _SEPARATION_WEIGHT * short / self._min_distance[:, i, j])
         pull = (slope / distance)[..., None] * step
         return float(total), self._incidence @ pull
 
@@ -256,13 +256,13 @@ def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
         # Without noise, coincident sites would have no gradient that separates them.
         noise = 1e-4 * rng.uniform(-1.0, 1.0, (n, 2))
         start = np.clip(layout + noise, rectangle.low, rectangle.high)
-        found = minimize(
+        result = minimize(
             energy, np.tile(start, (ROWS, 1, 1)).ravel(), jac=True, method="L-BFGS-B", bounds=bounds,
             options={"maxiter": 200, "maxcor": 20},
         )  # fmt: skip
-        controls = np.asarray(found.x).reshape(ROWS, n, 2)
-        if float(found.fun) < least and is_apart(task, controls):
-            best, least = controls, float(found.fun)
+        controls = np.asarray(result.x).reshape(ROWS, n, 2)
+        if float(result.fun) < least and is_apart(task, controls):
+            best, least = controls, float(result.fun)
     return best, np.tile(first, (ROWS, 1, 1))
 
 

@@ -70,8 +70,8 @@ class Phase(NamedTuple):
         wanted = np.linspace(0.0, 1.0, frames)
         since = wanted * (1.0 - self.gap)
         for _ in range(60):
-            missed = since / (1.0 - self.gap) + self.lead(since) - wanted
-            since = since - missed / (1.0 / (1.0 - self.gap) + self.lead(since, 1))
+            error = since / (1.0 - self.gap) + self.lead(since) - wanted
+            since = since - error / (1.0 / (1.0 - self.gap) + self.lead(since, 1))
         # The ends are set exactly.
         since[0], since[-1] = 0.0, 1.0 - self.gap
         return 2.0 * np.pi * (self.start + since)
@@ -87,8 +87,8 @@ def _return_gap(motion: Motion, own: Features) -> float:
     if motion.closed:
         return 0.0
     speed = float(np.linalg.norm(own.velocity[:, 3:], axis=1).mean())
-    way = float(np.linalg.norm(own.pose[-1] - own.pose[0]))
-    seconds = 1.5 * way / max(speed, 1e-3)
+    distance = float(np.linalg.norm(own.pose[-1] - own.pose[0]))
+    seconds = 1.5 * distance / max(speed, 1e-3)
     return float(np.clip(seconds / (seconds + motion.duration), *_GAP_RANGE))
 
 
@@ -98,8 +98,8 @@ def _mismatch_table(own: Array, others: list[tuple[Array, Phase]], scale: float)
     table = np.zeros((_STEPS, SAMPLES))
     for points, phase in others:
         s = phase.share(lap)
-        there = points[np.round(np.minimum(s, 1.0) * (SAMPLES - 1)).astype(np.int64)]
-        square = squared_distances(there, own)
+        samples = points[np.round(np.minimum(s, 1.0) * (SAMPLES - 1)).astype(np.int64)]
+        square = squared_distances(samples, own)
         table += np.where(s[:, None] <= 1.0, square / (square + scale**2), 0.0)
     return table / len(others)
 

@@ -168,11 +168,11 @@ def find_transitions(compared: Comparison, most: float) -> list[Transition]:
                 angle = 2.0 * np.pi * float(k) / steps
                 candidates.append((float(row[k]), Transition(i, j, angle, pose, velocity, support, (here, there))))
     taken: list[Transition] = []
-    for _, found in sorted(candidates):
-        meets = [other for other in taken if {found.first, found.second} & {other.first, other.second}]
-        near = any(_angle_between(found.angle, other.angle) < _MIN_ANGLE_APART for other in meets)
-        if not near and not any(other[:2] == found[:2] for other in meets):
-            taken.append(found)
+    for _, candidate in sorted(candidates):
+        meets = [other for other in taken if {candidate.first, candidate.second} & {other.first, other.second}]
+        near = any(_angle_between(candidate.angle, other.angle) < _MIN_ANGLE_APART for other in meets)
+        if not near and not any(other[:2] == candidate[:2] for other in meets):
+            taken.append(candidate)
     return taken
 
 
