@@ -1,7 +1,7 @@
 """Calls of compiled kernels by their address, so that a caller is compiled independently of the kernels.
 
 A kernel is one of several functions with the same signature. A call by name would link all of them into the caller; by
-address each is compiled, and cached, by itself. Calling convention and errors are those of any other numba call.
+address each is compiled, and cached, separately. Calling convention and errors are those of any other numba call.
 """
 
 from collections.abc import Callable

@@ -4,7 +4,7 @@ r"""Weighted mean pose of several clips at a phase, and its derivative.
 
 θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
 the ground by its twist ξ (`loops`); the ends of limbs are blended like the root, and the limbs follow by inverse
-kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
+kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, stored in the memory (`lap`).
 """
 
 from collections.abc import Sequence

@@ -94,7 +94,7 @@ class Cylindrical(AnimationMap):
     cannot support more, only a share λ of the others' joints is blended in: the weights are λ w_i, plus 1 − λ for
     that clip.
 
-    A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
+    A ∈ SE(2) is the frame of the lap, stored in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
     seam θ = 0 forwards, and by the inverse backwards, so the figure walks on. Pose, velocity and acceleration are
     continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
     position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.

@@ -4,7 +4,7 @@ r"""The map of a led figure: a clip of straight walking is carried along a curve
 
 A(s) ∈ SE(2) is the frame of the figure's path at arc length s (`controllers.walking.walked_path`), ℓ the length of the
 clip's lap, ρ the pose without its steady drift (`loops`). λ is such that s + ℓλ is constant while the foot is in stance
-and advances while it swings (`limbs`): so a foot in stance keeps its place, however path and pelvis turn over it. The
+and advances while it swings (`limbs`): so a foot in stance keeps its place while path and pelvis turn above it. The
 legs follow by inverse kinematics. In bends the figure leans to the inside like an inverted pendulum whose foot is on
 the path: root and trunk turn about the path by φ(s), and the root is lowered by twice the height that this lifts the
 outer hip.
@@ -264,7 +264,7 @@ class Led(KernelMap):
     Raises
     ------
     ParameterError
-        If the clip does not travel by 0.5 m a lap, or turns by more than 30° meanwhile.
+        If the clip travels less than 0.5 m per lap, or turns by more than 30° per lap.
     """
 
     map_kernel = staticmethod(led_map)

@@ -176,7 +176,7 @@ class Lifted(ClipMap):
         Raises
         ------
         ParameterError
-            If there is no such clip, a joint is none of the poses' or a limb's, or the share is not from 0 to 1.
+            If there is no such clip, a joint is not in the poses or belongs to a limb, or the share is not in [0, 1].
         """
         joints = (self.nq - 3) // 4
         legs = {joint for limb in self.limbs for joint in limb.joints}

@@ -92,7 +92,7 @@ class RiverClips(AnimationMap):
     the hand's after a change of river, and while the hand is faster than its river (`river_memory.even_pace`).
 
     Clips are aligned in time to the first (`alignment`), so that a change keeps about the same phase of motion. A ∈
-    SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h jumps, and the reference
+    SE(2) is the frame of the lap, stored in the memory (`lap`). When the river changes, h jumps, and the reference
     continues from where the figure stands (`place_clip`) with a decaying offset (`inertialization`). Where a change
     between the two clips is precomputed (`clip_change`), it begins at the next gate instead, and h runs through it with
     the phase of the hand. h does not depend on the stylus's orientation.

@@ -2,7 +2,7 @@ r"""Clips as closed loops: each is split into a steady drift over the ground and
 
 .. math:: X_{root}(s) = \exp(s\,\xi)\,\rho(s), \qquad s \in [0, 1],\; \rho(1) = \rho(0)
 
-ξ = (v, ω) is the planar twist whose exponential is the displacement of one lap: a walk goes on from where the lap
+ξ = (v, ω) is the planar twist whose exponential is the displacement of one lap: a walk continues from where the lap
 ended, a spin returns to its start after a turn of ω = 2π. Everything else (ρ and the joints) is a periodic C² spline,
 in R³ for the root's position and in R⁴, normalised, for each rotation.
 """

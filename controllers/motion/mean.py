@@ -82,7 +82,7 @@ def _dominant_eigenvector(unit: Array, weights: Array, q: Quat) -> None:  # noqa
     m, square = work_array((4, 4)), work_array((4, 4))
     m[:] = 0.0
     for i in range(unit.shape[0]):
-        # A multiple of the identity makes M positive in spite of negative weights, and changes no eigenvector.
+        # A multiple of the identity makes M positive despite negative weights, and changes no eigenvector.
         for j in range(4):
             m[j, j] += max(-weights[i], 0.0)
         for j in range(4):

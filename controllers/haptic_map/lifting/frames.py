@@ -23,8 +23,8 @@ from controllers.motion.channels import closing_signs, normalise, signed_like
 from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
 from controllers.state import Array
 
-CLOSES = 1e-6  # [m], for quaternions half of [rad]: tolerance within which a closed clip must close
-LEAST_GAP = 0.05  # [rad] least gap that an open clip leaves in the lap
+CLOSES = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
+LEAST_GAP = 0.05  # [rad] least gap that an open clip must leave in the lap
 WIDEST_STEP = 0.5 * np.pi  # [rad] largest angle between two frames
 
 _TURN = 2.0 * np.pi

@@ -38,7 +38,7 @@ class Lifting(NamedTuple):
     transitions : tuple of Transition
         Transitions, the best first.
     same : tuple of (int, int)
-        Pairs of clips with the same motion; their curves are kept apart nevertheless.
+        Pairs of clips with the same motion, whose curves are still kept apart.
     still : tuple of int
         Clips in which nothing moves.
     before, after : ArrangementMeasure
