@@ -1,8 +1,8 @@
 """Borrowed arrays in compiled code: arrays without reference counting, valid for the duration of a call.
 
 numba counts a reference, by an atomic instruction, for every array of a tuple that is passed to a function or taken out
-of a tuple. For a loop that passes on a hundred arrays per tick this costs a tenth of its time, although the caller
-keeps the arrays alive anyway.
+of a tuple. In a loop that passes a hundred arrays per tick this takes a tenth of the time, although the caller keeps
+the arrays alive anyway.
 """
 
 from typing import Any, Protocol, TypeVar, cast
@@ -16,7 +16,7 @@ _Value = TypeVar("_Value")
 
 
 @intrinsic
-def _borrowed(typingctx: Any, value: Any) -> Any:
+def _borrow(typingctx: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return without_owner(context, builder, value, values[0])
 
@@ -37,11 +37,11 @@ def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-class _Borrowed(Protocol):
+class _Borrow(Protocol):
     def __call__(self, value: _Value) -> _Value: ...
 
 
-borrowed = cast(_Borrowed, _borrowed)
+borrowed = cast(_Borrow, _borrow)
 """An array, or a tuple that contains arrays, without reference counting; for compiled code only.
 
 The original must outlive every use: compiled code may neither return nor store a borrowed array. It must be passed on

@@ -1,4 +1,4 @@
-"""Validation in constructors: numbers within their bounds, and values of the kind that a field's annotation says."""
+"""Validation in constructors: numbers within their bounds, and values of the type that a field is annotated with."""
 
 import inspect
 import reprlib
@@ -15,12 +15,12 @@ import numpy.typing as npt
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_NUMBERS: dict[object, tuple[type, str]] = {float: (Real, "a number"), int: (Integral, "a whole number")}
-_WORDS: dict[object, str] = {bool: "True or False", str: "text", types.NoneType: "None"}
+_NUMBER_KINDS: dict[object, tuple[type, str]] = {float: (Real, "a number"), int: (Integral, "a whole number")}
+_KIND_NAMES: dict[object, str] = {bool: "True or False", str: "text", types.NoneType: "None"}
 
 
 def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bool = False) -> float:
-    """The value, a gain or length, if it is at least `least` and finite (or infinite, where allowed); else raises."""
+    """Return a gain or length as a float if it is at least `least` and finite (or infinite if allowed); else raise."""
     of_kind(name, value, float)
     number = float(value)
     if np.isnan(number) or number < least or (np.isinf(number) and not infinite):
@@ -31,57 +31,58 @@ def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bo
 
 
 def check_kinds(part: object) -> None:
-    """Refuse a field of a dataclass whose value is of another kind than its annotation.
+    """Raise if the value of a dataclass field is not of the type of its annotation.
 
     Raises
     ------
     ParameterError
-        The field, its value, and what would be right.
+        The message names the field, its value, and the type expected.
     """
-    for name, kind in _kinds(type(part)).items():
+    for name, kind in _field_kinds(type(part)).items():
         of_kind(name, getattr(part, name), kind)
 
 
 @cache
-def _kinds(part: type) -> dict[str, object]:
+def _field_kinds(part: type) -> dict[str, object]:
     hints = get_type_hints(part)
     return {field.name: hints[field.name] for field in fields(cast(Any, part))}
 
 
 def of_kind(name: str, value: object, kind: object) -> None:
-    """Refuse a value that is not of a kind: a class, a number, one of several words, a sequence of a kind, a union.
+    """Raise if a value is not of a kind: a class, a number, one of several words, a sequence of a kind, or a union.
 
-    A truth value is no number and a class no object of it; what is an array or a function is not looked at.
+    A bool is not a number, and a class is not an instance of itself. Annotations that are not classes (arrays,
+    functions) are not checked.
 
     Raises
     ------
     ParameterError
-        The name, the value, and what would be right.
+        The message gives the name, the value, and the kind expected.
     """
-    if not _is(value, kind):
-        raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_expected(kind)}")
+    if not _is_of_kind(value, kind):
+        raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_kind_in_words(kind)}")
 
 
 def takes(name: str, function: object, *arguments: str) -> None:
-    """Refuse what is no function, or one that cannot be called with so many arguments, without a call.
+    """Raise if an object is not callable, or cannot be called with these arguments; it is not called here.
 
     Raises
     ------
     ParameterError
-        The name, the function, and the arguments with which it is called.
+        The message gives the name, the function, and the arguments with which it is called.
     """
     expected = f"expected a function of {', '.join(arguments)}"
     if not callable(function):
         raise ParameterError(f"{name} is {reprlib.repr(function)}; {expected}")
     try:
-        found = inspect.signature(function)
-    except ValueError:  # of some functions in C, which do not tell
+        signature = inspect.signature(function)
+    except ValueError:  # raised for some functions in C, whose signature is unknown
         return
     try:
-        found.bind(*arguments)
+        signature.bind(*arguments)
     except TypeError:
         called = getattr(function, "__name__", type(function).__name__)
-        raise ParameterError(f"{name} is {called}{found}; {expected}") from None
+        raise ParameterError(f"{name} is {called}{signature}; {expected}") from None
 
 
 def numbers_of(name: str, values: npt.ArrayLike) -> Array:
@@ -95,22 +96,26 @@ def numbers_of(name: str, values: npt.ArrayLike) -> Array:
     return array.astype(np.float64)
 
 
-def _is(value: object, kind: Any) -> bool:
+def _is_of_kind(value: object, kind: Any) -> bool:
     origin, inner = get_origin(kind), get_args(kind)
     if kind is Any:
         return True
     if origin in (Union, types.UnionType):
-        return any(_is(value, one) for one in inner)
+        return any(_is_of_kind(value, one) for one in inner)
     if origin is Literal:
         return isinstance(value, str) and value in inner
     if origin in (tuple, Sequence):
         if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str | bytes):
             return False
         several = cast(Sequence[object], value)
-        return (_open(kind) or len(several) == len(inner)) and all(_is(one, inner[0]) for one in several)
-    if kind in _NUMBERS:
+        return (_has_any_length(kind) or len(several) == len(inner)) and all(
+            _is_of_kind(one, inner[0]) for one in several
+        )
+    if kind in _NUMBER_KINDS:
         return (
-            isinstance(value, _NUMBERS[kind][0]) and not isinstance(value, bool) and (kind is int or fits_float(value))
+            isinstance(value, _NUMBER_KINDS[kind][0])
+            and not isinstance(value, bool)
+            and (kind is int or fits_float(value))
         )
     if kind is bool:
         return isinstance(value, bool | np.bool_)
@@ -126,18 +131,18 @@ def fits_float(value: Any) -> bool:
     return True
 
 
-def _open(kind: object) -> bool:
+def _has_any_length(kind: object) -> bool:
     """Whether a sequence may have any length."""
     return get_origin(kind) is not tuple or Ellipsis in get_args(kind)
 
 
-def _expected(kind: Any) -> str:
+def _kind_in_words(kind: Any) -> str:
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
-        return " or ".join(_expected(one) for one in inner)
+        return " or ".join(_kind_in_words(one) for one in inner)
     if origin is Literal:
         return f"one of {', '.join(inner)}"
     if origin in (tuple, Sequence):
-        several = "a sequence" if inner[0] is Any else f"a sequence, each {_expected(inner[0])}"
-        return several if _open(kind) else f"{len(inner)} numbers"
-    return _NUMBERS[kind][1] if kind in _NUMBERS else _WORDS.get(kind) or kind.__name__
+        several = "a sequence" if inner[0] is Any else f"a sequence, each {_kind_in_words(inner[0])}"
+        return several if _has_any_length(kind) else f"{len(inner)} numbers"
+    return _NUMBER_KINDS[kind][1] if kind in _NUMBER_KINDS else _KIND_NAMES.get(kind) or kind.__name__

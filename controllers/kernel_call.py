@@ -1,7 +1,7 @@
 """Calls of compiled kernels by their address, so that a caller is compiled independently of the kernels.
 
 A kernel is one of several functions with the same signature. A call by name would link all of them into the caller; by
-address each is compiled, and cached, by itself. Calling convention and errors are those of any other numba call.
+address each is compiled, and cached, separately. Calling convention and errors are those of any other numba call.
 """
 
 from collections.abc import Callable
@@ -29,21 +29,21 @@ def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, 
 
     @intrinsic
     def call(typingctx: Any, address: Any, given: Any) -> Any:
-        return types.void(types.int64, types.Tuple(arguments)), _generate
+        return types.void(types.int64, types.Tuple(arguments)), _emit_call
 
     return cast(Callable[[int, tuple[Any, ...]], None], call)
 
 
 @intrinsic
 def _call_as_given(typingctx: Any, address: Any, given: Any) -> Any:
-    return types.void(types.int64, types.Tuple(tuple(given.types))), _generate
+    return types.void(types.int64, types.Tuple(tuple(given.types))), _emit_call
 
 
 call_as_given = cast(Callable[[int, tuple[Any, ...]], None], _call_as_given)
 """`kernel_call` of kernels compiled for exactly the types of the given arguments."""
 
 
-def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+def _emit_call(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     convention, arguments = context.call_conv, signature.args[1].types
     kernel = convention.get_function_type(types.void, arguments).as_pointer()
     status, _ = convention.call_function(
@@ -55,22 +55,22 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
-_Keeper = Callable[[Any, tuple[types.Type, ...]], None]
-_announced: list[tuple[Any, tuple[types.Type, ...]]] = []
-_keepers: list[_Keeper] = []
+_KernelListener = Callable[[Any, tuple[types.Type, ...]], None]
+_announced_kernels: list[tuple[Any, tuple[types.Type, ...]]] = []
+_listeners: list[_KernelListener] = []
 
 
 def announce(kernel: Any, arguments: tuple[types.Type, ...]) -> None:
-    """Tell the keepers of a kernel (an ``njit`` function) and its types, before it is compiled."""
-    _announced.append((kernel, arguments))
-    for keeper in _keepers:
-        keeper(kernel, arguments)
+    """Notify all listeners of a kernel (an ``njit`` function) and its argument types, before it is compiled."""
+    _announced_kernels.append((kernel, arguments))
+    for listener in _listeners:
+        listener(kernel, arguments)
 
 
-def add_keeper(keeper: _Keeper) -> _Keeper:
-    """Have a function told of every kernel, past and future: `sim.compilation` has the code of laws and maps kept."""
-    _keepers.append(keeper)
-    for kernel, arguments in _announced:
+def add_keeper(keeper: _KernelListener) -> _KernelListener:
+    """Notify a function of every kernel, past and future; `sim.compilation` so caches the code of laws and maps."""
+    _listeners.append(keeper)
+    for kernel, arguments in _announced_kernels:
         keeper(kernel, arguments)
     return keeper
 

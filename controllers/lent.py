@@ -1,9 +1,9 @@
 """Named tuples lent to compiled functions: one pointer is passed, and fields are read by name where they are needed.
 
 numba passes a tuple field by field, every array as its pointers, shape and strides, and counts a reference for each. A
-call with a state of sixty arrays so has several hundred arguments, and takes most of the time in which its kernel is
-compiled. A lent tuple is one argument, arrays read from it are not counted (see `controllers.borrowed`), and code that
-reads a field by its name is the same for a tuple and for a lent one.
+call with a state of sixty arrays thus has several hundred arguments, which take most of the time to compile its kernel.
+A lent tuple is one argument, arrays read from it are not counted (see `controllers.borrowed`), and code that reads a
+field by its name is the same for a tuple and for a lent one.
 """
 
 from typing import Any, Protocol, TypeVar, cast
@@ -17,7 +17,7 @@ from numba.extending import intrinsic, lower_getattr_generic, models, register_m
 from controllers.borrowed import without_owner
 
 _Tuple = TypeVar("_Tuple")
-_INDEX = ir.IntType(32)
+_INDEX_TYPE = ir.IntType(32)
 
 
 class Lent(types.Type):
@@ -35,7 +35,7 @@ class Lent(types.Type):
 
     @property
     def key(self) -> object:
-        """What equal types have in common: a tuple's own name lacks those of its fields."""
+        """Identity of the type: the type of the tuple, since its name does not include the names of its fields."""
         return self.kind
 
     @property
@@ -44,33 +44,33 @@ class Lent(types.Type):
         return cast(type, self.kind.instance_class)
 
 
-def _is_named(kind: Any) -> bool:
+def _is_named_tuple(kind: Any) -> bool:
     return isinstance(kind, types.NamedTuple | types.NamedUniTuple)
 
 
 @register_model(Lent)
-class _Pointer(models.PrimitiveModel):
+class _LentPointer(models.PrimitiveModel):
     def __init__(self, manager: Any, lent: Lent):
         super().__init__(manager, lent, manager.lookup(lent.kind).get_value_type().as_pointer())
 
 
 @infer_getattr
-class _Fields(AttributeTemplate):
+class _LentFields(AttributeTemplate):
     key = Lent
 
     def generic_resolve(self, lent: Lent, name: str) -> Any:
         if name not in lent.kind.fields:
             return None
         field = lent.kind.types[lent.kind.fields.index(name)]
-        return Lent(field) if _is_named(field) else field
+        return Lent(field) if _is_named_tuple(field) else field
 
 
 @lower_getattr_generic(Lent)
-def _read(context: Any, builder: Any, lent: Lent, whole: Any, name: str) -> Any:
-    at = lent.kind.fields.index(name)
-    place = builder.gep(whole, [_INDEX(0), _INDEX(at)], inbounds=True)
-    field = lent.kind.types[at]
-    return place if _is_named(field) else without_owner(context, builder, field, builder.load(place))
+def _read_field(context: Any, builder: Any, lent: Lent, whole: Any, name: str) -> Any:
+    index = lent.kind.fields.index(name)
+    pointer = builder.gep(whole, [_INDEX_TYPE(0), _INDEX_TYPE(index)], inbounds=True)
+    field = lent.kind.types[index]
+    return pointer if _is_named_tuple(field) else without_owner(context, builder, field, builder.load(pointer))
 
 
 @intrinsic
@@ -88,5 +88,5 @@ class _Lend(Protocol):
 
 
 lend = cast(_Lend, _lend)
-"""A named tuple as it is lent to functions that are called: valid as long as the compiled caller runs, and keeps the
-tuple. A lent tuple is lent on."""
+"""Lend a named tuple to functions that compiled code calls: valid as long as the caller runs and keeps the tuple.
+A tuple that is already lent is passed on unchanged."""

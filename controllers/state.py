@@ -28,7 +28,7 @@ HAND_SWITCH = 14
 HAND_SIZE = 15
 
 LONGEST_STEP = 0.05
-"""Bound on one time step of what moves with the hand's time [s], so that it does not jump after a pause."""
+"""Largest time step by which states driven by the hand's clock advance [s], so that they do not jump after a pause."""
 
 # Slices of the vector for use outside compiled code; a haptic map's argument is the stylus pose.
 POSITION = slice(HAND_POSITION, HAND_QUATERNION)

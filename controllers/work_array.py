@@ -1,7 +1,7 @@
 """Work arrays on the stack of a compiled kernel, so that a servo tick allocates nothing on the heap.
 
 `numpy.empty` in compiled code allocates heap memory in every call. A work array lies in the stack frame of the function
-that creates it, like a local array in C: it must not be returned, nor stored beyond that call. In Python, and so where
+that creates it, like a local array in C: it must not be returned, nor stored beyond that call. In Python, hence also if
 a kernel is evaluated on symbols, it is `numpy.empty`.
 """
 
@@ -32,7 +32,7 @@ def work_integers(shape: int | tuple[int, ...]) -> IntArray:
     return np.empty(shape, np.int64)
 
 
-def _on_stack(kind: types.Type) -> Any:
+def _stack_allocator(kind: types.Type) -> Any:
     """Intrinsic that allocates an array of a number type on the caller's stack."""
 
     @intrinsic(prefer_literal=True)
@@ -67,14 +67,14 @@ def _on_stack(kind: types.Type) -> Any:
     return array
 
 
-_numbers, _integers = _on_stack(types.float64), _on_stack(types.int64)
+_stack_floats, _stack_integers = _stack_allocator(types.float64), _stack_allocator(types.int64)
 
 
 @overload(work_array, prefer_literal=True, strict=False, inline="always")
 def _work_array(shape: Any) -> Any:
-    return lambda shape: _numbers(shape)  # pyright: ignore[reportUnknownLambdaType]
+    return lambda shape: _stack_floats(shape)  # pyright: ignore[reportUnknownLambdaType]
 
 
 @overload(work_integers, prefer_literal=True, strict=False, inline="always")
 def _work_integers(shape: Any) -> Any:
-    return lambda shape: _integers(shape)  # pyright: ignore[reportUnknownLambdaType]
+    return lambda shape: _stack_integers(shape)  # pyright: ignore[reportUnknownLambdaType]

@@ -1,4 +1,4 @@
-"""Time alignment of loops: a shift of the phase, then, if it is worth it, a smooth, monotone, periodic time warp."""
+"""Time alignment of loops: a shift of the phase, then, if it gains enough, a smooth, monotone, periodic time warp."""
 
 from collections.abc import Sequence
 
@@ -10,18 +10,19 @@ from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 
-LARGEST_LEAD = 0.125  # share of the lap by which a warp leads or lags at most
+LARGEST_LEAD = 0.125  # largest lead or lag of a warp, as a fraction of the lap
 
-# Samples of a lap. In four sets of embedded clips, half turns joints by 1 to 2° RMS, twice by 0.8° at most.
+# Samples of a lap. In four sets of embedded clips, half as many change joint angles by 1 to 2° RMS, twice as many by
+# at most 0.8°.
 _SAMPLES = 128
-_BAND = int(LARGEST_LEAD * _SAMPLES)
-_STEEPEST = 0.25  # and changes the pace by at most a quarter
-# Weight of stance relative to rotations: cheer with ginga slides 1.0 cm, with half of it as well, with twice 0.7.
-_STANCE = 2.0
-_LOW, _SLOW = 0.02, 0.5  # [m], [m per lap] height, or speed, at which an end counts half as in stance
-# A warp that leaves more of the mismatch is not made: a warp of every pair gains a few percent, and bends flights
-# (accelerations up to 2.8 times the clip's own).
-_WORTH = 0.9
+_MAX_LEAD = int(LARGEST_LEAD * _SAMPLES)
+_MAX_PACE_CHANGE = 0.25  # largest change of the pace by a warp
+# Weight of stance relative to rotations: a blend of cheer and ginga slides 1.0 cm, also with half of it; twice: 0.7.
+_STANCE_WEIGHT = 2.0
+_STANCE_HEIGHT, _STANCE_SPEED = 0.02, 0.5  # [m], [m per lap] height and speed at which the degree of stance is halved
+# A warp that leaves more of the mismatch is not used: if every pair were warped, a few percent would be gained, and
+# flights would be distorted (accelerations up to 2.8 times the clip's own).
+_MAX_MISMATCH_RATIO = 0.9
 
 
 def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
@@ -36,11 +37,11 @@ def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
          y * z - w * x, y * z + w * x],
         axis=-1,
     )  # fmt: skip
-    stance = [_STANCE * _stands(channels, loop.drift, limb)[:, None] for limb in limbs]
+    stance = [_STANCE_WEIGHT * _stance_degree(channels, loop.drift, limb)[:, None] for limb in limbs]
     return np.concatenate([2.0 * matrix.reshape(_SAMPLES, -1), channels[:, 2:3], *stance], axis=1)
 
 
-def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
+def _stance_degree(channels: Array, drift: Array, limb: Limb) -> Array:
     """Degree from 0 to 1 to which an end is in stance (low, and slow over the ground); shape (samples,)."""
     place, quaternions = (part[:, 0] for part in end_poses(channels[:, None], limb))
     height = place[:, 2] + lowest_point(quaternions, limb, SHARP)
@@ -48,8 +49,8 @@ def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
     across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
     # The velocity over the ground is that of the drift plus that in the frame of the drift.
     speed = np.linalg.norm(0.5 * _SAMPLES * (ahead - behind)[:, :2] + drift[:2] + across, axis=1)
-    low = 1.0 / (1.0 + ((height - height.min()) / _LOW) ** 2)
-    return low / (1.0 + (speed / _SLOW) ** 2)
+    low = 1.0 / (1.0 + ((height - height.min()) / _STANCE_HEIGHT) ** 2)
+    return low / (1.0 + (speed / _STANCE_SPEED) ** 2)
 
 
 def _best_shift(reference: Array, features: Array) -> int:
@@ -61,18 +62,18 @@ def _best_shift(reference: Array, features: Array) -> int:
     return best if correlation[best] - correlation[0] > 0.02 * spread + 1e-12 else 0
 
 
-def _warp(reference: Array, features: Array) -> Array:
+def _time_warp(reference: Array, features: Array) -> Array:
     """Lead of the loop's phase over the reference's at each sample [samples], by dynamic time warping in a band.
 
     The lead changes by at most one sample per sample, and is zero at the lap's ends.
     """
-    leads = np.arange(-_BAND, _BAND + 1)
+    leads = np.arange(-_MAX_LEAD, _MAX_LEAD + 1)
     index: IntArray = (np.arange(_SAMPLES)[:, None] + leads) % _SAMPLES
     cost = ((features[index] - reference[:, None, :]) ** 2).sum(axis=2)
     # A small cost of the lead, so that without a difference in mismatch there is no warp.
-    cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _BAND)
+    cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _MAX_LEAD)
     total = np.full(len(leads), np.inf)
-    total[_BAND] = 0.0
+    total[_MAX_LEAD] = 0.0
     steps = np.zeros((_SAMPLES, len(leads)), dtype=np.int64)
     for k in range(_SAMPLES):
         padded = np.pad(total, 1, constant_values=np.inf)
@@ -80,31 +81,31 @@ def _warp(reference: Array, features: Array) -> Array:
         steps[k] = np.array([0, -1, 1])[options.argmin(axis=0)]
         total = options.min(axis=0) + cost[k]
     lead = np.zeros(_SAMPLES)
-    at = _BAND
+    at = _MAX_LEAD
     for k in range(_SAMPLES - 1, -1, -1):
         lead[k] = leads[at]
         at += steps[k, at]
     return lead
 
 
-def _smoothed(lead: Array) -> Array:
+def _smooth_lead(lead: Array) -> Array:
     """Periodic lead smoothed by a Gaussian of a sixteenth of the lap, and scaled to the steepest slope allowed."""
     frequency = np.fft.rfftfreq(_SAMPLES)
     spectrum = np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _SAMPLES / 16.0) ** 2)
     smooth = np.fft.irfft(spectrum, _SAMPLES)
     steepest = float(np.abs(np.diff(smooth, append=smooth[:1])).max())
-    return smooth * min(1.0, _STEEPEST / max(steepest, 1e-12))
+    return smooth * min(1.0, _MAX_PACE_CHANGE / max(steepest, 1e-12))
 
 
-def _lead(reference: Array, features: Array) -> Array:
+def _worthwhile_lead(reference: Array, features: Array) -> Array:
     """Lead of a loop over the reference at each sample [laps]: the smoothed warp, or zero if it gains little."""
-    lead = _smoothed(_warp(reference, features))
+    lead = _smooth_lead(_time_warp(reference, features))
     at = np.arange(_SAMPLES) + lead
     first = np.floor(at).astype(int)
     share = (at - first)[:, None]
     warped = (1.0 - share) * features[first % _SAMPLES] + share * features[(first + 1) % _SAMPLES]
     left, before = float(((warped - reference) ** 2).sum()), float(((features - reference) ** 2).sum())
-    return lead / _SAMPLES if left < _WORTH * before else np.zeros(_SAMPLES)
+    return lead / _SAMPLES if left < _MAX_MISMATCH_RATIO * before else np.zeros(_SAMPLES)
 
 
 def aligned_channels(loops: list[Loop], samples: int, limbs: Sequence[Limb] = ()) -> Array:
@@ -132,7 +133,7 @@ def aligned_channels(loops: list[Loop], samples: int, limbs: Sequence[Limb] = ()
     for loop in loops[1:]:
         features = _features(loop, limbs)
         shift = _best_shift(reference, features)
-        lead = _lead(reference, np.roll(features, -shift, axis=0))
+        lead = _worthwhile_lead(reference, np.roll(features, -shift, axis=0))
         knots = np.arange(_SAMPLES + 1) / _SAMPLES
         smooth = CubicSpline(knots, np.append(lead, lead[0]), bc_type="periodic")(phase)
         own = loop.channels(phase + shift / _SAMPLES + smooth, smooth)

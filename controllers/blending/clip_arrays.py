@@ -1,4 +1,4 @@
-"""Clips and limbs of a map as plain arrays for storage, and back, bit for bit."""
+"""Clips and limbs of a map as plain arrays for storage, restored bit for bit."""
 
 from collections.abc import Mapping, Sequence
 
@@ -31,7 +31,7 @@ def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limb
 
 
 def kept(arrays: Mapping[str, Array], key: str, shape: tuple[int | None, ...]) -> Array:
-    """The array of a key, as floats of a given shape, in which None stands for any length.
+    """Stored array of a key, as floats of a given shape, in which None stands for any length.
 
     Raises
     ------

@@ -4,7 +4,7 @@ r"""Weighted mean pose of several clips at a phase, and its derivative.
 
 θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
 the ground by its twist ξ (`loops`); the ends of limbs are blended like the root, and the limbs follow by inverse
-kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
+kinematics (`limbs`). A ∈ SE(2) is the frame of the lap, stored in the memory (`lap`).
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from controllers.state import Array, IntArray
 from controllers.work_array import work_array
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
-_WAYS = 3  # parameters of a pose: θ, and two by which only the weights change
+_PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weights
 
 
 @njit
@@ -66,8 +66,8 @@ def _mean_position(value: Array, slope: Array, column: int, weights: Array, chan
         for k in range(3):
             mean[0, k] += weights[i] * value[i, column + k]
             mean[1, k] += weights[i] * slope[i, column + k]
-            for way in range(_WAYS):
-                mean[1 + way, k] += changes[way, i] * value[i, column + k]
+            for parameter in range(_PARAMETERS):
+                mean[1 + parameter, k] += changes[parameter, i] * value[i, column + k]
 
 
 @njit
@@ -77,8 +77,8 @@ def _mean_drift(drifts: Array, weights: Array, changes: Array, mean: Array) -> N
     for i in range(drifts.shape[0]):
         for k in range(3):
             mean[0, k] += weights[i] * drifts[i, k]
-            for way in range(_WAYS):
-                mean[1 + way, k] += changes[way, i] * drifts[i, k]
+            for parameter in range(_PARAMETERS):
+                mean[1 + parameter, k] += changes[parameter, i] * drifts[i, k]
 
 
 @njit
@@ -102,7 +102,7 @@ def _turn_position(angle: float, turn: Array, x: float, y: float, shift: Array, 
     `turn` (3,) and `shift` (2, 3) hold the derivatives of angle and shift.
     """
     c, s = np.cos(angle), np.sin(angle)
-    for k in range(_WAYS):
+    for k in range(_PARAMETERS):
         dx, dy = p[1 + k, 0] - turn[k] * p[0, 1], p[1 + k, 1] + turn[k] * p[0, 0]
         p[1 + k, 0], p[1 + k, 1] = c * dx - s * dy + shift[0, k], s * dx + c * dy + shift[1, k]
     p[0, 0], p[0, 1] = c * p[0, 0] - s * p[0, 1] + x, s * p[0, 0] + c * p[0, 1] + y
@@ -113,7 +113,7 @@ def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
     """Turn a rotation about the vertical by an angle with derivatives `turn`; rates are local, shape (3, 3)."""
     up_x, up_y = 2.0 * (q[1] * q[3] - q[0] * q[2]), 2.0 * (q[2] * q[3] + q[0] * q[1])
     up_z = 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2])
-    for k in range(_WAYS):
+    for k in range(_PARAMETERS):
         rate[0, k] += turn[k] * up_x
         rate[1, k] += turn[k] * up_y
         rate[2, k] += turn[k] * up_z
@@ -216,14 +216,14 @@ def combine(
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
-    _combine(
+    _combine_borrowed(
         borrowed(figure), borrowed(clips), angle, borrowed(mixture), borrowed(memory), borrowed(ground), borrowed(pose),
         borrowed(jacobian),
     )  # fmt: skip
 
 
 @njit(forceinline=True)
-def _combine(
+def _combine_borrowed(
     figure: Array, clips: ClipsAt, angle: float, mixture: Mixture, memory: Array, ground: Ground, pose: Array,
     jacobian: Array,
 ) -> None:  # fmt: skip
@@ -233,9 +233,9 @@ def _combine(
     rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
-    tangents = _WAYS if jacobian.shape[0] > 0 else 0
+    tangents = _PARAMETERS if jacobian.shape[0] > 0 else 0
 
-    drift, shift, turn = work_array((1 + _WAYS, 3)), work_array((2, 3)), work_array(3)
+    drift, shift, turn = work_array((1 + _PARAMETERS, 3)), work_array((2, 3)), work_array(3)
     _mean_drift(drifts, weights[0], changes[0], drift)
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.

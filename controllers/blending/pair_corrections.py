@@ -24,9 +24,10 @@ _ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
 
 
 def neighbouring_pairs(sites: Array, share: float = 0.0) -> list[tuple[int, int]]:
-    """Pairs of sites (rows, m, 2) that are Gabriel neighbours (Gabriel & Sokal 1969) at a share of the rows, or at one.
+    """Pairs of sites (rows, m, 2) that are Gabriel neighbours (Gabriel & Sokal 1969) in at least `share` of the rows.
 
-    No other site lies in or on the circle whose diameter is the segment between the two.
+    No other site lies in or on the circle whose diameter is the segment between the two. One row is enough if `share`
+    is 0.
     """
     clips = sites.shape[1]
     found: list[tuple[int, int]] = []
@@ -34,9 +35,9 @@ def neighbouring_pairs(sites: Array, share: float = 0.0) -> list[tuple[int, int]
         for i in range(j):
             middle, half = 0.5 * (sites[:, i] + sites[:, j]), 0.5 * np.linalg.norm(sites[:, i] - sites[:, j], axis=1)
             others = np.delete(sites, (i, j), axis=1)
-            apart = np.linalg.norm(others - middle[:, None], axis=2).min(axis=1, initial=np.inf)
-            alone = apart > half + _ROUNDING
-            if alone.any() and alone.mean() >= share:
+            nearest = np.linalg.norm(others - middle[:, None], axis=2).min(axis=1, initial=np.inf)
+            adjacent = nearest > half + _ROUNDING
+            if adjacent.any() and adjacent.mean() >= share:
                 found.append((i, j))
     return found
 
@@ -65,9 +66,9 @@ def packed_pairs(channels: Array, drifts: Array, limbs: Sequence[Limb], pairs: S
     for n, (i, j) in enumerate(pairs):
         index[i, j] = n
         weights[n, :, i], weights[n, :, j] = 1.0 - second, second
-    found = foot_corrections(channels, drifts, limbs, weights.reshape(-1, clips))
+    corrections = foot_corrections(channels, drifts, limbs, weights.reshape(-1, clips))
     powers = (second * (1.0 - second))[:, None] * (1.0 - 2.0 * second)[:, None] ** np.arange(_TERMS)
-    table = np.einsum("kt,nptc->npkc", np.linalg.inv(powers), found.reshape(rows, len(pairs), _TERMS, size))
+    table = np.einsum("kt,nptc->npkc", np.linalg.inv(powers), corrections.reshape(rows, len(pairs), _TERMS, size))
     return np.concatenate([[rows, clips, len(pairs), size], index.ravel(), control_points(table, np.ones(1)).ravel()])
 
 
@@ -111,9 +112,9 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
                 continue
             product, difference, power, slope = w[a] * w[b], w[a] - w[b], 1.0, 0.0
             for k in range(_TERMS):
-                for way in range(3):
-                    rates[way] = (changes[way, a] * w[b] + w[a] * changes[way, b]) * power
-                    rates[way] += product * slope * (changes[way, a] - changes[way, b])
+                for parameter in range(3):
+                    rates[parameter] = (changes[parameter, a] * w[b] + w[a] * changes[parameter, b]) * power
+                    rates[parameter] += product * slope * (changes[parameter, a] - changes[parameter, b])
                 first = table + (pair * _TERMS + k) * channels
                 for c in range(channels):
                     p = first + c
@@ -121,7 +122,7 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
                     value = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
                     d[0, c] += product * power * value
                     d[1, c] += product * power * scale * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
-                    for way in range(3):
-                        d[1 + way, c] += rates[way] * value
+                    for parameter in range(3):
+                        d[1 + parameter, c] += rates[parameter] * value
                 slope = (k + 1) * power
                 power *= difference

@@ -5,7 +5,7 @@ import numpy as np
 from controllers.state import Array
 
 NODE = 8  # numbers per node: start of the chord (3), chord (3), 1/|chord|², radius
-_NOWHERE = 1e150  # [m] position of nodes without a piece, so that they are always out of reach
+_UNREACHABLE = 1e150  # [m] position of nodes without a piece, so that they are always out of reach
 
 
 def capsule_tree(coefficients: Array, step: Array) -> tuple[Array, int]:
@@ -35,7 +35,7 @@ def capsule_tree(coefficients: Array, step: Array) -> tuple[Array, int]:
     c0, c1, c2, c3 = (coefficients[:, k] for k in range(4))
     end = c0 + h * (c1 + h * (c2 + h * c3))
     control = np.stack([c0, c0 + h * c1 / 3.0, c0 + 2.0 * h * c1 / 3.0 + h * h * c2 / 3.0, end], axis=1)
-    tree = np.tile([_NOWHERE] * 3 + [0.0] * (NODE - 3), (2 ** (levels + 1), 1))
+    tree = np.tile([_UNREACHABLE] * 3 + [0.0] * (NODE - 3), (2 ** (levels + 1), 1))
     for level in range(levels + 1):
         run = 2 ** (levels - level)
         firsts = np.arange(0, n, run)

@@ -16,15 +16,17 @@ from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
 
-BRANCHES = 8  # largest number of branches of one curve; further ones are ignored
+BRANCHES = 8  # largest number of branches of one curve that are found; others are ignored
 
 SAME_BRANCH = 0.1
-"""Largest change of phase from one tick to the next, of a lap, at which a branch is still the one that was followed."""
+"""Largest change of phase from one tick to the next, as a fraction of the lap, at which a branch counts as the same."""
 
 
 @njit
-def _runs(blob: Array, at: int, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array) -> int:
-    """Runs of pieces that come nearer than the radius, as rows [first, last, likely nearest]; returns their number."""
+def _find_runs(
+    blob: Array, at: int, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array
+) -> int:
+    """Write the runs of pieces nearer than the radius, as rows [first, last, likely nearest]; returns their number."""
     pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
     breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
     nodes = work_integers(64)
@@ -92,7 +94,7 @@ def branches(blob: Array, at: int, px: float, py: float, pz: float, radius: floa
     runs, scratch = work_integers((BRANCHES, 3)), work_array((48, 8))
     pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
     breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
-    count = _runs(blob, at, px, py, pz, radius, runs, scratch)
+    count = _find_runs(blob, at, px, py, pz, radius, runs, scratch)
     for k in range(count):
         best: float = math.inf
         # The likely nearest piece first: its distance then rules out most others.

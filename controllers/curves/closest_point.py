@@ -6,7 +6,7 @@ number of roots; the piece is halved until the roots are isolated, and a safegua
 no root is missed.
 
 A warm start only tightens the first bound: it speeds the search up and cannot trap it in a local minimum. Of equally
-near points (within 1e-11 m) the one found first is kept, which is that of the warm start.
+near points (within 1e-11 m) the first one found is returned, which is that of the warm start.
 """
 
 import math
@@ -32,11 +32,11 @@ from controllers.curves.trajectory import (
 from controllers.state import Array
 from controllers.work_array import work_array, work_integers
 
-_TIE = 1e-11  # [m] a branch is searched only if it may improve the distance by more than this
+_TIE_TOLERANCE = 1e-11  # [m] a branch is searched only if it may improve the distance by more than this
 
 
 @njit
-def _slope(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> tuple[float, float]:
+def _quintic(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> tuple[float, float]:
     """Quintic f = (φ − p)·φ̇ and f' = |φ̇|² + (φ − p)·φ̈ at u."""
     x, y, z = piece_point(blob, row, u)
     vx, vy, vz = piece_velocity(blob, row, u)
@@ -46,24 +46,24 @@ def _slope(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> 
 
 
 @njit
-def _square(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> float:
+def _squared_distance(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> float:
     x, y, z = piece_point(blob, row, u)
     return (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
 
 
 @njit
-def _root(blob: Array, row: int, low: float, high: float, px: float, py: float, pz: float) -> float:
+def _refine_root(blob: Array, row: int, low: float, high: float, px: float, py: float, pz: float) -> float:
     """Root of f between low (f < 0) and high (f > 0): Newton, bisecting whenever it leaves the bracket or stalls."""
-    f_low, _ = _slope(blob, row, low, px, py, pz)
-    f_high, _ = _slope(blob, row, high, px, py, pz)
+    f_low, _ = _quintic(blob, row, low, px, py, pz)
+    f_high, _ = _quintic(blob, row, high, px, py, pz)
     u = 0.5 * (low + high)
     if f_low < 0.0 < f_high:
         u = low - f_low * (high - low) / (f_high - f_low)
-    finest = 1e-15 * (abs(low) + abs(high))
+    resolution = 1e-15 * (abs(low) + abs(high))
     last = high - low
     for _ in range(100):
-        f, slope = _slope(blob, row, u, px, py, pz)
-        if f == 0.0 or high - low <= finest:
+        f, slope = _quintic(blob, row, u, px, py, pz)
+        if f == 0.0 or high - low <= resolution:
             break
         if f < 0.0:
             low = u
@@ -74,13 +74,13 @@ def _root(blob: Array, row: int, low: float, high: float, px: float, py: float, 
             step = u - 0.5 * (low + high)
         last = abs(step)
         u -= step
-        if last <= finest:
+        if last <= resolution:
             break
     return u
 
 
 @njit
-def _variations(b: Array) -> int:
+def _sign_variations(b: Array) -> int:
     """Sign variations of six Bernstein coefficients: an upper bound on the number of roots, of the same parity."""
     count, sign = 0, 0.0
     for k in range(6):
@@ -94,8 +94,8 @@ def _variations(b: Array) -> int:
 @njit
 def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: float, b: Array) -> tuple[float, float]:
     """(d², u) of the point of one piece nearest to p; `b` is scratch of shape (48, 8)."""
-    best, best_u = _square(blob, row, 0.0, px, py, pz), 0.0
-    end = _square(blob, row, h, px, py, pz)
+    best, best_u = _squared_distance(blob, row, 0.0, px, py, pz), 0.0
+    end = _squared_distance(blob, row, h, px, py, pz)
     if end < best:
         best, best_u = end, h
     for k in range(6):
@@ -118,7 +118,7 @@ def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: 
         top -= 1
         row_b = b[top]
         low, high = row_b[6], row_b[7]
-        variations = _variations(row_b)
+        variations = _sign_variations(row_b)
         if variations == 0 or (variations == 1 and row_b[5] < 0.0):
             continue
         largest = 0.0
@@ -127,8 +127,8 @@ def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: 
         # On an arc about p the quintic is only rounding error: stop once it can no longer change the distance.
         flat = 6.0 * largest * (high - low) <= 1e-20 + 1e-12 * best
         if variations == 1 or flat or top > 44:
-            u = h * 0.5 * (low + high) if flat else _root(blob, row, h * low, h * high, px, py, pz)
-            square = _square(blob, row, u, px, py, pz)
+            u = h * 0.5 * (low + high) if flat else _refine_root(blob, row, h * low, h * high, px, py, pz)
+            square = _squared_distance(blob, row, u, px, py, pz)
             if square < best:
                 best, best_u = square, u
             continue
@@ -157,14 +157,14 @@ def chord_square(blob: Array, node: int, px: float, py: float, pz: float) -> flo
 
 
 @njit
-def _out_of_reach(blob: Array, node: int, square: float, best: float) -> bool:
+def _is_out_of_reach(blob: Array, node: int, square: float, best: float) -> bool:
     """Whether no point of the capsule at ``blob[node]`` can be nearer than `best`; `square` is that to its chord."""
-    reach = max(best - _TIE + blob[node + 7], 0.0)
+    reach = max(best - _TIE_TOLERANCE + blob[node + 7], 0.0)
     return square >= reach * reach
 
 
 @njit
-def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:  # noqa: C901 - each case of a piece without a call, once per tick
+def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:  # noqa: C901 - all cases of a piece inline, once per tick
     """Phase t* of the point of the curve packed at ``blob[at:]`` that is nearest to p, over the whole curve.
 
     Parameters
@@ -196,7 +196,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         guess = wrap_phase(blob, at, guess)
         # The hand may have moved over some pieces since: a Newton step follows it over them.
         piece = find_piece(blob, at, guess)
-        f, slope = _slope(blob, rows + piece * PIECE, guess - blob[breaks + piece], px, py, pz)
+        f, slope = _quintic(blob, rows + piece * PIECE, guess - blob[breaks + piece], px, py, pz)
         if slope > 0.0:
             guess = wrap_phase(blob, at, guess - f / slope)
         below = first_leaf + find_piece(blob, at, guess)
@@ -206,7 +206,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         while top > 0:
             top -= 1
             node = int(nodes[top])
-            if _out_of_reach(blob, tree + NODE * node, squares[top], best):
+            if _is_out_of_reach(blob, tree + NODE * node, squares[top], best):
                 continue
             if node < first_leaf:
                 near, far = 2 * node, 2 * node + 1
@@ -223,14 +223,14 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
                 h = blob[breaks + piece + 1] - start
                 square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
                 distance = math.sqrt(square)
-                if distance < best - _TIE:
+                if distance < best - _TIE_TOLERANCE:
                     best, best_t = distance, start + u
         if below == 1:
             break
         sibling = below ^ 1
         squares[0] = chord_square(blob, tree + NODE * sibling, px, py, pz)
         below //= 2
-        if _out_of_reach(blob, tree + NODE * sibling, squares[0], best):
+        if _is_out_of_reach(blob, tree + NODE * sibling, squares[0], best):
             continue
         nodes[0], top = sibling, 1
         head = tree + NODE * sibling

@@ -6,12 +6,12 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_MARGIN = 0.15  # share of the interval at each edge over which the blend is eased
-AXIS = 1e-3  # [m] distance from the axis below which the derivatives are those at this distance
+_EASING_FRACTION = 0.15  # fraction of the interval at each edge over which the blend is eased
+AXIS = 1e-3  # [m] nearer to the axis, derivatives are evaluated at this distance
 
 
 @njit
-def eased(s: float, margin: float = _MARGIN) -> tuple[float, float]:
+def eased(s: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
     """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between except for eased edges; C²."""
     if s <= 0.0:
         return 0.0, 0.0
@@ -27,7 +27,7 @@ def eased(s: float, margin: float = _MARGIN) -> tuple[float, float]:
 
 
 @njit
-def blend_weight(x: float, low: float, high: float, margin: float = _MARGIN) -> tuple[float, float]:
+def blend_weight(x: float, low: float, high: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
     """Weight u of the upper end of an interval, 1 − u being that of the lower end, and its derivative by x."""
     u, slope = eased((x - low) / (high - low), margin)
     return u, slope / (high - low)

@@ -32,8 +32,8 @@ from controllers.curves.trajectory import (
 )
 from controllers.state import Array
 
-# The record's header: step of the grid [s]; h/2 [steps]; number of edits in force, and including those undone; most
-# edits in the table; TABLE to WORK are offsets from the start; then the grasped phase, its point (3), the pending edit.
+# The record's header: step of the grid [s]; h/2 [steps]; number of edits in force, and including those undone; capacity
+# of the table; TABLE to WORK are offsets from the start; then the grasped phase, its point (3), the pending edit.
 STEP, HALF, COUNT, TOTAL, DEPTH, TABLE, BASE, COMMITTED, WORK, PHASE, ANCHOR, PENDING = *range(10), 10, 13
 RECORD_HEADER = 18
 EDIT = 5  # numbers per edit
@@ -53,8 +53,8 @@ def work_curve(record: Array, at: int) -> int:
 
 
 @njit
-def _lay_bump(record: Array, at: int, edit: int, source: int, target: int) -> tuple[int, int]:
-    """Write source + bump to target on the pieces under the edit at ``record[edit:]``; returns first and count."""
+def _add_bump(record: Array, at: int, edit: int, source: int, target: int) -> tuple[int, int]:
+    """Write source + bump to target on the pieces under the edit at ``record[edit:]``; return first piece and count."""
     curve = work_curve(record, at)
     breaks, n = curve + int(record[curve + BREAKS]), int(record[curve + PIECES])
     centre, width = record[edit], record[edit + 1]
@@ -124,7 +124,7 @@ def _bound_piece(record: Array, node: int, row: int, h: float) -> None:
 
 
 @njit
-def _join(record: Array, node: int, left: int, right: int) -> None:
+def _join_capsules(record: Array, node: int, left: int, right: int) -> None:
     """Capsule that contains those of two runs, the second of which begins where the first ends."""
     for i in range(3):
         record[node + i] = record[left + i]
@@ -155,7 +155,7 @@ def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
         for number in range(low, high + 1):
             node, left = tree + NODE * number, tree + NODE * 2 * number
             if 2 * number < last:
-                _join(record, node, left, left + NODE)
+                _join_capsules(record, node, left, left + NODE)
             else:
                 record[node : node + NODE] = record[left : left + NODE]
         last //= 2
@@ -218,7 +218,7 @@ def carry_to(record: Array, at: int, x: float, y: float, z: float) -> None:
     record[edit + 3] = (y - record[at + ANCHOR + 1]) / weight
     record[edit + 4] = (z - record[at + ANCHOR + 2]) / weight
     rows = curve + int(record[curve + COEFFICIENTS])
-    first, count = _lay_bump(record, at, edit, at + int(record[at + COMMITTED]), rows)
+    first, count = _add_bump(record, at, edit, at + int(record[at + COMMITTED]), rows)
     _bound_run(record, curve, first, count)
 
 
@@ -233,10 +233,10 @@ def commit(record: Array, at: int) -> None:
         at + int(record[at + COMMITTED]),
         at + int(record[at + BASE]),
     )
-    _lay_bump(record, at, at + PENDING, committed, committed)
+    _add_bump(record, at, at + PENDING, committed, committed)
     count = int(record[at + COUNT])
     if count == int(record[at + DEPTH]):
-        _lay_bump(record, at, table, base, base)
+        _add_bump(record, at, table, base, base)
         for i in range(table, table + EDIT * (count - 1)):
             record[i] = record[i + EDIT]
         count -= 1
@@ -251,7 +251,7 @@ def _replay(record: Array, at: int, count: int) -> None:
     committed = at + int(record[at + COMMITTED])
     _copy_pieces(record, at, at + int(record[at + BASE]), committed)
     for edit in range(count):
-        _lay_bump(record, at, at + int(record[at + TABLE]) + EDIT * edit, committed, committed)
+        _add_bump(record, at, at + int(record[at + TABLE]) + EDIT * edit, committed, committed)
     record[at + COUNT] = count
     let_go(record, at)
 

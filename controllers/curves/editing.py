@@ -10,14 +10,14 @@ from controllers.curves.trajectory import BREAKS, CHANNELS, COEFFICIENTS, PIECE,
 from controllers.errors import CurveError
 from controllers.state import Array
 
-_GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grasped phase
-_LONGEST = 10_000  # most half widths in a curve: 160 000 steps, a hundred megabytes
-MOST_EDITS = 10_000  # that can be undone: of each, five numbers are kept
-_SAME = 1e-9  # of a step of the grid: breaks nearer than this coincide
+_STEPS_PER_HALF_WIDTH = 16  # grid steps per half width h: the centre of a bump is at most h/32 from the grasped phase
+_MAX_DURATION_RATIO = 10_000  # largest duration of a curve in half widths: 160 000 steps, a hundred megabytes
+MOST_EDITS = 10_000  # largest number of edits that can be undone; each is stored as five numbers
+_BREAK_TOLERANCE = 1e-9  # fraction of a grid step: breaks nearer than this coincide
 
 
-def _of_pieces(times: Array, coefficients: Array, like: Trajectory) -> Trajectory:
-    """Curve of given pieces: with exactly these coefficients instead of a new spline through its samples."""
+def _curve_of_pieces(times: Array, coefficients: Array, like: Trajectory) -> Trajectory:
+    """Curve with exactly these coefficients, instead of a new spline through its samples."""
     u = (times[-1] - times[-2]) ** np.arange(4)
     samples = np.vstack([coefficients[:, 0], u @ coefficients[-1]])
     if like.periodic:
@@ -41,14 +41,14 @@ def refined(curve: Trajectory, cells: int) -> Trajectory:
     breaks, step = np.asarray(curve.times, dtype=float), curve.duration / cells
     grid = curve.start + step * np.arange(cells + 1, dtype=np.float64)
     nearest = np.clip(np.round((breaks - curve.start) / step).astype(int), 0, cells)
-    on_grid = np.abs(breaks - grid[nearest]) <= _SAME * step
+    on_grid = np.abs(breaks - grid[nearest]) <= _BREAK_TOLERANCE * step
     grid[nearest[on_grid]] = breaks[on_grid]
     times = np.sort(np.concatenate([grid, breaks[~on_grid]]))
     piece = np.clip(np.searchsorted(breaks, times[:-1], side="right") - 1, 0, len(breaks) - 2)
     c0, c1, c2, c3 = (curve.coefficients[piece, power] for power in range(4))
     u = (times[:-1] - breaks[piece])[:, None]
     shifted = [c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3), c2 + 3.0 * u * c3, c3]
-    return _of_pieces(times, np.ascontiguousarray(np.stack(shifted, axis=1)), curve)
+    return _curve_of_pieces(times, np.ascontiguousarray(np.stack(shifted, axis=1)), curve)
 
 
 def record_of(curve: Trajectory, width: float, depth: int) -> Array:
@@ -73,17 +73,17 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
         raise CurveError(
             f"a bump's half width must be above 0 s and at most half of the curve's {curve.duration:g} s, got {width}"
         )
-    if curve.duration > _LONGEST * width:
+    if curve.duration > _MAX_DURATION_RATIO * width:
         raise CurveError(
             f"a curve of {curve.duration:g} s cannot be bent by bumps of a half width of {width:g} s; expected "
-            f"{curve.duration / _LONGEST:g} s or more"
+            f"{curve.duration / _MAX_DURATION_RATIO:g} s or more"
         )
     if not 1 <= depth <= MOST_EDITS:
         raise CurveError(f"from 1 to {MOST_EDITS} edits can be undone, got {depth}")
     steps = np.diff(np.asarray(curve.times, dtype=float))
     # For a curve of equal steps the grid is a refinement of its breaks, so that steps stay equal.
-    multiple = len(steps) if np.ptp(steps) <= _SAME * steps[0] else 1
-    cells = multiple * int(np.ceil(_GRID * curve.duration / (width * multiple)))
+    multiple = len(steps) if np.ptp(steps) <= _BREAK_TOLERANCE * steps[0] else 1
+    cells = multiple * int(np.ceil(_STEPS_PER_HALF_WIDTH * curve.duration / (width * multiple)))
     step = curve.duration / cells
     fine = refined(curve, cells)
     packed, rows = fine.packed(), fine.coefficients.ravel()
@@ -108,4 +108,4 @@ def curve_of(record: Array, at: int, like: Trajectory) -> Trajectory:
     blob = record[work_curve.py_func(record, at) :]  # pyright: ignore[reportFunctionMemberAccess]
     pieces, breaks, rows = (int(blob[i]) for i in (PIECES, BREAKS, COEFFICIENTS))
     coefficients = blob[rows : rows + PIECE * pieces].reshape(pieces, 4, CHANNELS)
-    return _of_pieces(blob[breaks : breaks + pieces + 1].copy(), coefficients.copy(), like)
+    return _curve_of_pieces(blob[breaks : breaks + pieces + 1].copy(), coefficients.copy(), like)

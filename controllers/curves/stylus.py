@@ -1,4 +1,4 @@
-"""Stylus poses: where the stylus is, held upright."""
+"""Stylus poses with the stylus upright."""
 
 import numpy as np
 

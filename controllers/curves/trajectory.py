@@ -81,7 +81,7 @@ def piece_acceleration(blob: Array, row: int, u: float) -> tuple[float, float, f
 
 
 @njit
-def _place(blob: Array, at: int, t: float) -> tuple[int, float]:
+def _locate_phase(blob: Array, at: int, t: float) -> tuple[int, float]:
     """Offset of the coefficients of the piece at t, and the time since its break [s]."""
     t = wrap_phase(blob, at, t)
     piece = find_piece(blob, at, t)
@@ -91,25 +91,25 @@ def _place(blob: Array, at: int, t: float) -> tuple[int, float]:
 @njit
 def curve_point(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ(t) [m] of the curve packed at ``blob[at:]``."""
-    row, u = _place(blob, at, t)
+    row, u = _locate_phase(blob, at, t)
     return piece_point(blob, row, u)
 
 
 @njit
 def curve_velocity(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ̇(t) [m/s] of the curve packed at ``blob[at:]``."""
-    row, u = _place(blob, at, t)
+    row, u = _locate_phase(blob, at, t)
     return piece_velocity(blob, row, u)
 
 
 @njit
 def curve_acceleration(blob: Array, at: int, t: float) -> tuple[float, float, float]:
     """φ̈(t) [m/s²] of the curve packed at ``blob[at:]``."""
-    row, u = _place(blob, at, t)
+    row, u = _locate_phase(blob, at, t)
     return piece_acceleration(blob, row, u)
 
 
-def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+def _checked_samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
     array = numbers_of(f"{name} of a curve", values)
     if array.shape != shape:
         raise CurveError(f"{name} of a curve must have shape {shape}, got {array.shape}")
@@ -120,8 +120,8 @@ def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def _sign_continuous(quaternions: Array) -> Array:
-    """Flip signs so that neighbours agree; raises if samples are too coarse for an unambiguous direction of turning."""
+def _with_continuous_signs(quaternions: Array) -> Array:
+    """Flip signs so that neighbours agree; raises if samples are too far apart to tell the direction of turning."""
     dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
     if dots.size and np.abs(dots).min() < 0.5:
         at = int(np.abs(dots).argmin())
@@ -179,8 +179,8 @@ class Trajectory:
         if n < least:
             kind = "periodic" if self.periodic else "open"
             raise CurveError(f"a curve of kind {kind} needs at least {least} samples, got {n}")
-        times = _samples("times", self.times, (n,))
-        positions = _samples("positions", self.positions, (n, 3))
+        times = _checked_samples("times", self.times, (n,))
+        positions = _checked_samples("positions", self.positions, (n, 3))
         if not (np.diff(times) > 0.0).all():
             at = int(np.argmin(np.diff(times)))
             raise CurveError(f"times of a curve must increase; samples {at}, {at + 1} are at {times[at : at + 2]} s")
@@ -197,12 +197,12 @@ class Trajectory:
     def _checked_quaternions(self, n: int) -> Array:
         if self.quaternions is None:
             return np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-        quaternions = _samples("quaternions", self.quaternions, (n, 4))
+        quaternions = _checked_samples("quaternions", self.quaternions, (n, 4))
         norms = np.linalg.norm(quaternions, axis=1)
         if np.abs(norms - 1.0).max() > 1e-6:
             worst = norms[np.abs(norms - 1.0).argmax()]
             raise CurveError(f"quaternions of a curve must have unit length, one has {worst:.6g}")
-        quaternions = _sign_continuous(quaternions / norms[:, None])
+        quaternions = _with_continuous_signs(quaternions / norms[:, None])
         if self.periodic and 1.0 - abs(float(quaternions[-1] @ quaternions[0])) > 1e-9:
             raise CurveError("a periodic curve must repeat its first orientation as its last")
         return quaternions
@@ -224,14 +224,14 @@ class Trajectory:
         centre : array_like, shape (3,)
             In H [m].
         samples : int
-            Samples a lap; 96 keep the spline within 1e-6 of the radius.
+            Samples per lap; 96 keep the spline within 1e-6 of the radius.
         wave : float
             a [m].
 
         Raises
         ------
         ControllerError
-            If a number is none, negative or not finite, or the circle has no length.
+            If an argument is not a number, negative or not finite, or the circle has no length.
         """
         checked("radius", radius, "m")
         checked("period", period, "s")
@@ -280,7 +280,7 @@ class Trajectory:
         """Duration of one lap, or from end to end [s]."""
         return self.end - self.start
 
-    def _values(self, t: npt.ArrayLike, derivative: int) -> Array:
+    def _evaluate(self, t: npt.ArrayLike, derivative: int) -> Array:
         times, phase = cast("Array", self.times), np.asarray(t, dtype=float)
         if self.periodic:
             phase = self.start + np.mod(phase - self.start, self.duration)
@@ -294,19 +294,19 @@ class Trajectory:
 
     def point(self, t: npt.ArrayLike) -> Array:
         """φ(t) [m], shape (..., 3) for phases of shape (...)."""
-        return self._values(t, 0)[..., :3]
+        return self._evaluate(t, 0)[..., :3]
 
     def velocity(self, t: npt.ArrayLike) -> Array:
         """φ̇(t) [m/s], shape (..., 3)."""
-        return self._values(t, 1)[..., :3]
+        return self._evaluate(t, 1)[..., :3]
 
     def acceleration(self, t: npt.ArrayLike) -> Array:
         """φ̈(t) [m/s²], shape (..., 3)."""
-        return self._values(t, 2)[..., :3]
+        return self._evaluate(t, 2)[..., :3]
 
     def orientation(self, t: npt.ArrayLike) -> Array:
         """R_H(t), unit quaternions wxyz, shape (..., 4)."""
-        s = self._values(t, 0)[..., 3:]
+        s = self._evaluate(t, 0)[..., 3:]
         return s / np.linalg.norm(s, axis=-1, keepdims=True)
 
     def curvature(self, t: npt.ArrayLike) -> Array:
@@ -319,10 +319,10 @@ class Trajectory:
         """Length [m] of the curve from its start to φ(t), t in [start, end], shape (...) for phases of shape (...)."""
         times, phase = cast("Array", self.times), np.clip(np.asarray(t, dtype=float), self.start, self.end)
         piece = np.clip(np.searchsorted(times, phase, side="right") - 1, 0, len(times) - 2)
-        whole = np.concatenate(([0.0], np.cumsum(self._arc(times[:-1], np.diff(times)))))
-        return whole[piece] + self._arc(times[piece], phase - times[piece])
+        cumulative = np.concatenate(([0.0], np.cumsum(self._arc_within_piece(times[:-1], np.diff(times)))))
+        return cumulative[piece] + self._arc_within_piece(times[piece], phase - times[piece])
 
-    def _arc(self, t: Array, step: Array) -> Array:
+    def _arc_within_piece(self, t: Array, step: Array) -> Array:
         """Integral of |φ̇| over [t, t + step] within a piece, by Gauss-Legendre quadrature."""
         speed = np.linalg.norm(self.velocity(t[..., None] + step[..., None] * _GAUSS_NODES), axis=-1)
         return step * (speed @ _GAUSS_WEIGHTS)

@@ -39,7 +39,7 @@ class ClipMap(KernelMap):
         limbs: Sequence[Limb],
     ) -> None:
         super().__init__(params)
-        # Stored as given, so that a map made of them again is the same bit for bit.
+        # Stored as given, so that a map rebuilt from them is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
         self.names, self.limbs = tuple(names), tuple(limbs)
 

@@ -23,27 +23,27 @@ from controllers.state import Array
 
 
 @njit
-def _about_y(angle: float) -> Quaternion:
+def _rotation_about_y(angle: float) -> Quaternion:
     return np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0
 
 
 @njit
-def _about_z(angle: float) -> Quaternion:
+def _rotation_about_z(angle: float) -> Quaternion:
     return np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
 
 
 @njit
-def _wrapped(angle: float) -> float:
+def _wrap_angle(angle: float) -> float:
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 @njit
-def _zyz(q: Quaternion, sign: float) -> Vector:
+def _zyz_angles(q: Quaternion, sign: float) -> Vector:
     """Angles a, b, c of R_z(a) R_y(b) R_z(c), with b of a given sign; at b = 0 only a + c is defined."""
     w, x, y, z = q
     total, difference = np.arctan2(z, w), np.arctan2(-sign * x, sign * y)
     b = 2.0 * np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
-    return _wrapped(total + difference), sign * b, _wrapped(total - difference)
+    return _wrap_angle(total + difference), sign * b, _wrap_angle(total - difference)
 
 
 @njit
@@ -100,15 +100,15 @@ def bend_arm(wrist: Vector, tool: Quaternion, upper: float, fore: float, arm_ang
     sine = np.sqrt(1.0 - cosine * cosine)
     elbow = np.arctan2(sine, cosine)
     beta = np.arctan2(fore * sine, upper + fore * cosine)
-    to_wrist = product(_about_z(azimuth), _about_y(elevation))
-    swivel = product(to_wrist, _about_z(arm_angle))
-    shoulder = product(swivel, _about_y(-beta))
-    arm = product(shoulder, _about_y(elbow))
+    to_wrist = product(_rotation_about_z(azimuth), _rotation_about_y(elevation))
+    swivel = product(to_wrist, _rotation_about_z(arm_angle))
+    shoulder = product(swivel, _rotation_about_y(-beta))
+    arm = product(shoulder, _rotation_about_y(elbow))
     hand = product((arm[0], -arm[1], -arm[2], -arm[3]), tool)
-    q[0], q[1], q[2] = _zyz(shoulder, 1.0)
+    q[0], q[1], q[2] = _zyz_angles(shoulder, 1.0)
     q[3] = elbow
-    q[4], q[5], q[6] = _zyz(hand, -1.0)
-    elevation_axis = turned(_about_z(azimuth), (0.0, 1.0, 0.0))
+    q[4], q[5], q[6] = _zyz_angles(hand, -1.0)
+    elevation_axis = turned(_rotation_about_z(azimuth), (0.0, 1.0, 0.0))
     return ArmPosture(wrist, flat, upper, fore, sine, cosine, swivel, shoulder, arm, elevation_axis)
 
 

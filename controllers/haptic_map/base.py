@@ -55,7 +55,7 @@ class HapticMap(ABC):
         register(cls.map_kernel)
 
     def __getstate__(self) -> object:
-        """What is copied and pickled: all but the callback, which asks this very object."""
+        """State to copy or pickle: all attributes but the callback, which calls this very object."""
         state = super().__getstate__()
         plain, *slots = state if isinstance(state, tuple) else (state,)
         if isinstance(plain, dict):
@@ -91,16 +91,16 @@ class HapticMap(ABC):
         """
         asked = self._asked
         if asked is None:
-            # By name, so that a method replaced in its class is asked, too.
+            # Looked up by name, so that a method replaced in its class is called.
             asked = Asked(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
-            object.__setattr__(self, "_asked", asked)  # kept alive, since the tick has only its address
+            object.__setattr__(self, "_asked", asked)  # keeps the callback alive, since the tick has only its address
         origin = np.array(_ORIGIN)
         start = self.pose(origin)
         asked.begin(checked_pose(start, np.size(start), type(self).__name__, origin))
         return CompiledMap.of(self.map_kernel, asked.params, np.zeros(1))
 
     def check(self) -> None:
-        """Raise the first error of a user-defined map that was called by the tick, if there was one."""
+        """Raise the first error of a user-defined map that occurred when the tick called it, if there was one."""
         if self._asked is not None and self._asked.error is not None:
             raise self._asked.error
 
@@ -141,7 +141,7 @@ class HapticMap(ABC):
 class KernelMap(HapticMap):
     """A map whose pose and derivative are computed by one compiled kernel, the `map_kernel` of its class.
 
-    Its configurations are those of the figure, unless the class says another `nq`.
+    Its configurations are those of the figure, unless the class overrides `nq`.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class KernelMap(HapticMap):
     Raises
     ------
     ParameterError
-        If the class has no kernel, or the parameters are no row of numbers.
+        If the class has no kernel, or the parameters are not a row of numbers.
     """
 
     def __init__(self, params: npt.ArrayLike) -> None:

@@ -21,15 +21,15 @@ from controllers.work_array import work_array
 
 FPS = 120.0  # rows of o per second of the phase
 LEAD_IN = 0.1  # [s] before the gate at which the rows begin
-# Rows of zeros, then of the first row, that close the periodic spline behind the last row; never read. Their
-# influence decays by 0.27 a row, to 7e-10.
+# Number of rows of zeros, and then of copies of the first row, that close the periodic spline after the last row. They
+# are never read, and their influence decays by 0.27 per row, to 7e-10.
 _PADDING = 16
-# A row of the directory: first and second river, offset and number of rows, offset and number of gates.
-_FIRST, _SECOND, _ROWS, _COUNT, _GATES, _PHASES, _ENTRY = range(7)
+# Columns of the directory: first and second river, offset and number of rows, offset and number of gates.
+_FIRST, _SECOND, _FIRST_ROW, _ROW_COUNT, _FIRST_GATE, _GATE_COUNT, _ENTRY_SIZE = range(7)
 
 
 class ClipChange(NamedTuple):
-    """A change from a river's clip to another's.
+    """A precomputed transition from one river's clip to another's.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class ClipChange(NamedTuple):
 
 def packed_changes(changes: Sequence[ClipChange]) -> Array:
     """Changes packed for the kernels: their number, a directory, then their rows and gates."""
-    at, rows, data = 1 + _ENTRY * len(changes), [], []
+    at, rows, data = 1 + _ENTRY_SIZE * len(changes), [], []
     for change in changes:
         blank = np.zeros((_PADDING, change.offsets.shape[1]))
         samples = np.concatenate([change.offsets, blank, blank + change.offsets[0]])
@@ -70,7 +70,7 @@ def packed_changes(changes: Sequence[ClipChange]) -> Array:
 def known_between(changes: Array, first: float, second: float) -> bool:
     """Whether there is a precomputed change from one river to another."""
     for k in range(int(changes[0])):
-        entry = changes[1 + k * _ENTRY :]
+        entry = changes[1 + k * _ENTRY_SIZE :]
         if entry[_FIRST] == first and entry[_SECOND] == second:
             return True
     return False
@@ -84,16 +84,16 @@ def gate_behind(
 
     Phases count from the start of the lap [s]. The number is −1 if no gate was passed.
     """
-    way = now - before
-    way -= lap * np.round(way / lap)
+    step = now - before
+    step -= lap * np.round(step / lap)
     for k in range(int(changes[0])):
-        entry = changes[1 + k * _ENTRY :]
+        entry = changes[1 + k * _ENTRY_SIZE :]
         if entry[_FIRST] == first and entry[_SECOND] == second:
-            gates = int(entry[_GATES])
-            for i in range(gates, gates + int(entry[_PHASES])):
+            gates = int(entry[_FIRST_GATE])
+            for i in range(gates, gates + int(entry[_GATE_COUNT])):
                 behind = now - changes[i]
                 behind -= lap * np.floor(behind / lap)
-                if behind < way:
+                if behind < step:
                     return k, float(changes[i])
     return -1, 0.0
 
@@ -101,7 +101,7 @@ def gate_behind(
 @njit
 def change_lasts(changes: Array, k: int) -> float:
     """T, duration of a change [s]."""
-    return (changes[1 + k * _ENTRY + _COUNT] - 1.0) / FPS - LEAD_IN
+    return (changes[1 + k * _ENTRY_SIZE + _ROW_COUNT] - 1.0) / FPS - LEAD_IN
 
 
 @njit
@@ -121,12 +121,12 @@ def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacob
     jacobian : Array, shape (nv, 6) or (0, 6)
         Updated.
     """
-    entry = changes[1 + k * _ENTRY :]
-    size, last = 6 + 3 * ((pose.shape[0] - 7) // 4), int(entry[_COUNT]) - 1
+    entry = changes[1 + k * _ENTRY_SIZE :]
+    size, last = 6 + 3 * ((pose.shape[0] - 7) // 4), int(entry[_ROW_COUNT]) - 1
     u = min(max((s + LEAD_IN) * FPS, 0.0), float(last))
     row = min(int(u), last - 1)
     offset, rate = work_array(size), work_array(size)
-    interpolate(borrowed(changes[int(entry[_ROWS]) + row * size :]), size, u - row, FPS, offset, rate)
+    interpolate(borrowed(changes[int(entry[_FIRST_ROW]) + row * size :]), size, u - row, FPS, offset, rate)
     w, a, b, c = pose[3], pose[4], pose[5], pose[6]
     x, y, z = rotate(w, a, b, c, offset[0], offset[1], offset[2])
     pose[0], pose[1], pose[2] = pose[0] + x, pose[1] + y, pose[2] + z

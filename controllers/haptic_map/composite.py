@@ -38,7 +38,7 @@ class Composite(AnimationMap):
 
     θ = atan2(y, x) is the phase; the radius r blends red (inside) and blue (outside) with the weights 1 − u(r) and u(r)
     for the joints of the upper body, where u has eased ends (C²). Root and all other joints are those of the lower
-    clip. Where the lower clip's legs cannot carry all of red and blue, only a share λ of them is blended in
+    clip. Where the lower clip's legs cannot support all of red and blue, only a share λ of them is blended in
     (`with_share`). h does not depend on height or orientation of the stylus; on the axis r = 0 it is not defined.
 
     Parameters
@@ -87,7 +87,7 @@ class Composite(AnimationMap):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Says so if only a share of red and blue is blended in."""
+        """A remark if only a share of red and blue is blended in."""
         if self.share == 1.0:
             return ()
         return (f"the lower body bears {100 * self.share:.0f} % of the others' arms",)
@@ -131,5 +131,5 @@ class Composite(AnimationMap):
         r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
         upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
         share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        made = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
-        return made.with_share(share)
+        result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
+        return result.with_share(share)

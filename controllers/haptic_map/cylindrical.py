@@ -22,12 +22,13 @@ from controllers.work_array import work_array
 
 _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")
-_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _SHARE, _TABLE_SIZE, _TABLE = range(8)
-# Nodes of the table of corrections along each of r and z: cheer with ginga slides 1.0 cm with 9 and 17, too; walk,
-# run, ginga and cheer, which are not blended as a whole, 6.0 and 5.4 cm instead of 7.5.
+_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _LEGS_OF, _SHARE, _TABLE_SIZE, _TABLE = range(8)
+# Nodes of the table of corrections along each of r and z: a blend of cheer and ginga slides 1.0 cm, also with 9 and 17;
+# one of walk, run, ginga and cheer, which no map blends as a whole, slides 7.5 cm, with 9 and 17 nodes 6.0 and 5.4 cm.
 _NODES = 13
-_EDGE = 0.05  # eased share at each end of the table's coordinates: nodes are dense where a clip's weight is small
-_ROWS = 512  # largest number of rows of the table round the lap
+# eased fraction at each end of the table's coordinates: nodes are dense where a clip's weight is small
+_TABLE_EASING = 0.05
+_MAX_ROWS = 512  # largest number of rows of the table round the lap
 
 
 @njit
@@ -37,7 +38,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     radius, angle = cylinder(x, chain)
     a, a_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     b, b_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX])
-    owner = int(params[_OWN_LEGS]) - 1
+    owner = int(params[_LEGS_OF]) - 1
     last = 1 if owner >= 0 else 0
     weights, changes = work_array((1 + last, _CLIPS)), work_array((1 + last, 3, _CLIPS))
     weights[:], changes[:] = 0.0, 0.0
@@ -56,8 +57,8 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     table = params[_TABLE : _TABLE + size]
     d = work_array((4, table_channels(table) if size > 0 else 0))
     if size > 0:
-        i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
-        j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
+        i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _TABLE_EASING)
+        j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _TABLE_EASING)
         correction(table, angle, i, j, d, jacobian.shape[0] > 0)
         for k in range(d.shape[1]):
             d[2, k] *= i_slope
@@ -68,7 +69,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
 def _mixtures() -> tuple[Array, Array]:
     """The table's nodes (k, 2), as shares of r and z, and the weights of the clips there (k, 4)."""
     ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
-    nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [ease(at, _EDGE)[0] for at in share], share)
+    nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [ease(at, _TABLE_EASING)[0] for at in share], share)
     z, r = np.meshgrid(nodes, nodes)
     places = np.stack([r.ravel(), z.ravel()], axis=-1)
     a, b = (np.array([ease(at)[0] for at in way]) for way in places.T)
@@ -88,11 +89,12 @@ class Cylindrical(AnimationMap):
     describes how poses are blended. With limbs, in-betweens are corrected by a table (`inbetween`): feet move one at a
     time while they are lifted (`footfalls`), and the root may sway (`with_sway`).
 
-    The mean of clips with different footsteps is no gait: while one clip plants a foot, another lifts it. With `upper`,
-    only those joints are blended; root, legs and feet are those of one clip everywhere. Where that clip's legs cannot
-    carry more, only a share λ of the others' joints is blended in: the weights are λ w_i, plus 1 − λ for that clip.
+    The mean of clips with different footsteps is not a gait: while one clip plants a foot, another lifts it. With
+    `upper`, only those joints are blended; root, legs and feet are those of one clip everywhere. Where that clip's legs
+    cannot support more, only a share λ of the others' joints is blended in: the weights are λ w_i, plus 1 − λ for
+    that clip.
 
-    A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
+    A ∈ SE(2) is the frame of the lap, stored in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
     seam θ = 0 forwards, and by the inverse backwards, so the figure walks on. Pose, velocity and acceleration are
     continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
     position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.
@@ -158,21 +160,21 @@ class Cylindrical(AnimationMap):
         legs = 1.0 + legs_of if self.upper else 0.0
         super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
-        self._numbers = numbers
+        self._intervals = numbers
         self._nodes, self.mixtures = _mixtures()
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
         self.corrections: Array = np.empty((0, len(self.mixtures), ROOT))
         if limbs:
-            self._correct(self._found(limbs) if corrections is None else corrections)
+            self._set_corrections(self._compute_corrections(limbs) if corrections is None else corrections)
 
-    def _found(self, limbs: Sequence[Limb]) -> Array:
+    def _compute_corrections(self, limbs: Sequence[Limb]) -> Array:
         if self.upper:
-            return np.zeros((_ROWS, *correction_shape(len(limbs))))
-        rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
+            return np.zeros((_MAX_ROWS, *correction_shape(len(limbs))))
+        rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _MAX_ROWS))
         channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
         return foot_corrections(channels, self.drifts, limbs, self.mixtures)
 
-    def _correct(self, values: Array) -> None:
+    def _set_corrections(self, values: Array) -> None:
         table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))
         blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
         self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
@@ -180,18 +182,18 @@ class Cylindrical(AnimationMap):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Says so if only some joints are blended."""
+        """A remark if only some joints are blended."""
         if not self.upper:
             return ()
         owner = _ORDINALS[self.legs_of]
-        told = f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's"
+        remark = f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's"
         if self.share < 1.0:
-            told += f", which bear {100 * self.share:.0f} % of the others' arms"
-        return (told,)
+            remark += f", which bear {100 * self.share:.0f} % of the others' arms"
+        return (remark,)
 
     def places(self, angles: Array) -> Array:
         """Upright stylus poses (k, n, 7) at which the weights are those of the mixtures, at angles θ (n,)."""
-        r_min, r_max, z_min, z_max = self._numbers
+        r_min, r_max, z_min, z_max = self._intervals
         r, z = r_min + self._nodes[:, 0] * (r_max - r_min), z_min + self._nodes[:, 1] * (z_max - z_min)
         x = np.zeros((len(r), len(angles), 7))
         x[..., 0], x[..., 1] = r[:, None] * np.cos(angles), r[:, None] * np.sin(angles)
@@ -210,7 +212,7 @@ class Cylindrical(AnimationMap):
         values = self.corrections.copy()
         rows = len(values)
         values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
-        other._correct(values)
+        other._set_corrections(values)
         return other
 
     def with_share(self, share: float) -> "Cylindrical":
@@ -257,7 +259,7 @@ class Cylindrical(AnimationMap):
         clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
         owner = int(kept(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
         share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        made = Cylindrical(
+        result = Cylindrical(
             clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints, owner
         )  # fmt: skip
-        return made.with_share(share) if joints else made
+        return result.with_share(share) if joints else result

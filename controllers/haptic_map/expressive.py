@@ -17,9 +17,9 @@ from controllers.work_array import work_array
 
 FADE_FROM = 2.0 * np.pi / 3.0  # [rad] stylus angle from which its effect fades out, to zero at half a turn
 _JOINTS, _ROWS = 0, 1
-_JOINT, _GAIN, _LOW, _HIGH, _ROW = 0, 1, 4, 7, 10
+_JOINT, _GAIN, _LOW, _HIGH, _ROW_SIZE = 0, 1, 4, 7, 10
 _NO_MEMORY = np.zeros(0)
-_ROUNDING = 0.02  # [rad] smooths the room left to a joint limit near zero, so that it stays positive
+_ROUNDING = 0.02  # [rad] smoothing of the distance to a joint limit near zero, so that it stays positive
 
 
 @njit
@@ -49,9 +49,9 @@ def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float
     Parameters
     ----------
     wanted, there : float
-        Turn y that is asked for, and the present value of the joint's component [rad].
+        Desired turn y, and the present value of the joint's component [rad].
     low, high : float
-        Ends of its range [rad]; the room R is about the distance to the end in the direction of y, and stays positive.
+        Ends of its range [rad]; R is approximately the distance to the end in the direction of y, and stays positive.
     """
     side = 1.0 if wanted >= 0.0 else -1.0
     left = (high - there if side > 0.0 else there - low) - _ROUNDING
@@ -107,7 +107,7 @@ def express(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
     turn, rates = work_array(3), work_array((3, 3))
     stylus_turn(x, turn, rates)
     for n in range(int(params[_JOINTS])):
-        row = params[_ROWS + _ROW * n : _ROWS + _ROW * (n + 1)]
+        row = params[_ROWS + _ROW_SIZE * n : _ROWS + _ROW_SIZE * (n + 1)]
         joint = int(row[_JOINT])
         first = 3 + 3 * joint if jacobian.shape[0] > 0 else 0
         rows = jacobian[first : first + 3]

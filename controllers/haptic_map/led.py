@@ -4,7 +4,7 @@ r"""The map of a led figure: a clip of straight walking is carried along a curve
 
 A(s) ∈ SE(2) is the frame of the figure's path at arc length s (`controllers.walking.walked_path`), ℓ the length of the
 clip's lap, ρ the pose without its steady drift (`loops`). λ is such that s + ℓλ is constant while the foot is in stance
-and advances while it swings (`limbs`): so a foot in stance keeps its place, however path and pelvis turn over it. The
+and advances while it swings (`limbs`): so a foot in stance keeps its place while path and pelvis turn above it. The
 legs follow by inverse kinematics. In bends the figure leans to the inside like an inverted pendulum whose foot is on
 the path: root and trunk turn about the path by φ(s), and the root is lowered by twice the height that this lifts the
 outer hip.
@@ -49,14 +49,15 @@ from controllers.work_array import work_array
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
 LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
-"""Least length [m] and largest turn [rad] of a lap that is led; `models.mocap.preparation.laps` cuts laps by them."""
+"""Least length [m] and largest turn [rad] of a led clip's lap; `models.mocap.preparation.laps` cuts laps by them."""
 
-_UPRIGHT = 0.015  # [rad] lean below which the root is hardly lowered
-_STOOP = 2.0  # lowering of the root over the rise of the outer hip; above 1, since in bends feet also swing outwards
+_LEAN_ROUNDING = 0.015  # [rad] lean below which the root is hardly lowered: rounding of |φ| at zero
+# lowering of the root over the rise of the outer hip; above 1, since in bends feet also swing outwards
+_LOWERING_RATIO = 2.0
 
 
 @njit
-def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array) -> None:
+def _interpolate_channels(rows: Array, samples: int, lap: float, value: Array, slope: Array) -> None:
     """Channels at a phase of the lap, and their derivatives by it, from uniform cubic B-splines."""
     place = (lap - np.floor(lap)) * samples
     row = min(int(place), samples - 1)
@@ -65,20 +66,20 @@ def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array)
 
 
 @njit
-def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slope: Array, change: Array) -> None:
-    """Channels of a clip's two forms, mixed by u = `held`; `change` becomes their derivatives by u."""
+def _mix_forms(rows: Array, samples: int, lap: float, share: float, value: Array, slope: Array, change: Array) -> None:
+    """Channels of a clip's two forms, mixed by u = `share`; `change` is written: their derivatives by u."""
     n = value.shape[0]
     ground, ground_slope = work_array(n), work_array(n)
-    _channels(rows, samples, lap, value, slope)
-    _channels(rows[n * (samples + 3) :], samples, lap, ground, ground_slope)
+    _interpolate_channels(rows, samples, lap, value, slope)
+    _interpolate_channels(rows[n * (samples + 3) :], samples, lap, ground, ground_slope)
     for k in range(n):
         change[k] = ground[k] - value[k]
-        value[k] += held * change[k]
-        slope[k] += held * (ground_slope[k] - slope[k])
+        value[k] += share * change[k]
+        slope[k] += share * (ground_slope[k] - slope[k])
 
 
 @njit
-def _carried(  # noqa: PLR0913 - derivatives by either number of the walker, in one kernel
+def _carry_along(  # noqa: PLR0913 - derivatives by either number of the walker in one kernel
     path: Array, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
     slope: Array, by: int, p: Array, q: Array, spin: Array,
 ) -> None:  # fmt: skip
@@ -113,7 +114,7 @@ def _carried(  # noqa: PLR0913 - derivatives by either number of the walker, in 
     p[1 + by, 2] = rate * (upright * slope[2] - over * slope[1]) - leaning * side
     p[0, 0] += x
     p[0, 1] += y
-    _unit(value[3:], slope[3:], rate, by, q, spin)
+    _unit_rotation(value[3:], slope[3:], rate, by, q, spin)
     q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * lean), -np.sin(0.5 * lean), 0.0, 0.0, q[0], q[1], q[2], q[3])
     spin[0, by] -= leaning * (1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
     spin[1, by] -= leaning * 2.0 * (q[1] * q[2] - q[0] * q[3])
@@ -128,17 +129,17 @@ def _carried(  # noqa: PLR0913 - derivatives by either number of the walker, in 
 
 
 @njit
-def _stooped(lean: float, leaning: float, width: float) -> tuple[float, float]:
+def _lowering(lean: float, leaning: float, width: float) -> tuple[float, float]:
     """Lowering of the root of a leaning figure [m], in proportion to the rise of its outer hip, and its derivative.
 
     Otherwise a leg that lands straight would be too short, and its knee would stop with a jerk.
     """
-    size = np.sqrt(lean * lean + _UPRIGHT * _UPRIGHT)
-    return width * (size - _UPRIGHT), width * leaning * lean / size
+    size = np.sqrt(lean * lean + _LEAN_ROUNDING * _LEAN_ROUNDING)
+    return width * (size - _LEAN_ROUNDING), width * leaning * lean / size
 
 
 @njit
-def _unit(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Array) -> None:
+def _unit_rotation(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Array) -> None:
     """Unit quaternion of four channels and its local angular velocity (3, 2) by x, 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
     scale = 1.0 / np.sqrt(max(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2, 1e-12))
     for j in range(4):
@@ -157,31 +158,31 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     change[:] = 0.0
     rows, lap = params[_HEADER + LIMB * limbs :], s / stride + params[_PHASE]
     if params[_FORMS] > 1.0:
-        _mixed(rows, samples, lap, x[1], value, slope, change)
+        _mix_forms(rows, samples, lap, x[1], value, slope, change)
     else:
-        _channels(rows, samples, lap, value, slope)
+        _interpolate_channels(rows, samples, lap, value, slope)
     q, spins = work_array((rotations, 4)), work_array((rotations, 3, 2))
     root, end = work_array((3, 3)), work_array((3, 3))
     tangents = 2 if jacobian.shape[0] > 0 else 0
     lean, leaning = path_value(path, s, PATH_LEAN)
-    _carried(path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
-    _carried(path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
-    lower, lowering = _stooped(lean, leaning, params[_WIDTH])
+    _carry_along(path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
+    _carry_along(path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
+    lower, lowering = _lowering(lean, leaning, params[_WIDTH])
     root[0, 2] -= lower
     root[1, 2] -= lowering
     for joint in range(1, rotations):
         at = 3 + 4 * joint
-        _unit(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
-        _unit(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
+        _unit_rotation(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
+        _unit_rotation(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
         last, at = int(limb[LAST]), 3 + 4 * rotations + END * i
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
-        there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
-        _carried(path, there, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
-        _carried(path, there, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
+        s_end, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
+        _carry_along(path, s_end, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
+        _carry_along(path, s_end, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
         place_limb(limb, q, spins, root, end, tangents)
     pose[:3] = root[0]
     for joint in range(rotations):
@@ -194,7 +195,7 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
                 jacobian[3 + 3 * joint : 6 + 3 * joint, by] = spins[joint, :, by]
 
 
-class _Forms(NamedTuple):
+class _ClipForms(NamedTuple):
     """Rows of a led clip in its forms, the length of a lap [m], and attributes of `Led`."""
 
     rows: list[Array]
@@ -204,25 +205,25 @@ class _Forms(NamedTuple):
     pace: float = 1.0
 
 
-def _captured_forms(
+def _forms_of_capture(
     rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stands: Mask, capture: Capture, duration: float,
     sway: Array,
-) -> _Forms:  # fmt: skip
-    """Form of a capture: feet in stance held, and flight phases made steps, unless it hops on one foot or leaps far.
+) -> _ClipForms:  # fmt: skip
+    """Form of a capture: feet held in stance, flight phases turned into steps unless it hops on one foot or leaps far.
 
     `duration` is that of a lap [s]; the other arguments are those of `with_planted_ends`.
     """
     flights, stride, still = runs(~np.any(stands, axis=1)), float(drift[0]), np.zeros((2, 2))
     # A flight phase of the capture becomes a walking step, which is shorter.
     steps = min(stride, capture.step * len(flights)) if flights else stride
-    held = (channels, drift, limbs, stands, capture.radius, duration)
-    planted = with_planted_ends(rows, *held, steps, still if flights else sway)
+    clip_and_limbs = (channels, drift, limbs, stands, capture.radius, duration)
+    planted = with_planted_ends(rows, *clip_and_limbs, steps, still if flights else sway)
     low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stands, sway)
     if low is not None:
-        return _Forms([reached(low, steps, limbs)], steps, False, True, 1.0 / hastened(stands))
+        return _ClipForms([reached(low, steps, limbs)], steps, False, True, 1.0 / hastened(stands))
     if flights:
-        planted = with_planted_ends(rows, *held, stride, still)
-    return _Forms([planted], stride, bool(flights))
+        planted = with_planted_ends(rows, *clip_and_limbs, stride, still)
+    return _ClipForms([planted], stride, bool(flights))
 
 
 class Led(KernelMap):
@@ -263,7 +264,7 @@ class Led(KernelMap):
     Raises
     ------
     ParameterError
-        If the clip does not travel by 0.5 m a lap, or turns by more than 30° meanwhile.
+        If the clip travels less than 0.5 m per lap, or turns by more than 30° per lap.
     """
 
     map_kernel = staticmethod(led_map)
@@ -277,7 +278,7 @@ class Led(KernelMap):
         capture: Capture | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._made_of = (clip, tuple(limbs), phase, standing, capture)
+        self._arguments = (clip, tuple(limbs), phase, standing, capture)
         poses, fps = clip
         checked = checked_clip(poses, fps, "the clip that is led")
         loop, (net, turns) = forward_loop(checked, fps), turn_of(checked)
@@ -303,28 +304,28 @@ class Led(KernelMap):
         limbs = [limb.allowing([channels]) for limb in limbs]
         rows = with_ends(channels[:, None], drift, limbs, np.ones(1))[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        signs, made = closing_signs(rows, self._rotations), _Forms([rows], self.stride)
+        signs, clip_forms = closing_signs(rows, self._rotations), _ClipForms([rows], self.stride)
         if standing is not None:
             stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
             sway = np.zeros((2, 2)) if sway is None else sway
             if capture is None:
                 low = grounded(rows, signs, self.stride, limbs, stands, sway)
                 flies = bool(runs(~np.any(stands, axis=1)))
-                made = _Forms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
+                clip_forms = _ClipForms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
             else:
-                made = _captured_forms(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
-        forms, self.stride, self.flies, self.grounds, self.pace = made
+                clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
+        forms, self.stride, self.flies, self.grounds, self.pace = clip_forms
         self.sways = self.grounds or (capture is not None and not self.flies)
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
-        width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
+        width = _LOWERING_RATIO * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
         header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
         super().__init__(np.concatenate([header, *(limb.packed() for limb in limbs), *packed]))
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
-        return Led(*self._made_of, sway)
+        return Led(*self._arguments, sway)
 
     @property
     def nq(self) -> int:

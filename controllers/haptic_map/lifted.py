@@ -39,8 +39,8 @@ class Lifted(ClipMap):
     lifted. They stay above the floor (`floor`), and in stance they keep their place while the mixture changes
     (`footing`).
 
-    Motions side by side are seldom alike: a hand that is pushed from a walk onto a kick would ask the figure to kick
-    within a tenth of a second. `with_legs_of` leaves root, legs and trunk to one clip, as `Cylindrical` does, and
+    Neighbouring motions are seldom alike: a hand that is pushed from a walk onto a kick would require the figure to
+    kick within a tenth of a second. `with_legs_of` takes root, legs and trunk from one clip, as `Cylindrical` does, and
     blends only a share λ of the other joints.
 
     h is C² except on the axis r = 0, where the phase is not defined. Outside the box round all sites r and z are
@@ -71,7 +71,7 @@ class Lifted(ClipMap):
     transitions : tuple of MapTransition
         As given.
     legs_of : int or None
-        Clip that gives root, legs and trunk (see `with_legs_of`); None where all is blended.
+        Clip that gives root, legs and trunk (see `with_legs_of`); None if all joints are blended.
     share : float
         λ.
 
@@ -102,8 +102,8 @@ class Lifted(ClipMap):
                 f"a lifted map takes one or more clips, each with closed, angles and a name of its own; got {m} clips, "
                 f"{len(closed)} closed, {len(angles)} angles, the names {', '.join(names)}"
             )
-        self._placed = tuple(_placed_clip(*values) for values in zip(names, clips, closed, angles, strict=True))
-        sizes = [clip.poses.shape[1] for clip in self._placed]
+        self._placed_clips = tuple(_place_clip(*values) for values in zip(names, clips, closed, angles, strict=True))
+        sizes = [clip.poses.shape[1] for clip in self._placed_clips]
         if len(set(sizes)) != 1:
             raise ParameterError(f"all clips must have poses of one size, got {sizes}")
         self.margin = _checked_margin(margin)
@@ -111,8 +111,8 @@ class Lifted(ClipMap):
         self.transitions = checked_transitions(transitions, m)
         self.legs_of: int | None = None
         self.share = 1.0
-        limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
-        params = packed_lifted(self._placed, self.sites, self.margin, limbs)
+        limbs = [limb.allowing([clip.poses for clip in self._placed_clips]) for limb in limbs]
+        params = packed_lifted(self._placed_clips, self.sites, self.margin, limbs)
         super().__init__(params, clips, names, limbs)
 
     def compiled(self) -> CompiledMap:
@@ -124,16 +124,16 @@ class Lifted(ClipMap):
     @property
     def closed(self) -> tuple[bool, ...]:
         """Whether each clip is closed."""
-        return tuple(clip.closed for clip in self._placed)
+        return tuple(clip.closed for clip in self._placed_clips)
 
     @property
     def angles(self) -> tuple[Array, ...]:
         """θ_i(t_k) of each clip [rad]."""
-        return tuple(clip.angles for clip in self._placed)
+        return tuple(clip.angles for clip in self._placed_clips)
 
     def placed(self, i: int) -> Array:
         """Poses of clip i (n, nq) after its displacement to the origin: h along its curve, from the first lap on."""
-        return self._placed[i].poses.copy()
+        return self._placed_clips[i].poses.copy()
 
     def site(self, i: int, angles: Array) -> Array:
         """q_i = (r, z) [m] of curve i at angles (...), shape (..., 2)."""
@@ -163,12 +163,12 @@ class Lifted(ClipMap):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Says so if only some joints are blended."""
+        """A remark if only some joints are blended."""
         if self.legs_of is None:
             return ()
         owner, arms = self.names[self.legs_of], "the others' arms"
-        bears = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
-        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {bears}",)
+        what = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
+        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {what}",)
 
     def with_legs_of(self, clip: int, upper: Sequence[int], share: float) -> "Lifted":
         """The same map with root and all joints but `upper` (counted from 1) from one clip, and a share λ of the rest.
@@ -176,11 +176,11 @@ class Lifted(ClipMap):
         Raises
         ------
         ParameterError
-            If there is no such clip, a joint is none of the poses' or a limb's, or the share is not from 0 to 1.
+            If there is no such clip, a joint is not in the poses or belongs to a limb, or the share is not in [0, 1].
         """
         joints = (self.nq - 3) // 4
-        taken = {joint for limb in self.limbs for joint in limb.joints}
-        if not (0 <= clip < len(self.names) and 0.0 <= share <= 1.0 and set(upper) <= {*range(1, joints)} - taken):
+        legs = {joint for limb in self.limbs for joint in limb.joints}
+        if not (0 <= clip < len(self.names) and 0.0 <= share <= 1.0 and set(upper) <= {*range(1, joints)} - legs):
             raise ParameterError(
                 f"a lifted map takes the legs of clip 0 to {len(self.names) - 1}, other joints from 1 to "
                 f"{joints - 1} that are no limb's, and a share from 0 to 1; got {clip}, {list(upper)} and {share}"
@@ -197,7 +197,7 @@ class Lifted(ClipMap):
             "margin": np.array([self.margin]),
             "transitions": transition_rows(self.transitions),
         }
-        for name, clip in zip(self.names, self._placed, strict=True):
+        for name, clip in zip(self.names, self._placed_clips, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
         return arrays | clip_arrays(self.clips, self.names, self.limbs)
 
@@ -213,7 +213,7 @@ class Lifted(ClipMap):
         names = kept_names(arrays)
         return Lifted(
             kept_clips(arrays),
-            [_flag(f"closed/{name}", float(kept(arrays, f"closed/{name}", (1,))[0])) for name in names],
+            [_checked_flag(f"closed/{name}", float(kept(arrays, f"closed/{name}", (1,))[0])) for name in names],
             [kept(arrays, f"angles/{name}", (None,)) for name in names],
             kept(arrays, "sites", (None, None, 2)),
             kept_limbs(arrays),
@@ -223,13 +223,13 @@ class Lifted(ClipMap):
         )
 
 
-def _flag(name: str, value: float) -> bool:
+def _checked_flag(name: str, value: float) -> bool:
     if value not in (0.0, 1.0):
         raise ParameterError(f"{name} is {value}; expected 0 or 1")
     return bool(value)
 
 
-def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:
+def _place_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:
     poses = checked_clip(*clip, f"clip {name}")
     checked = checked_angles(angles, len(poses), closed, f"clip {name}")
     gap = closing_gap(poses) if closed else 0.0

@@ -32,21 +32,21 @@ from controllers.saturation import clamped
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
 
-_LAGS = 128  # samples of λ round the lap
-_ROWS = 256  # largest number of rows of the corrections' table round the lap
-_PAIR_STEPS = 24  # phases of the lap at which neighbouring clips are searched
+_LAG_SAMPLES = 128  # samples of λ round the lap
+_MAX_ROWS = 256  # largest number of rows of the corrections' table round the lap
+_PAIR_SAMPLES = 24  # phases of the lap at which neighbouring clips are searched
 (
-    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _OWN_LEGS, _SHARE, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT,
+    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LEGS_OF, _SHARE, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT,
     _PAIRS_AT, _SOLES_AT, _FIGURE,
 ) = range(15)  # fmt: skip
-_NOBODYS = 0.0  # in place of 1 + the number of the clip that gives the legs: all joints are blended
+_NO_OWNER = 0.0  # instead of 1 + the number of the clip that gives the legs: all joints are blended
 
 
 @njit
-def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array, slope: Array) -> None:
+def _write_lags(control: Array, limbs: int, angle: float, channels: int, value: Array, slope: Array) -> None:
     """Write λ of each limb, which all clips share, into the channels of the first clip."""
-    s = angle * _LAGS / (2.0 * np.pi)
-    row = min(int(s), _LAGS - 1)
+    s = angle * _LAG_SAMPLES / (2.0 * np.pi)
+    row = min(int(s), _LAG_SAMPLES - 1)
     b0, b1, b2, b3 = basis(s - row)
     c0, c1, c2, c3 = basis_slope(s - row)
     for n in range(limbs):
@@ -54,7 +54,7 @@ def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array,
         v2, v3 = control[(row + 2) * limbs + n], control[(row + 3) * limbs + n]
         k = channels - END * (limbs - n) + 3
         value[0, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
-        slope[0, k] = _LAGS / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+        slope[0, k] = _LAG_SAMPLES / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
 
 
 @njit
@@ -79,30 +79,30 @@ def weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chang
     for i in range(count):
         by_r, by_z = changes[1, i], changes[2, i]
         changes[0, i] += by_r * change[0, 0] + by_z * change[0, 1]
-        for way in (1, 2):
-            changes[way, i] = by_r * change[way, 0] + by_z * change[way, 1]
+        for parameter in (1, 2):
+            changes[parameter, i] = by_r * change[parameter, 0] + by_z * change[parameter, 1]
     return angle, count
 
 
 @njit
-def _give_legs(owner: int, share: float, near: IntArray, count: int, w: Array, changes: Array) -> int:
-    """Weights of two groups from those of the second: the first is the owner's, of the second it gets 1 − λ more.
+def _assign_legs(owner: int, share: float, near: IntArray, count: int, w: Array, changes: Array) -> int:
+    """Weights of both groups from those of group 1: group 0 is the owner's alone; group 1 is λ w, plus 1 − λ for it.
 
-    Returns the number of clips, which counts the owner though it may be far from the hand.
+    Returns the number of clips, which includes the owner even if it is far from the hand.
     """
     at = 0
     while at < count and near[at] != owner:
         at += 1
     if at == count:
         near[at], w[1, at], count = owner, 0.0, count + 1
-        for way in range(3):
-            changes[1, way, at] = 0.0
+        for parameter in range(3):
+            changes[1, parameter, at] = 0.0
     for i in range(count):
         w[0, i] = 0.0
         w[1, i] *= share
-        for way in range(3):
-            changes[0, way, i] = 0.0
-            changes[1, way, i] *= share
+        for parameter in range(3):
+            changes[0, parameter, i] = 0.0
+            changes[1, parameter, i] *= share
     w[0, at] = 1.0
     w[1, at] += 1.0 - share
     return count
@@ -111,12 +111,12 @@ def _give_legs(owner: int, share: float, near: IntArray, count: int, w: Array, c
 @njit
 def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of `Lifted`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    total, chain, owner = int(params[_CLIPS]), work_array((3, 6)), int(params[_OWN_LEGS]) - 1
-    groups = 2 if owner >= 0 else 1  # the last group has the weights of the hand's place
+    total, chain, owner = int(params[_CLIPS]), work_array((3, 6)), int(params[_LEGS_OF]) - 1
+    groups = 2 if owner >= 0 else 1  # the last group has the weights at the position of the hand
     near, w, changes = work_integers(total), work_array((groups, total)), work_array((groups, 3, total))
     angle, count = weigh(params, x, chain, near, w[groups - 1], changes[groups - 1])
     if owner >= 0:
-        count = _give_legs(owner, params[_SHARE], near, count, w, changes)
+        count = _assign_legs(owner, params[_SHARE], near, count, w, changes)
     figure = params[_FIGURE:]
     channels = figure_channels(figure)
     value, slope, drifts = work_array((count, channels)), work_array((count, channels)), work_array((count, 3))
@@ -126,7 +126,7 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
         for k in range(3):
             drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
     limbs = figure_limbs(figure)
-    _lags(params[int(params[_LAG_AT]) :], limbs, angle, channels, value, slope)
+    _write_lags(params[int(params[_LAG_AT]) :], limbs, angle, channels, value, slope)
     pairs = params[int(params[_PAIRS_AT]) :]
     d = work_array((4, pair_channels(pairs)))
     if d.shape[1] > 0:
@@ -148,7 +148,7 @@ def packed_lifted(clips: Sequence[PlacedClip], sites: Array, margin: float, limb
     splines = [lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(clips, channels, strict=True)]
     low, high = box(sites)
     half = 0.5 * margin
-    rows = int(np.clip(max(len(clip.poses) for clip in clips), 64, _ROWS)) if limbs else 1
+    rows = int(np.clip(max(len(clip.poses) for clip in clips), 64, _MAX_ROWS)) if limbs else 1
     blocks = [
         packed_figure(np.zeros(rotations, dtype=np.int64), limbs),
         control_points(lags, np.ones(lags.shape[1:])).ravel(),
@@ -156,10 +156,10 @@ def packed_lifted(clips: Sequence[PlacedClip], sites: Array, margin: float, limb
         packed_frames(splines),
         packed_neighbours(sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
         _packed_pairs(splines, drifts, lags, sites, rows, limbs),
-        _packed_soles(channels, limbs),
+        _packed_ground(channels, limbs),
     ]
     at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
-    numbers = [low[0], high[0], low[1], high[1], margin, len(clips), _NOBODYS, 1.0, *at]
+    numbers = [low[0], high[0], low[1], high[1], margin, len(clips), _NO_OWNER, 1.0, *at]
     return np.concatenate([np.array(numbers), *blocks])
 
 
@@ -168,7 +168,7 @@ def with_legs_of(params: Array, clip: int, upper: Sequence[int], share: float) -
     changed = params.copy()
     groups = weight_groups(changed[_FIGURE:])
     groups[:] = np.isin(np.arange(len(groups)), upper)
-    changed[_OWN_LEGS], changed[_SHARE] = 1.0 + clip, share
+    changed[_LEGS_OF], changed[_SHARE] = 1.0 + clip, share
     return changed
 
 
@@ -183,7 +183,7 @@ def _clip_channels(clip: PlacedClip, lags: Array, limbs: Sequence[Limb]) -> Arra
     return np.concatenate([result, *ends], axis=2)[:, 0]
 
 
-def _packed_soles(channels: list[Array], limbs: Sequence[Limb]) -> Array:
+def _packed_ground(channels: list[Array], limbs: Sequence[Limb]) -> Array:
     if not limbs:
         return np.zeros(1 + len(channels))
     floor = min(lowest_of_limbs(clip[:, None], limbs, SOFTNESS).min() for clip in channels)
@@ -203,15 +203,15 @@ def _packed_pairs(
     normalise(channels, (last - 3) // 4)
     for n in range(len(limbs)):
         channels[..., last + END * n + 3] = round_lap(lags[:, n], phases)[:, None]
-    steps = round_lap(sites, np.arange(_PAIR_STEPS) * 2.0 * np.pi / _PAIR_STEPS)
+    steps = round_lap(sites, np.arange(_PAIR_SAMPLES) * 2.0 * np.pi / _PAIR_SAMPLES)
     return packed_pairs(channels, drifts, limbs, neighbouring_pairs(steps))
 
 
 def _common_lags(clips: Sequence[PlacedClip], drifts: Array, rotations: int, limbs: Sequence[Limb]) -> Array:
-    """λ of each limb at equal steps of the lap, shape (_LAGS, limbs), from all clips."""
+    """λ of each limb at equal steps of the lap, shape (_LAG_SAMPLES, limbs), from all clips."""
     if not drifts[:, 2].any() or not limbs:
-        return np.zeros((_LAGS, len(limbs)))
-    phases = np.arange(_LAGS) * 2.0 * np.pi / _LAGS
+        return np.zeros((_LAG_SAMPLES, len(limbs)))
+    phases = np.arange(_LAG_SAMPLES) * 2.0 * np.pi / _LAG_SAMPLES
     splines = [lap_spline(clip.angles, clip.remainder, rotations, clip.closed) for clip in clips]
     channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
     return np.stack([end_lag(end_poses(channels, limb)[0], drifts) for limb in limbs], axis=1)

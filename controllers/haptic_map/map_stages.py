@@ -23,12 +23,12 @@ MAP_ARGUMENTS = (_VECTOR, _VECTOR, _VECTOR, _VECTOR, types.Array(types.float64, 
 """Types of a kernel's arguments: params, x, memory, pose, jacobian."""
 
 _KERNEL, _END, _ADDRESS = range(3)
-_call = kernel_call(MAP_ARGUMENTS)
-_registered: list[Kernel] = []  # of this process, in the order in which classes of maps were made
+_call_kernel = kernel_call(MAP_ARGUMENTS)
+_registered_kernels: list[Kernel] = []  # in this process, in the order in which the map classes were defined
 
 
 def register(kernel: Kernel) -> None:
-    """Make a kernel, an ``njit`` function, one that a map may be made of; `HapticMap` does so for every class.
+    """Register a kernel, an ``njit`` function, for use in maps; `HapticMap` registers that of every class.
 
     Raises
     ------
@@ -37,9 +37,9 @@ def register(kernel: Kernel) -> None:
     """
     if not hasattr(kernel, "py_func"):
         raise ParameterError(f"the kernel of a map is {kernel!r}; expected a function compiled by numba's njit")
-    if kernel not in _registered:
+    if kernel not in _registered_kernels:
         announce(kernel, MAP_ARGUMENTS)
-        _registered.append(kernel)
+        _registered_kernels.append(kernel)
 
 
 class CompiledMap(NamedTuple):
@@ -48,14 +48,14 @@ class CompiledMap(NamedTuple):
     Attributes
     ----------
     stages : IntArray, shape (n, 3)
-        Kernels in the order of their calls: which one (`kernels_of`), the end of its parameters, which begin where
-        those of the stage before end, and its address, 0 until it is `linked`.
+        Kernels in the order of their calls. Columns: number of the kernel (`kernels_of`), end of its parameters (which
+        begin where those of the stage before end), and its address, 0 until it is `linked`.
     params : Array
         Parameters of all stages.
     memory : Array
         State of the map between ticks, at the start of a run.
     size : float
-        Lengths of the figure that is shown over those of the figure of its clips [1].
+        Ratio of the lengths of the figure shown to those of the figure of its clips [1].
     """
 
     stages: IntArray
@@ -70,25 +70,25 @@ class CompiledMap(NamedTuple):
 
     def followed_by(self, kernel: Kernel, params: Array) -> "CompiledMap":
         """The map whose pose is changed by one more kernel."""
-        row = np.array([[_registered.index(kernel), len(self.params) + len(params), 0]], dtype=np.int64)
+        row = np.array([[_registered_kernels.index(kernel), len(self.params) + len(params), 0]], dtype=np.int64)
         return self._replace(stages=np.concatenate([self.stages, row]), params=np.concatenate([self.params, params]))
 
 
 def kernels_of(stages: IntArray) -> tuple[Kernel, ...]:
     """Kernels of the stages of a map, in the order of their calls."""
-    return tuple(_registered[number] for number in stages[:, _KERNEL])
+    return tuple(_registered_kernels[number] for number in stages[:, _KERNEL])
 
 
 def linked(stages: IntArray, address: Callable[[Kernel], int]) -> IntArray:
     """The same stages with the addresses of their kernels."""
-    found = stages.copy()
-    found[:, _ADDRESS] = [address(kernel) for kernel in kernels_of(stages)]
-    return found
+    result = stages.copy()
+    result[:, _ADDRESS] = [address(kernel) for kernel in kernels_of(stages)]
+    return result
 
 
 @njit
 def first_params(stages: IntArray, params: Array) -> Array:
-    """Parameters of the first stage: those of the map without what is around it."""
+    """Parameters of the first stage: those of the innermost map."""
     return params[: stages[0, _END]]
 
 
@@ -102,7 +102,7 @@ def evaluate_map_jacobian(
         if stages[n, _ADDRESS] == 0:
             raise ControllerError("a kernel of this haptic map is not compiled; its stages are not linked")
         end = stages[n, _END]
-        _call(stages[n, _ADDRESS], (params[first:end], x, memory, pose, jacobian))
+        _call_kernel(stages[n, _ADDRESS], (params[first:end], x, memory, pose, jacobian))
         first = end
 
 

@@ -17,17 +17,21 @@ from controllers.errors import ParameterError
 from controllers.rotations import logarithm, multiply
 from controllers.state import Array, Pose
 
-_NUMBERS = ctypes.POINTER(ctypes.c_double)
-_CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
+_DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
+_CALLBACK_TYPE = ctypes.CFUNCTYPE(
+    None, _DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER, ctypes.c_int64, ctypes.c_int64
+)
 FIGURE = 75
 """Numbers of a pose of the figure: root position, root quaternion and 17 joint quaternions."""
-_UNIT = 1e-3  # by which the norm of a quaternion may be off: more than single precision, less than an arbitrary scale
-_STEP = 1e-5  # [m, rad] of central differences: cube root of the rounding error, for lengths of some centimetres
-_AGREE = 1e-3  # share of the largest entry: a slip of sign, unit, frame or column errs by more, differences by 1e-7
+_NORM_TOLERANCE = 1e-3  # largest error of a quaternion's norm: more than single precision, less than an arbitrary scale
+# [m, rad] step of central differences: cube root of the rounding error, for lengths of some centimetres
+_DIFFERENCE_STEP = 1e-5
+# fraction of the largest entry: a wrong sign, unit, frame or column errs by more, differences by 1e-7
+_DERIVATIVE_TOLERANCE = 1e-3
 
 
 @intrinsic
-def _call_c(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: Any, rows: Any) -> Any:
+def _call_c_function(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: Any, rows: Any) -> Any:
     """Call ``void (double *x, double *pose, double *jacobian, int64 nq, int64 rows)``; all are given as int64."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -41,18 +45,18 @@ def _call_c(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: 
     return types.void(*[types.int64] * 6), generate
 
 
-_call = cast(Callable[[int, int, int, int, int, int], None], _call_c)
+_call_callback = cast(Callable[[int, int, int, int, int, int], None], _call_c_function)
 
 
 @njit
 def own_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of a map in Python: the bits of the first parameter are the address of the callback (see `Asked`)."""
     place, rows = params.view(np.int64)[0], jacobian.shape[0]
-    _call(place, x.ctypes.data, pose.ctypes.data, jacobian.ctypes.data, pose.shape[0], rows)
+    _call_callback(place, x.ctypes.data, pose.ctypes.data, jacobian.ctypes.data, pose.shape[0], rows)
 
 
 class Asked:
-    """C callback of a map for the tick; after a first error in a run, which is kept, the pose stays at its last value.
+    """C callback of a map for the tick; the first error in a run is stored, and the pose then stays at its last value.
 
     Parameters
     ----------
@@ -66,68 +70,68 @@ class Asked:
         self.error: BaseException | None = None
         self._last = np.zeros(0)
 
-        def answer(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
-            last = self._last  # this call's own, since the runs of a sweep ask in several threads
+        def evaluate(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
+            last = self._last  # local to this call, since the runs of a sweep call in several threads
             if self.error is None:
-                place = np.ctypeslib.as_array(x, (7,)).copy()
-                self._last = last = checked_pose(pose(place), nq, name, place)
+                stylus = np.ctypeslib.as_array(x, (7,)).copy()
+                self._last = last = checked_pose(pose(stylus), nq, name, stylus)
                 if rows:
                     np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(
-                        jacobian(place), rows, name, place
+                        jacobian(stylus), rows, name, stylus
                     )
             np.ctypeslib.as_array(target, (nq,))[:] = last
 
-        def ask(*given: Any) -> None:
+        def callback(*given: Any) -> None:
             try:
-                answer(*given)
-            except BaseException as error:  # nothing may leave a C callback, Ctrl-C neither: it would be ignored
+                evaluate(*given)
+            except BaseException as error:  # no exception may leave a C callback, not even Ctrl-C: it would be ignored
                 self.error = error
-                answer(*given)
+                evaluate(*given)
 
-        self._callback = _CALLBACK(ask)
+        self._callback = _CALLBACK_TYPE(callback)
         address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
         self.params: Array = np.array([address], dtype=np.int64).view(np.float64)
 
     def begin(self, start: Pose) -> None:
-        """Forget the error of the run before; the configuration is `start` before the first call."""
+        """Clear the error of the previous run; the configuration is `start` before the first call."""
         self.error, self._last = None, start
 
 
 def checked_pose(pose: Any, nq: int, name: str, x: Array) -> Pose:
-    """A configuration of `nq` finite numbers, with unit quaternions if it is the figure's, that a map gave at x (7,).
+    """Validate a configuration that a map gave at x (7,): `nq` finite numbers, with unit quaternions if the figure's.
 
     Raises
     ------
     ParameterError
         If the pose has another shape, a number that is not finite, or a quaternion whose norm is not 1.
     """
-    numbers = numbers_of(f"the pose of map {name} at {_place(x)}", pose)
+    numbers = numbers_of(f"the pose of map {name} at {_where(x)}", pose)
     if numbers.shape != (nq,) or not np.isfinite(numbers).all():
         many = "" if numbers.shape != (nq,) else f" with {numbers[~np.isfinite(numbers)][0]} in it"
         raise ParameterError(
-            f"map {name} gave a pose of shape {numbers.shape}{many} at {_place(x)}; expected {nq} finite numbers"
+            f"map {name} gave a pose of shape {numbers.shape}{many} at {_where(x)}; expected {nq} finite numbers"
         )
     if nq == FIGURE:
         norms = np.sqrt((numbers[3:].reshape(-1, 4) ** 2).sum(axis=1))
         worst = int(np.argmax(np.abs(norms - 1.0)))
-        if abs(norms[worst] - 1.0) > _UNIT:
+        if abs(norms[worst] - 1.0) > _NORM_TOLERANCE:
             first, whose = 3 + 4 * worst, f"joint {worst}" if worst else "the root"
             raise ParameterError(
                 f"map {name} gave a quaternion of norm {norms[worst]:.4g} for {whose}, pose[{first}:{first + 4}], at "
-                f"{_place(x)}; expected 1"
+                f"{_where(x)}; expected 1"
             )
     return numbers
 
 
 def checked_jacobian(jacobian: Any, nv: int, name: str, x: Array) -> Array:
-    """A derivative (nv, 6) of finite numbers that a map gave at a stylus pose (7,).
+    """Validate a derivative that a map gave at a stylus pose (7,): finite numbers of shape (nv, 6).
 
     Raises
     ------
     ParameterError
         If the derivative has another shape or a number that is not finite.
     """
-    numbers = numbers_of(f"the jacobian of map {name} at {_place(x)}", jacobian)
+    numbers = numbers_of(f"the jacobian of map {name} at {_where(x)}", jacobian)
     if numbers.shape != (nv, 6):
         raise ParameterError(
             f"map {name} gave a jacobian of shape {numbers.shape}; expected ({nv}, 6), or none: "
@@ -135,40 +139,40 @@ def checked_jacobian(jacobian: Any, nv: int, name: str, x: Array) -> Array:
         )
     if not np.isfinite(numbers).all():
         raise ParameterError(
-            f"map {name} gave a jacobian with a number that is not finite at {_place(x)}; expected finite ones"
+            f"map {name} gave a jacobian with a number that is not finite at {_where(x)}; expected finite ones"
         )
     return numbers
 
 
-def _place(x: Array) -> str:
+def _where(x: Array) -> str:
     return f"p = [{x[0]:.4g}, {x[1]:.4g}, {x[2]:.4g}]"
 
 
 def check_derivative(jacobian: Array, pose: Callable[[Array], Pose], name: str, x: Array) -> None:
     """Compare a map's derivative (nv, 6) at a stylus pose (7,) with finite differences of the pose.
 
-    Where differences of two steps do not agree, the map is not smooth, and nothing is compared.
+    Where the differences with two step sizes do not agree, the map is not smooth, and nothing is compared.
 
     Raises
     ------
     ParameterError
         If an entry differs by more than a thousandth of the largest one.
     """
-    expected, coarse = finite_differences(pose, x), finite_differences(pose, x, 10.0 * _STEP)
-    allowed = _AGREE * max(float(np.abs(expected).max()), _AGREE)
-    wrong = np.abs(jacobian - expected)
-    if wrong.max() <= allowed or np.abs(coarse - expected).max() > allowed:
+    expected, coarse = finite_differences(pose, x), finite_differences(pose, x, 10.0 * _DIFFERENCE_STEP)
+    allowed = _DERIVATIVE_TOLERANCE * max(float(np.abs(expected).max()), _DERIVATIVE_TOLERANCE)
+    errors = np.abs(jacobian - expected)
+    if errors.max() <= allowed or np.abs(coarse - expected).max() > allowed:
         return
-    row, column = np.unravel_index(np.argmax(wrong), wrong.shape)
+    row, column = np.unravel_index(np.argmax(errors), errors.shape)
     raise ParameterError(
-        f"the jacobian of map {name} is {jacobian[row, column]:.4g} in row {row}, column {column} at {_place(x)}, "
+        f"the jacobian of map {name} is {jacobian[row, column]:.4g} in row {row}, column {column} at {_where(x)}, "
         f"and its pose changes by {expected[row, column]:.4g} there; expected the same, linear before angular velocity "
         "in the columns, or no jacobian: it is then computed by finite differences"
     )
 
 
 def difference(before: Pose, after: Pose) -> Array:
-    """The tangent that leads from one configuration to another in unit time, shape (nv,).
+    """Tangent that leads from one configuration to another in unit time, shape (nv,).
 
     Root velocity in the world; angular velocity of root and joints in their own frames, as in MuJoCo's qvel.
     """
@@ -179,16 +183,16 @@ def difference(before: Pose, after: Pose) -> Array:
     return np.concatenate(parts)
 
 
-def finite_differences(pose: Callable[[Array], Pose], x: Array, of: float = _STEP) -> Array:
+def finite_differences(pose: Callable[[Array], Pose], x: Array, of: float = _DIFFERENCE_STEP) -> Array:
     """Derivative of a map at a stylus pose (7,) by central differences of a step [m, rad], shape (nv, 6)."""
     columns: list[Array] = []
     for k in range(6):
-        before, after = (_moved(x, k, step) for step in (-of, of))
+        before, after = (_displace(x, k, step) for step in (-of, of))
         columns.append(difference(pose(before), pose(after)) / (2.0 * of))
     return np.stack(columns, axis=1)
 
 
-def _moved(x: Array, k: int, step: float) -> Array:
+def _displace(x: Array, k: int, step: float) -> Array:
     """A stylus pose moved along, or turned about, an axis of H."""
     moved = x.copy()
     if k < 3:

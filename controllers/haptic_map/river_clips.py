@@ -36,8 +36,8 @@ from controllers.legs.limbs import Limb
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-LONGEST = 0.7  # of a round: longest duration of a change
-_ALIKE = 1e-6  # [s] largest difference of the laps of two rivers with a change between them
+LONGEST = 0.7  # longest duration of a change, as a fraction of a round
+_LAP_TOLERANCE = 1e-6  # [s] largest difference between the laps of two rivers that have a change between them
 
 
 @njit
@@ -58,16 +58,16 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     if change >= 0:
         since = after(shown - start, memory[GATE], period)
         memory[CHANGE] = memory[CHANGE] if since < change_lasts(known, change) else -1.0
-    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend = curve_acceleration(params, curve, phase)
     # Differentiating (φ − p)·φ̇ = 0 at the nearest point gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
     slope = 0.0
     for i in range(3):
-        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
+        slope += tangent[i] ** 2 + (point[i] - x[i]) * bend[i]
     chain = work_array((3, 6))
     chain[:] = 0.0
     for i in range(3):
-        chain[0, i] = rate * pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
+        chain[0, i] = rate * pace * tangent[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
     weights, changes = work_array((1, rivers)), work_array((1, 3, rivers))
     weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0
@@ -84,18 +84,18 @@ class RiverClips(AnimationMap):
 
     .. math:: h(p, i, k) = A\,\rho_i\Bigl(\frac{2\pi}{m} \Bigl(k + \frac{t^*_i - t_0}{t_1 - t_0}\Bigr)\Bigr)
 
-    i is the active river, whose number the field leaves in its trace; t*_i the phase of its curve nearest to the stylus
-    (of several branches, of the one that continues). A round of m laps of the river is a lap of its clip, and k the lap
-    of the round that the hand is in: it is told by continuity, and k = 0 at first. A hand without an active
-    river that is outside the tube of the last one, or too fast in it, plays no frame: the reference stops at a phase at
-    which the clip can stand (`stop_clip`). The phase that is shown leads or lags behind the hand's after a change of
-    river, and while a hand goes faster than its river (`river_memory.even_pace`).
+    i is the active river, whose number the field writes to its trace; t*_i is the phase of its curve nearest to the
+    stylus (if there are several branches, on the one that continues the last phase). A round of m laps of the river is
+    a lap of its clip, and k is the lap of the round that the hand is in: it follows by continuity, and k = 0 at first.
+    If no river is active, and the hand is outside the tube of the last one or too fast in it, no frame is played: the
+    reference stops at a phase at which the clip can stand (`stop_clip`). The phase that is shown leads or lags behind
+    the hand's after a change of river, and while the hand is faster than its river (`river_memory.even_pace`).
 
     Clips are aligned in time to the first (`alignment`), so that a change keeps about the same phase of motion. A ∈
-    SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h jumps, and the reference goes
-    on from where the figure stands (`place_clip`) with a decaying offset (`inertialization`). Where a change between
-    the two clips is precomputed (`clip_change`), it begins at the next gate instead, and h runs through it with the
-    phase of the hand. h does not depend on the stylus's orientation.
+    SE(2) is the frame of the lap, stored in the memory (`lap`). When the river changes, h jumps, and the reference
+    continues from where the figure stands (`place_clip`) with a decaying offset (`inertialization`). Where a change
+    between the two clips is precomputed (`clip_change`), it begins at the next gate instead, and h runs through it with
+    the phase of the hand. h does not depend on the stylus's orientation.
 
     Parameters
     ----------
@@ -145,13 +145,13 @@ class RiverClips(AnimationMap):
         if laps < 1:
             raise ParameterError(f"a round of rivers has one lap or more, got {laps}")
         self.curves, self._laps, self._tube = tuple(curves), laps, tube
-        self._rests: tuple[Array, ...] = (np.zeros(0),) * len(curves)
+        self._rest_phases: tuple[Array, ...] = (np.zeros(0),) * len(curves)
         self.changes: tuple[ClipChange, ...] = ()
         super().__init__(clips, self._header(), (), limbs, lap, apart)
 
     def _header(self) -> Array:
         """Parameters of the kernel before those of the blend."""
-        blocks = [*(curve.packed() for curve in self.curves), *self._rests, packed_changes(self.changes)]
+        blocks = [*(curve.packed() for curve in self.curves), *self._rest_phases, packed_changes(self.changes)]
         offsets = np.cumsum([CURVES + len(blocks) + 1, *(len(block) for block in blocks)])
         return np.concatenate([[len(self.curves), self._tube, self.laps, offsets[-1]], offsets, *blocks])
 
@@ -165,7 +165,7 @@ class RiverClips(AnimationMap):
         return self.laps * self.curves[river].duration
 
     def with_rests(self, rests: Sequence[Array]) -> "RiverClips":
-        """The same map with clips that stop only at phases [s] of the round, shape (n,) per curve; empty: anywhere.
+        """The same map with clips that stop only at given phases [s] of the round, (n,) per curve; empty: anywhere.
 
         Raises
         ------
@@ -176,8 +176,8 @@ class RiverClips(AnimationMap):
         if len(phases) != len(self.curves) or not all(np.all(np.isfinite(still)) for still in phases):
             raise ParameterError(f"expected finite phases of rest for each of {len(self.curves)} rivers, got {rests}")
         other = copy(self)
-        other._rests = tuple(phases)
-        return other._repacked()
+        other._rest_phases = tuple(phases)
+        return other._repack()
 
     def with_changes(self, changes: Sequence[ClipChange]) -> "RiverClips":
         """The same map with precomputed changes between its clips.
@@ -190,27 +190,27 @@ class RiverClips(AnimationMap):
         """
         laps = [curve.duration for curve in self.curves]
         for change in changes:
-            told = f"the change from river {change.first} to {change.second}"
+            name = f"the change from river {change.first} to {change.second}"
             if not {change.first, change.second} <= set(range(len(laps))) or change.first == change.second:
-                raise ParameterError(f"{told} is not between two of {len(laps)} rivers")
-            if abs(laps[change.first] - laps[change.second]) > _ALIKE:
-                raise ParameterError(f"{told} is between laps of {laps[change.first]} and {laps[change.second]} s")
+                raise ParameterError(f"{name} is not between two of {len(laps)} rivers")
+            if abs(laps[change.first] - laps[change.second]) > _LAP_TOLERANCE:
+                raise ParameterError(f"{name} is between laps of {laps[change.first]} and {laps[change.second]} s")
             if not len(change.gates) or change.offsets.shape[1:] != (3 + 3 * ((self.nq - 3) // 4),):
-                raise ParameterError(f"{told} has {len(change.gates)} gates and offsets {change.offsets.shape}")
+                raise ParameterError(f"{name} has {len(change.gates)} gates and offsets {change.offsets.shape}")
             if not 0.0 < change.seconds < LONGEST * self.round_seconds(change.first):
                 period = self.round_seconds(change.first)
-                raise ParameterError(f"{told} lasts {change.seconds:.2f} s of a round of {period:.2f} s")
+                raise ParameterError(f"{name} lasts {change.seconds:.2f} s of a round of {period:.2f} s")
         other = copy(self)
         other.changes = tuple(changes)
-        return other._repacked()
+        return other._repack()
 
     def on_one_river(self) -> "RiverClips":
         """The same clips with the first river's curve for all, so that a change affects only the motion."""
         other = copy(self)
         other.curves = (self.curves[0],) * len(self.curves)
-        return other._repacked()
+        return other._repack()
 
-    def _repacked(self) -> "RiverClips":
+    def _repack(self) -> "RiverClips":
         self._params = np.concatenate([self._header(), self._params[int(self._params[BLEND]) :]])
         return self
 

@@ -1,7 +1,7 @@
-"""Which clip of a bundle of rivers is playing, at which phase, and how it gives way to another: the map's memory.
+"""Memory of the map of a bundle of rivers: the clip that is playing, its phase, and the change to another clip.
 
 Clips whose durations have no short lap in common are played in a round of several laps: the map is then a function on
-the covering of the curves by that many laps, and the memory keeps which of them the hand is in.
+the covering of the curves by that many laps, and the memory stores which of them the hand is in.
 """
 
 import math
@@ -19,21 +19,23 @@ from controllers.rotations import multiply
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-# Memory behind the frame of the lap; phases in s, of the round:
-# RIVER: river of the playing clip. PHASE: last phase of the hand. STILL: 1 while the clip is held at a phase.
-# COURSE: river whose curve times the hand. CAME: phase at which the hand came to it. AHEAD: lead of the clip over the
-# hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate. LOOKED: phase
-# shown when gates were last searched.
+# Memory after the frame of the lap; phases are those of the round [s].
+# RIVER: river of the clip that is playing. PHASE: last phase of the hand. STILL: 1 while the clip is held at a phase.
+# COURSE: river whose curve gives the phase of the hand. CAME: phase at which the hand came to it. AHEAD: lead of the
+# clip over the hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate.
+# LOOKED: phase shown when gates were last searched.
 RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(MEMORY, MEMORY + 10)
-# Parameters: header, offsets of the packed curves, of the rest phases and of the changes, then these, then the blend.
+# Parameters: header; offsets of the packed curves, of the rest phases and of the changes; these blocks; the blend.
 RIVERS, TUBE, LAPS, BLEND, CURVES = range(5)
-_RACES = 2.0  # times the river's pace: a faster hand that no river holds plays no clip
-_SOON = 0.03  # [s] horizon of the prediction in `lets_go`: followed until it races the clip, a root leaps by 3.7 m/s
-_EVEN = 0.02  # of the river's pace: a hand that is off it by no more is followed at once; encoder noise is 1 %
-_SLACK = 0.25  # [s] largest lag of a clip behind a hand that goes faster than its river
-_CAUGHT = 0.025  # [s] lag above which a clip does not slow down with the hand
-_CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand decays to zero
-_PAST = 0.25  # of a round: a phase up to this before a moment counts as before it, any other as after it
+_MAX_PACE = 2.0  # largest pace, in multiples of the river's, of a hand that no river holds: a faster one plays no clip
+# [s] horizon of the prediction in `lets_go`: without it the root's velocity jumps by up to 3.7 m/s
+_PREDICTION_TIME = 0.03
+# deviation from the river's pace up to which the hand is followed without lag; encoder noise is 1 %
+_PACE_TOLERANCE = 0.02
+_MAX_LAG = 0.25  # [s] L, largest lag of a clip behind a hand that is faster than its river
+_SLOWING_LAG = 0.025  # [s] l, lag above which a clip does not slow down with the hand
+_CATCH_UP_TIME = 2.0  # [s] of phase over which the clip's lead over the hand decays to zero
+_PAST_FRACTION = 0.25  # of a round: a phase up to this before a moment counts as before it, all others as after it
 
 
 @njit
@@ -57,8 +59,8 @@ def in_round(params: Array, curve: int, phase: float) -> float:
 
 
 @njit
-def _in_lap_of(params: Array, curve: int, phase: float, last: float) -> float:
-    """The phase [s] of the round nearest to `last`, of those at the same place of the curve as `phase`, in any lap."""
+def _nearest_lap_phase(params: Array, curve: int, phase: float, last: float) -> float:
+    """Phase [s] of the round nearest to `last`, among those at the same point of the curve as `phase` in any lap."""
     if np.isnan(last):
         return phase
     lap = lap_of(params, curve)
@@ -67,22 +69,22 @@ def _in_lap_of(params: Array, curve: int, phase: float, last: float) -> float:
 
 @njit
 def phase_near(params: Array, curve: int, x: Array, last: float) -> float:
-    """Phase [s] of the curve's point nearest to the stylus; of several branches, that which continues `last`."""
+    """Phase [s] of the curve's point nearest to the stylus; of several branches, on the one that continues `last`."""
     found, lap = work_array((BRANCHES, 2)), lap_of(params, curve)
     best, nearest = np.nan, SAME_BRANCH * lap
     for k in range(branches(params, curve, x[0], x[1], x[2], params[TUBE], found)):
-        away = found[k, 0] - last
-        away = abs(away - lap * np.round(away / lap))
-        if away < nearest:
-            best, nearest = found[k, 0], away
+        distance = found[k, 0] - last
+        distance = abs(distance - lap * np.round(distance / lap))
+        if distance < nearest:
+            best, nearest = found[k, 0], distance
     if np.isnan(best):
         best, _ = closest_phase(params, curve, x[0], x[1], x[2], last)
-    return _in_lap_of(params, curve, wrap_phase(params, curve, best), last)
+    return _nearest_lap_phase(params, curve, wrap_phase(params, curve, best), last)
 
 
 @njit
 def timing_curve(params: Array, memory: Array) -> int:
-    """Offset in the parameters of the curve that times the hand."""
+    """Offset in the parameters of the curve that gives the phase of the hand."""
     return int(params[CURVES + int(memory[COURSE])])
 
 
@@ -95,62 +97,62 @@ def changes_of(params: Array) -> Array:
 @njit
 def after(phase: float, moment: float, period: float) -> float:
     """Time of a phase after a moment of the round [s]; negative up to a quarter of the round before it."""
-    way = phase - moment
-    return way - period * np.floor(way / period + _PAST)
+    elapsed = phase - moment
+    return elapsed - period * np.floor(elapsed / period + _PAST_FRACTION)
 
 
 @njit
 def lead_of(params: Array, memory: Array, phase: float) -> tuple[float, float]:
     """Lead [s] of the clip over a hand at a phase [s], which decays with the phase, and its derivative by the phase."""
-    went = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCHES_UP
-    return memory[AHEAD] * (1.0 - smooth_step(went)), -memory[AHEAD] * smooth_step_slope(went) / _CATCHES_UP
+    progress = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCH_UP_TIME
+    return memory[AHEAD] * (1.0 - smooth_step(progress)), -memory[AHEAD] * smooth_step_slope(progress) / _CATCH_UP_TIME
 
 
 @njit
-def _share(lead: float, faster: bool) -> float:
-    """Share c of the excess of the hand's pace that the lead [s] takes up, of a hand that is faster or slower."""
+def _absorbed_share(lead: float, faster: bool) -> float:
+    """Share c of the excess of the hand's pace that the lead [s] absorbs, for a hand that is faster or slower."""
     if faster:
-        return float(1.0 - smooth_step(min(abs(lead) / _SLACK, 1.0)))
-    return float(smooth_step(min(max(-lead / _CAUGHT, 0.0), 1.0)))
+        return float(1.0 - smooth_step(min(abs(lead) / _MAX_LAG, 1.0)))
+    return float(smooth_step(min(max(-lead / _SLOWING_LAG, 0.0), 1.0)))
 
 
 @njit
 def even_pace(params: Array, memory: Array, x: Array, way: float, changed: Array) -> None:
-    r"""Let the clip's lead take up the excess of the hand's pace over the river's, so that a push makes no clip race.
+    r"""Let the clip's lead absorb the excess of the hand's pace over the river's, so that a push rushes no clip.
 
     .. math:: \dot e = -c\,(r - \operatorname{sat}(r, 1 \pm 0.02)), \qquad
               c = \begin{cases} 1 - S(|e| / L) & r > 1 \\ S(-e / l) & r < 1 \end{cases}
 
     r is the pace of the hand, 1 for the river's; e the lead of the clip over the hand [s], negative if it lags; S the
-    smooth step, L = 0.25 s and l = 0.025 s. So a clip lags behind a hand that goes faster by at most L, and then goes
-    at its pace; it does not slow down with the hand while it lags, and stops with it if it does not.
+    smooth step, L = 0.25 s and l = 0.025 s. So a clip lags behind a faster hand by at most L, and then follows at the
+    hand's pace; while it lags it does not slow down with the hand, and otherwise it stops with it.
 
     Parameters
     ----------
     params, memory : Array
         The map's, with the hand at the phase of the memory.
     x : Array
-        Position of the hand a time |way| after, or, if way < 0, before that [m], shape (3,).
+        Position of the hand a time |way| later, or earlier if way < 0 [m], shape (3,).
     way : float
         That time [s].
     changed : Array
-        A copy of the memory, or the memory itself, for the hand at x. Updated.
+        A copy of the memory, or the memory itself; updated for the hand at x.
     """
     curve = timing_curve(params, memory)
-    phase, whole = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
+    phase, period = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
     step = phase - memory[PHASE]
-    step -= whole * np.round(step / whole)
-    off = step - min(max(step, way - _EVEN * abs(way)), way + _EVEN * abs(way))
-    # Not of a clip that is held, or of a hand whose phase is not known yet.
+    step -= period * np.round(step / period)
+    off = step - min(max(step, way - _PACE_TOLERANCE * abs(way)), way + _PACE_TOLERANCE * abs(way))
+    # Not if the clip is held, or the phase of the hand is not known yet.
     if memory[STILL] == 0.0 and abs(off) > 0.0:
         lead, _ = lead_of(params, memory, memory[PHASE])
-        half = lead - 0.5 * _share(lead, off * way > 0.0) * off
-        changed[AHEAD], changed[CAME] = lead - _share(half, off * way > 0.0) * off, phase
+        half = lead - 0.5 * _absorbed_share(lead, off * way > 0.0) * off
+        changed[AHEAD], changed[CAME] = lead - _absorbed_share(half, off * way > 0.0) * off, phase
 
 
 @njit
 def takes_over(params: Array, memory: Array, river: float) -> bool:
-    """Whether the active river of the field (−1: none) takes the hand over from another river, or a held clip goes on.
+    """Whether the field's active river (−1: none) takes over the hand from another river, or a held clip continues.
 
     The clip then begins at the phase of the hand on that river.
     """
@@ -161,42 +163,42 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
 @njit
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
-    whole, way = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
-    return (way - whole * np.round(way / whole)) / period
+    round_duration, step = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
+    return (step - round_duration * np.round(step / round_duration)) / period
 
 
 @njit
 def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
     """Whether the hand has left the river of the playing clip: no river is active, and it is off the tube or too fast.
 
-    `hand` (3, 3) holds position, velocity and acceleration. So that the clip does not follow a hand that is thrown off,
-    the pace predicted `_SOON` ahead counts too; and so does a predicted place more than half way to the curve's centre
-    of curvature, where the phase is not a useful measure of pace.
+    `hand` (3, 3) holds position, velocity and acceleration. So that the clip does not follow a hand that is thrown off
+    the curve, the pace predicted `_PREDICTION_TIME` ahead counts too, and so does a predicted position more than half
+    way to the centre of curvature, where the phase is not a useful measure of pace.
     """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
     curve = timing_curve(params, memory)
     found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
     outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[TUBE], found) == 0
-    if outside or abs(rate) > _RACES:
+    if outside or abs(rate) > _MAX_PACE:
         return True
     for i in range(3):
-        x[i] = hand[0, i] + _SOON * hand[1, i] + 0.5 * _SOON**2 * hand[2, i]
-        v[i] = hand[1, i] + _SOON * hand[2, i]
+        x[i] = hand[0, i] + _PREDICTION_TIME * hand[1, i] + 0.5 * _PREDICTION_TIME**2 * hand[2, i]
+        v[i] = hand[1, i] + _PREDICTION_TIME * hand[2, i]
     phase = phase_near(params, curve, x, memory[PHASE])
-    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend, gain, slope, square = curve_acceleration(params, curve, phase), 0.0, 0.0, 0.0
     for i in range(3):
-        gain += v[i] * along[i]
-        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
-        square += along[i] ** 2
-    return slope < 0.5 * square or abs(gain) > _RACES * slope
+        gain += v[i] * tangent[i]
+        slope += tangent[i] ** 2 + (point[i] - x[i]) * bend[i]
+        square += tangent[i] ** 2
+    return slope < 0.5 * square or abs(gain) > _MAX_PACE * slope
 
 
 @njit
 def change_clip(params: Array, memory: Array, river: float, phase: float) -> None:
     """Play the clip of another river, from a phase [s] on of the lap that the hand is in, in the frame of the lap."""
-    phase = _in_lap_of(params, int(params[CURVES + int(river)]), phase, memory[PHASE])
+    phase = _nearest_lap_phase(params, int(params[CURVES + int(river)]), phase, memory[PHASE])
     memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
     memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
 
@@ -226,12 +228,12 @@ def changing(memory: Array) -> bool:
 
 @njit
 def take_course(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
-    """Time the hand at x by another river's curve, while the playing clip shows the phase `shown` [s]."""
+    """Take the phase of the hand at x from another river's curve, while the playing clip shows phase `shown` [s]."""
     memory[COURSE] = river
     curve = timing_curve(params, memory)
     phase = phase_near(params, curve, x, shown)
-    period, away = round_of(params, curve), shown - phase
-    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, away - period * np.round(away / period)
+    period, lead = round_of(params, curve), shown - phase
+    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, lead - period * np.round(lead / period)
 
 
 @njit
@@ -249,23 +251,23 @@ def begin_change(memory: Array, river: float, change: int, gate: float) -> None:
 
 @njit
 def go_on(memory: Array, phase: float, ahead: float) -> None:
-    """Let a held clip go on with the hand at a phase [s], ahead of the hand by a time [s]."""
+    """Let a held clip continue with the hand at a phase [s], ahead of the hand by a time [s]."""
     memory[PHASE], memory[AHEAD], memory[STILL] = phase, ahead, 0.0
 
 
 @njit
 def stop_clip(params: Array, memory: Array, way: float) -> None:
-    """Hold the playing clip at the rest phase nearest to `way` [s] beyond the shown phase; without any, just there."""
+    """Hold the playing clip at the rest phase nearest to `way` [s] after the shown phase; without any, just there."""
     river, rivers, curve = int(memory[RIVER]), int(params[RIVERS]), timing_curve(params, memory)
     period = round_of(params, curve)
     first, last = int(params[CURVES + rivers + river]), int(params[CURVES + rivers + river + 1])
     wanted = in_round(params, curve, memory[SHOWN] + way)
     best, nearest = wanted, math.inf
     for k in range(first, last):
-        away = abs(params[k] - wanted)
-        away = min(away, period - away)
-        if away < nearest:
-            best, nearest = params[k], away
+        distance = abs(params[k] - wanted)
+        distance = min(distance, period - distance)
+        if distance < nearest:
+            best, nearest = params[k], distance
     memory[PHASE], memory[STILL], memory[LAST_ANGLE] = best, 1.0, np.nan
     memory[AHEAD], memory[CHANGE] = 0.0, -1.0
 
@@ -279,7 +281,7 @@ def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
 
 @njit
 def heading_between(pose: Pose, other: Pose) -> float:
-    """Angle about the vertical [rad] from the heading of one pose's root to that of another: the twist of q' q⁻¹."""
+    """Change of heading [rad] from one pose's root to another's: the twist of q' q⁻¹ about the vertical."""
     w, _, _, z = multiply(other[3], other[4], other[5], other[6], pose[3], -pose[4], -pose[5], -pose[6])
     return 2.0 * np.arctan2(z, w) if w >= 0.0 else 2.0 * np.arctan2(-z, -w)
 

@@ -1,4 +1,4 @@
-r"""The map to a redundant robot arm: the stylus leads the end effector (tool) of an arm with seven joints.
+r"""The map to a redundant robot arm: the stylus moves the end effector (tool) of an arm with seven joints.
 
 The tool's pose is the stylus's, displaced, scaled and saturated at the edge of a domain (`saturation`):
 
@@ -26,12 +26,13 @@ from controllers.state import Array
 JOINTS = 7
 _HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 4, 6, 8, 12, 16, 17
 
-_FAR, _NEARLY_BACK = 1e3, 3.1  # [m], [rad] far enough for the saturated stylus to be at the edge of its domain
-_LEAST_BEND = np.radians(8.0)  # least distance from the singularities of shoulder, elbow and wrist, which are at zero
+# [m], [rad] far enough that the saturated stylus is at the edge of its domain
+_FAR_DISTANCE, _NEARLY_HALF_TURN = 1e3, 3.1
+_MIN_BEND = np.radians(8.0)  # least angle from the singularities of shoulder, elbow and wrist, which are at zero
 
 
 @njit
-def _led_turning(stylus: Array, turn: Array, turn_slope: Array, axis: int) -> Vector:
+def _tool_angular_velocity(stylus: Array, turn: Array, turn_slope: Array, axis: int) -> Vector:
     """Angular velocity of the tool for a stylus that turns about an axis of H.
 
     `stylus` and `turn` are the rotation vectors of the stylus before and after saturation, `turn_slope` its derivative.
@@ -72,13 +73,13 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
             v = scale * place_slope[0, j], scale * place_slope[1, j], scale * place_slope[2, j]
             arm_rates(posture, pose, v, (0.0, 0.0, 0.0), jacobian[:, j])
         else:
-            omega = _led_turning(stylus, turn, turn_slope, j - 3)
+            omega = _tool_angular_velocity(stylus, turn, turn_slope, j - 3)
             swing = cross(omega, lever)
             arm_rates(posture, pose, (-swing[0], -swing[1], -swing[2]), omega, jacobian[:, j])
 
 
 class RobotArm(KernelMap):
-    """The stylus leads the tool of a robot arm.
+    """The stylus moves the tool of a robot arm.
 
     A configuration is the seven joint angles [rad], a tangent their rates [rad/s]. Stylus positions saturate smoothly
     (C²) at a ball about the origin of H, and its rotations from upright at a largest angle: beyond, the arm stays at
@@ -141,7 +142,7 @@ class RobotArm(KernelMap):
         return JOINTS
 
     def check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None = None) -> None:
-        """Refuse a domain in whose centre or at whose edge the arm does not work, on a grid of directions and turns.
+        """Raise if the arm does not work at the centre or the edge of the domain, on a grid of directions and turns.
 
         Parameters
         ----------
@@ -159,16 +160,16 @@ class RobotArm(KernelMap):
         """
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
-        far, bounds = (_FAR, _NEARLY_BACK), (self._params[_REACH + 1], self._params[_TURN + 1])
+        far, bounds = (_FAR_DISTANCE, _NEARLY_HALF_TURN), (self._params[_REACH + 1], self._params[_TURN + 1])
         edge = [(place, turn) for place in directions for turn in directions]
         points = np.array([np.concatenate([far[0] * u, exponential.py_func(*(far[1] * v))]) for u, v in edge])
         poses = [self.pose(x) for x in points] if evaluate is None else evaluate(self.compiled(), points)
         for (u, v), q in zip(edge, poses, strict=True):
-            straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
+            straight = np.abs(q[[1, 3, 5]]).min() < _MIN_BEND
             if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
                 raise ParameterError(
                     f"the arm cannot follow a stylus at {np.round(1e3 * bounds[0] * u)} mm turned by "
                     f"{np.round(np.degrees(bounds[1] * v))}°: joint angles {np.round(np.degrees(q))}°; expected "
                     f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
-                    f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
+                    f"{np.degrees(_MIN_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
                 )

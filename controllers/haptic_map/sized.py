@@ -51,7 +51,7 @@ class Sized(Wrapped):
     Raises
     ------
     ParameterError
-        If the size is no number, not positive, or not finite.
+        If the size is not a number, not positive, or not finite.
     """
 
     map_kernel = staticmethod(size_pose)

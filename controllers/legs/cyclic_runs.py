@@ -1,4 +1,4 @@
-"""Runs of True in a mask over the samples of a lap, which begins again at its end."""
+"""Runs of True in a cyclic mask over the samples of a lap."""
 
 import numpy as np
 

@@ -1,9 +1,9 @@
-r"""Floor constraint of a blend: feet do not go below the lowest point of all clips, even where corrections add up.
+r"""Floor constraint of a blend: feet do not go below the lowest point of all clips, whatever the sum of corrections.
 
 With l = z + m(R s_k) the height of an end (foot), m a soft minimum over its points s_k, and l₀ the lowest over all
 clips' frames, the end is raised by S(l₀ − l); S(x) = x³/(x² + s²), 0 for x < 0: C², and within s/2 of x. A clip alone
-is left unchanged. Of 30 hands that wander at random through nine lifted clips the lowest sole is at −12 mm, without
-this constraint at −126.
+is left unchanged. For 30 hands that wander at random among nine lifted clips the lowest sole is at −12 mm; without
+this constraint it is at −126 mm.
 """
 
 import numpy as np
@@ -14,10 +14,10 @@ from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
 SOFTNESS = 2e-3
-"""Softness of the minimum of soles' heights where a pose is put onto the floor [m]: four level points count 3 mm (ln 4
-of it) lower."""
+"""Softness of the minimum of sole heights when a pose is put on the floor [m]: four points at equal height count as
+3 mm (ln 4 times the softness) lower."""
 
-_ROUND = 4e-3  # s [m]
+_ROUNDING_LENGTH = 4e-3  # s [m]
 
 
 @njit
@@ -52,7 +52,7 @@ def keep_above(floor: float, sole: Array, end: Array, q: Quat, rate: Array, tang
     x = floor - end[0, 2] - least + SOFTNESS * np.log(total)
     if x <= 0.0:
         return
-    square, s2 = x * x, _ROUND * _ROUND
+    square, s2 = x * x, _ROUNDING_LENGTH * _ROUNDING_LENGTH
     slope = square * (square + 3.0 * s2) / (square + s2) ** 2
     end[0, 2] += x * square / (square + s2)
     # The vertical in the frame of the end: a point s moves up by ω·(s × up).

@@ -33,19 +33,20 @@ from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 CATCH_UP = 8.0
-"""κ ∫ g over a lap, at least: e⁻⁸ of a gap is left after it. Half or twice changes no slide of blends, nor of led
-captures, by more than 0.1 mm."""
+"""Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends
+and of led captures by at most 0.1 mm."""
 
-# Largest shares of the lap's lift that `STANDS` and h_0, which is `SWINGS`, may take up. Cheer with ginga slides 1.0 cm
-# with half or twice of h_0, too; walk, run, ginga and cheer, which are not blended as a whole, 2.3 or 0.8 cm in the
-# median instead of 1.0.
-_SHARE_STANCE, _SHARE_SWING = 0.2, 0.5
-_LIFTED = 0.002  # [m] a foot that is never lifted by more than this is not held
-# c, h_c [m]. Half or twice c leaves the largest slide of cheer with ginga at 1.0 cm; in blends of walk, run, ginga
-# and cheer the median slides 1.2 or 0.7 cm instead of 1.0, and soles sink 5 or 8 mm instead of 6.
-_RAISE, _RAISE_FROM = 0.02, 0.003
-_FADE = 4  # power of a clip's weight with which its own foot skate is kept: half way a sixteenth
-_LAPS = 4  # laps of integration until the path is periodic: each leaves e⁻⁸ of the error, four 1e-14
+# Largest fractions of a foot's highest lift in the lap that `STANDS` and h_0 (which is `SWINGS`) may take up. With half
+# or twice h_0 a blend of cheer and ginga still slides 1.0 cm; a blend of walk, run, ginga and cheer, which no map
+# blends as a whole, slides 2.3 or 0.8 cm in the median instead of 1.0.
+_MAX_STANCE_FRACTION, _MAX_SWING_FRACTION = 0.2, 0.5
+# [m] a foot whose highest lift in the lap is below this is held less, one that is never lifted not
+_FULL_HOLD_LIFT = 0.002
+# c, h_c [m]. With half or twice c the largest slide of a blend of cheer and ginga stays 1.0 cm; blends of walk, run,
+# ginga and cheer slide 1.2 or 0.7 cm in the median instead of 1.0, and their soles sink 5 or 8 mm instead of 6.
+_MAX_RAISE, _RAISE_SCALE = 0.02, 0.003
+_SKATE_EXPONENT = 4  # power of a clip's weight that scales its own foot skate: a sixteenth of it remains half way
+_INTEGRATION_LAPS = 4  # laps of integration until the path is periodic: each leaves e⁻⁸ of the error, all four 1e-14
 
 
 class BlendedFeet(NamedTuple):
@@ -54,7 +55,7 @@ class BlendedFeet(NamedTuple):
     Attributes
     ----------
     height : Array, shape (n, k, J)
-        Height of the lowest point of each sole over the lowest of all clips [m].
+        Height of the lowest point of each sole above the lowest point of all clips [m].
     moves : Array, shape (n, k, J, 3)
         Slip over the ground (x, y [m], heading [rad]) at the touching points, from each sample to the next.
     angles : Array, shape (n + 1, k, J)
@@ -69,8 +70,8 @@ class BlendedFeet(NamedTuple):
     own: Array
 
 
-def _raise(lift: Array) -> Array:
-    return _RAISE * lift / (lift + _RAISE_FROM)
+def _extra_clearance(lift: Array) -> Array:
+    return _MAX_RAISE * lift / (lift + _RAISE_SCALE)
 
 
 def _mean_rotations(quaternions: Array, weights: Array) -> Array:
@@ -96,17 +97,17 @@ def gap(slips: Array, hold: Array, turn: Array) -> Array:
     -------
     Array, shape (n, ..., 3)
     """
-    n, held = len(slips), hold[..., None]
+    n, decay = len(slips), hold[..., None]
     ahead, behind = np.empty_like(slips), np.empty_like(slips)
     front, back, angle = np.zeros_like(slips[0]), np.zeros_like(slips[0]), np.broadcast_to(turn, slips.shape[1:-1])
-    for _ in range(_LAPS):
+    for _ in range(_INTEGRATION_LAPS):
         for k in range(n):
             ahead[k] = front
-            front = held[k] * front + slips[k]
+            front = decay[k] * front + slips[k]
         for k in range(n - 1, -1, -1):
             if k == n - 1:
                 back[..., :2] = turned(angle, back[..., :2])
-            back = held[k] * back - slips[k]
+            back = decay[k] * back - slips[k]
             behind[k] = back
         front[..., :2] = turned(-angle, front[..., :2])
     return 0.5 * (ahead + behind)
@@ -130,23 +131,23 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     Array, shape (n, k, 2 + 4 limbs)
         Channels of `inbetween`, with zeros for the root.
     """
-    everything = np.concatenate([weights, np.eye(channels.shape[1])])
-    found = _found(channels, drifts, limbs, everything)
-    own = found[:, len(weights) :]
+    all_weights = np.concatenate([weights, np.eye(channels.shape[1])])
+    corrections = _mixture_corrections(channels, drifts, limbs, all_weights)
+    own = corrections[:, len(weights) :]
     # A clip given twice counts as one.
     clips = range(channels.shape[1])
-    alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in clips] for i in clips])
-    shares = (weights @ alike) ** _FADE / alike.sum(axis=0)
-    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
+    equal = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in clips] for i in clips])
+    shares = (weights @ equal) ** _SKATE_EXPONENT / equal.sum(axis=0)
+    return corrections[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
 
 
 def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:
     """Paths of the feet in the mean; arguments as in `foot_corrections`."""
-    own = np.stack([_own_height(channels, limbs, j) for j in range(len(limbs))], axis=2)
+    own = np.stack([_clip_sole_height(channels, limbs, j) for j in range(len(limbs))], axis=2)
     ground = own.min()
     height, moves, angles, n = [], [], [], len(channels)
     for j, limb in enumerate(limbs):
-        ends, turns = _own_end(channels, limbs, j)
+        ends, turns = _clip_end(channels, limbs, j)
         # The mean's frame moves over the ground with the drift exp((s + λ) ξ).
         lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
         shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
@@ -162,31 +163,31 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
 
 
-def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
+def _clip_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
     """End of limb j in each clip: position and λ (n, m, 4), and orientation (n, m, 4)."""
     at, column = channels.shape[2] - END * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
     return channels[..., at : at + END], channels[..., column : column + 4]
 
 
-def _own_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
-    end, turn = _own_end(channels, limbs, j)
+def _clip_sole_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
+    end, turn = _clip_end(channels, limbs, j)
     return end[..., 2] + lowest_point(turn, limbs[j], SHARP)
 
 
-def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
+def _mixture_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
     n = len(channels)
     feet = blended_feet(channels, drifts, limbs, weights)
     flight = np.einsum("km,nmj->nkj", weights, feet.own.min(axis=2, keepdims=True))
-    own_raise = np.einsum("km,nmj->nkj", weights, _raise(feet.own - feet.own.min(axis=2, keepdims=True)))
+    own_raise = np.einsum("km,nmj->nkj", weights, _extra_clearance(feet.own - feet.own.min(axis=2, keepdims=True)))
     lift = feet.height - feet.height.min(axis=2, keepdims=True)
-    raised = np.maximum(0.0, _raise(lift) - own_raise)
+    raised = np.maximum(0.0, _extra_clearance(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    least = np.minimum(STANDS, _SHARE_STANCE * highest)
-    free = smooth_steps((up - least) / np.maximum(np.minimum(SWINGS, _SHARE_SWING * highest) - least, 1e-6))
+    stance = np.minimum(STANDS, _MAX_STANCE_FRACTION * highest)
+    free = smooth_steps((up - stance) / np.maximum(np.minimum(SWINGS, _MAX_SWING_FRACTION * highest) - stance, 1e-6))
     # A foot that the clips do not lift follows the mean.
-    held = smooth_steps(highest / _LIFTED)
-    free = 1.0 - held * (1.0 - free)
+    hold = smooth_steps(highest / _FULL_HOLD_LIFT)
+    free = 1.0 - hold * (1.0 - free)
     rate = np.maximum(CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
     slips = (1.0 - free)[..., None] * feet.moves
     ahead = gap(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])

@@ -1,16 +1,16 @@
 r"""Run-time removal of foot skate: feet in stance keep their place on the floor while the hand changes the blend.
 
-The corrections of a mixture (`pair_corrections`) hold a foot only while the mixture is constant. Where the hand changes
-the mixture, and with it the foot's mean position, or between the mixtures that were corrected, the foot would slide. So
-each end has an offset o over the ground, kept in the memory. It cancels the share σ, the degree of stance, of the slip
-Δp of the end's touching points, and fades as the end swings through the air,
+The corrections of a mixture (`pair_corrections`) hold a foot only while the mixture is constant. The foot would slide
+when the hand changes the mixture, and with it the foot's mean position, or between the mixtures that were corrected. So
+each end has an offset o over the ground, stored in the memory. It cancels a fraction σ, the degree of stance, of the
+slip Δp of the end's touching points, and fades as the end swings through the air,
 
 .. math:: o \leftarrow o - \sigma\,\Delta p, \qquad \frac{do}{d\theta} = -\kappa\,(1 - \sigma_0)\, o .
 
 σ = σ₀(h) μ(w) falls with the height h of the sole, and to 0 where a clip is alone: a clip keeps its own foot skate, so
-that h∘α̃ = α. Headings likewise. While a hand moves back a little, the offset grows again, until the direction counts
-as reversed; so velocity and acceleration of the figure may be taken as differences to either side. h_* is the
-derivative at a given offset.
+that h∘α̃ = α. Headings are treated likewise. While a hand moves back a little, the offset grows again, until the
+direction counts as reversed; so velocity and acceleration of the figure may be computed by one-sided differences. h_*
+is the derivative at a given offset.
 """
 
 from collections.abc import Sequence
@@ -26,27 +26,28 @@ from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-# [m] height of the sole from which σ₀ is 0; up to `STANDS` it is 1. The example at `_MOST` slides 0.3 cm, with 4.5 mm
-# 0.6, with 8 mm, from which a sole swings elsewhere, 0.4 and with 12 mm 0.9.
+# [m] height of the sole above which σ₀ is 0; up to `STANDS` it is 1. In the example at `_MAX_OFFSET` feet slide
+# 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWINGS`) 0.4 cm and with 12 mm 0.9 cm.
 _SWING_HEIGHT = 0.006
-_MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0: of two clips, weights 0.72 and 0.985
-# κ [1/rad], and the additional rate where a clip is alone: half or twice of κ leaves the slide of the example at
-# `_MOST` at 0.3 cm.
-_FADE, _FADE_ALONE = 5.0, 1.0
-# [m], [rad] largest offset: a hand that goes round among walk, run, jump and angry once a lap makes feet slide 5.8 cm
-# without footing, 0.3 with it, 0.9 with half of the first and 0.2 with twice.
-_MOST, _MOST_TURN = 0.15, 0.8
+# Σ w² above which μ falls, and where it is 0: for two clips, weights 0.72 and 0.985
+_MIXED_SQUARES, _ALONE_SQUARES = 0.6, 0.97
+# κ [1/rad], and the additional rate where a clip is alone. In the example at `_MAX_OFFSET` the slide stays 0.3 cm with
+# half or twice κ.
+_FADE_RATE, _ALONE_FADE_RATE = 5.0, 1.0
+# [m], [rad] largest offset. For a hand that visits walk, run, jump and angry once a lap, feet slide 5.8 cm without
+# footing and 0.3 cm with it; 0.9 cm with half the first number and 0.2 cm with twice.
+_MAX_OFFSET, _MAX_TURN = 0.15, 0.8
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
-_TURNED = 0.15  # [rad] way back after which the hand's direction counts as reversed
-_JUMP = 1.0  # [rad] larger than any step of the hand's angle in one tick
-_WAY, _BEHIND, _ANGLE, _ENDS = range(4)
-_OFFSET, _PLACE, _TURN, _HELD, _STOOD, _END = 0, 3, 5, 9, 10, 11
+_REVERSAL_ANGLE = 0.15  # [rad] backward motion after which the hand's direction counts as reversed
+_MAX_ANGLE_STEP = 1.0  # [rad] larger than any change of the hand's angle in one tick
+_DIRECTION, _BEHIND, _ANGLE, _ENDS = range(4)
+_OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _END_SIZE = 0, 3, 5, 9, 10, 11  # of each end
 
 
 def fresh_footing(limbs: int) -> Array:
     """Memory of the footing of a number of limbs at the start of a run."""
-    memory = np.zeros(_ENDS + _END * limbs)
-    memory[_WAY], memory[_ANGLE] = 1.0, np.nan
+    memory = np.zeros(_ENDS + _END_SIZE * limbs)
+    memory[_DIRECTION], memory[_ANGLE] = 1.0, np.nan
     return memory
 
 
@@ -77,10 +78,10 @@ def go_on(footing: Array, angle: float) -> float:
     if not np.isfinite(step):
         return 0.0
     step -= 2.0 * np.pi * np.round(step / (2.0 * np.pi))
-    ahead = footing[_WAY] * step
+    ahead = footing[_DIRECTION] * step
     footing[_BEHIND] = max(footing[_BEHIND] - ahead, 0.0)
-    if footing[_BEHIND] > _TURNED:
-        footing[_WAY], footing[_BEHIND] = -footing[_WAY], 0.0
+    if footing[_BEHIND] > _REVERSAL_ANGLE:
+        footing[_DIRECTION], footing[_BEHIND] = -footing[_DIRECTION], 0.0
     return ahead
 
 
@@ -90,11 +91,11 @@ def mixed(weights: Array) -> float:
     square = 0.0
     for w in weights:
         square += w * w
-    return _step_down(square, _MIXED, _ALONE)
+    return _step_down(square, _MIXED_SQUARES, _ALONE_SQUARES)
 
 
 @njit
-def _levers(sole: Array, q: tuple[float, float, float, float], levers: Array) -> float:
+def _turn_sole(sole: Array, q: tuple[float, float, float, float], levers: Array) -> float:
     """Write the points of a sole (k, 3) turned by q; returns the height of the lowest."""
     least = np.inf
     for i in range(sole.shape[0]):
@@ -105,7 +106,7 @@ def _levers(sole: Array, q: tuple[float, float, float, float], levers: Array) ->
 
 
 @njit
-def _yawed(angle: float, q: Array) -> tuple[float, float, float, float]:
+def _yaw(angle: float, q: Array) -> tuple[float, float, float, float]:
     return multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
 
 
@@ -137,21 +138,21 @@ def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     q : Quat
         Orientation of the end; changed.
     """
-    state = footing[_ENDS + _END * limb : _ENDS + _END * (limb + 1)]
+    state = footing[_ENDS + _END_SIZE * limb : _ENDS + _END_SIZE * (limb + 1)]
     points, cosine, sine = sole.shape[0], np.cos(frame[2]), np.sin(frame[2])
     levers, before = work_array((points, 3)), work_array((points, 3))
-    turn = _yawed(frame[2] + state[_OFFSET + 2], q)
-    low = _levers(sole, turn, levers)
+    turn = _yaw(frame[2] + state[_OFFSET + 2], q)
+    low = _turn_sole(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stands = _step_down(end[2] + low - ground, STANDS, _SWING_HEIGHT)
-    size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MOST**2 + (state[_OFFSET + 2] / _MOST_TURN) ** 2
-    held = stands * mixture * max(1.0 - size, 0.0)
+    stance = _step_down(end[2] + low - ground, STANDS, _SWING_HEIGHT)
+    size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MAX_OFFSET**2 + (state[_OFFSET + 2] / _MAX_TURN) ** 2
+    hold = stance * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0
-    if known and abs(ahead) < _JUMP:
+    if known and abs(ahead) < _MAX_ANGLE_STEP:
         # Mean of the degree of stance before and after the step, so that steps forwards and back cancel.
-        share = 0.5 * (held + state[_HELD])
+        share = 0.5 * (hold + state[_HOLD])
         last = state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3]
-        low_before = _levers(sole, last, before)
+        low_before = _turn_sole(sole, last, before)
         w, _, _, z = multiply(turn[0], turn[1], turn[2], turn[3], last[0], -last[1], -last[2], -last[3])
         back = -2.0 * share * (np.arctan2(z, w) if w >= 0.0 else np.arctan2(-z, -w))
         turned_c, turned_s = np.cos(back), np.sin(back)
@@ -161,26 +162,26 @@ def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
             moved_x += touch * (turned_c * levers[i, 0] - turned_s * levers[i, 1] - before[i, 0])
             moved_y += touch * (turned_s * levers[i, 0] + turned_c * levers[i, 1] - before[i, 1])
             total += touch
-        moved_x = moved_x / total + frame[0] + cosine * x - sine * y - state[_PLACE]
-        moved_y = moved_y / total + frame[1] + sine * x + cosine * y - state[_PLACE + 1]
+        moved_x = moved_x / total + frame[0] + cosine * x - sine * y - state[_POSITION]
+        moved_y = moved_y / total + frame[1] + sine * x + cosine * y - state[_POSITION + 1]
         state[_OFFSET] -= share * (cosine * moved_x + sine * moved_y)
         state[_OFFSET + 1] -= share * (cosine * moved_y - sine * moved_x)
         state[_OFFSET + 2] += back
-        fade = _FADE * (1.0 - 0.5 * (stands + state[_STOOD])) + _FADE_ALONE * (1.0 - mixture)
+        fade = _FADE_RATE * (1.0 - 0.5 * (stance + state[_STANCE])) + _ALONE_FADE_RATE * (1.0 - mixture)
         left = np.exp(-fade * ahead)
         for i in range(3):
             state[_OFFSET + i] *= left
     elif known:
         state[_OFFSET : _OFFSET + 3] = 0.0
-    way = np.sqrt(state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2)
-    if way > _MOST:
-        state[_OFFSET] *= _MOST / way
-        state[_OFFSET + 1] *= _MOST / way
-    state[_OFFSET + 2] = min(max(state[_OFFSET + 2], -_MOST_TURN), _MOST_TURN)
+    distance = np.sqrt(state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2)
+    if distance > _MAX_OFFSET:
+        state[_OFFSET] *= _MAX_OFFSET / distance
+        state[_OFFSET + 1] *= _MAX_OFFSET / distance
+    state[_OFFSET + 2] = min(max(state[_OFFSET + 2], -_MAX_TURN), _MAX_TURN)
     end[0] += state[_OFFSET]
     end[1] += state[_OFFSET + 1]
-    q[0], q[1], q[2], q[3] = _yawed(state[_OFFSET + 2], q)
-    state[_PLACE] = frame[0] + cosine * end[0] - sine * end[1]
-    state[_PLACE + 1] = frame[1] + sine * end[0] + cosine * end[1]
-    state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3] = _yawed(frame[2], q)
-    state[_HELD], state[_STOOD] = held, stands
+    q[0], q[1], q[2], q[3] = _yaw(state[_OFFSET + 2], q)
+    state[_POSITION] = frame[0] + cosine * end[0] - sine * end[1]
+    state[_POSITION + 1] = frame[1] + sine * end[0] + cosine * end[1]
+    state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3] = _yaw(frame[2], q)
+    state[_HOLD], state[_STANCE] = hold, stance

@@ -1,8 +1,8 @@
 r"""Grounded form of a gait: a running gait without its flight phases, for paces that are too slow for them.
 
 The duration of a flight phase is given by gravity, whatever the pace; so a gait with flights cannot be played slowly.
-Here each flight phase is divided between the foot that pushes off and the one that lands: the former stands longer, the
-latter lands sooner, both at their places in the clip. A leg is played at a warped phase ψ(s) instead of s,
+Here each flight phase is divided between the foot that pushes off and the one that lands: the former stays in stance
+longer, the latter lands sooner, both at their places in the clip. A leg is played at a warped phase ψ(s) instead of s,
 
 .. math:: \psi(b - \sigma_+ g_-) = b, \qquad \psi(a + \sigma_- g_+) = a
 
@@ -23,16 +23,17 @@ from controllers.legs.reaching import extension, shortfall
 from controllers.motion.channels import signed_like
 from controllers.state import Array, Mask
 
-# σ₋, σ₊: their excess over 1 gives a double support of a tenth of the flight. Divided 0.6 to 0.4 instead of equally, a
-# flight lowers the pelvis by 7 cm more (docs/validation/led-figures.md).
-_AFTER, _BEFORE = 0.5, 0.6
-_LOWEST = 0.3  # [m] largest lowering of the root; a leap that needs more is no step: CMU 02_03's needs 0.26, SNU's 0.83
+# σ₋, σ₊: the excess of their sum over 1 gives a double support of a tenth of the flight. If the flight is divided 0.6
+# to 0.4 instead of equally, the pelvis is lowered by 7 cm more (docs/validation/led-figures.md).
+_SHARE_AFTER, _SHARE_BEFORE = 0.5, 0.6
+# [m] largest lowering of the root; a longer leap cannot become a step: CMU 02_03 needs 0.26, SNU 0.83
+_MAX_LOWERING = 0.3
 
 
 def grounded(
     rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
 ) -> Array | None:
-    """Rows of a led clip (`led`) without flight phases, or None if it has none, hops on one foot, or leaps too far.
+    """Rows of a led clip (`led`) without its flight phases; None if it has none, hops on one foot, or leaps too far.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def grounded(
         Displacement of the root over the floor [m], at m equal steps of the lap.
     """
     flights = runs(~np.any(standing, axis=1))
-    warps = [_warp(standing, j, flights) for j in range(len(limbs))]
+    warps = [_phase_warp(standing, j, flights) for j in range(len(limbs))]
     if not flights or any(warp is None for warp in warps):
         return None
     n, result = len(rows), rows.copy()
@@ -76,7 +77,7 @@ def grounded(
     window = np.hanning(width + 2)[1:-1]
     ceiling = minimum_filter1d(rows[:, 2] - short, width, mode="wrap")
     result[:, 2] = convolve1d(ceiling, window / window.sum(), mode="wrap")
-    if np.max(rows[:, 2] - result[:, 2]) > _LOWEST:
+    if np.max(rows[:, 2] - result[:, 2]) > _MAX_LOWERING:
         return None
     return result
 
@@ -84,22 +85,22 @@ def grounded(
 def hastened(standing: Mask) -> float:
     """Largest ψ' of limbs with the stance mask `standing` (n, limbs): ratio of a limb's swing speed to the clip's."""
     flights, n = runs(~np.any(standing, axis=1)), len(standing)
-    warps = [_warp(standing, j, flights) for j in range(standing.shape[1])]
+    warps = [_phase_warp(standing, j, flights) for j in range(standing.shape[1])]
     return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
 
 
-def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
+def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
     """ψ n of limb j at the samples of the lap; None if it is never in stance, or would land before it lifts off."""
     n, own = len(standing), runs(standing[:, j])
     if not own:
         return None
     before = {end % n: end - start for start, end in flights}
     after = {start: end - start for start, end in flights}
-    here, there = list[float](), list[float]()
+    phases, clip_phases = list[float](), list[float]()
     for start, end in own:
-        here += [start - _BEFORE * before.get(start, 0), end + _AFTER * after.get(end % n, 0)]
-        there += [float(start), float(end)]
-    if np.any(np.diff([*here, here[0] + n]) <= 0.0):
+        phases += [start - _SHARE_BEFORE * before.get(start, 0), end + _SHARE_AFTER * after.get(end % n, 0)]
+        clip_phases += [float(start), float(end)]
+    if np.any(np.diff([*phases, phases[0] + n]) <= 0.0):
         return None
     laps = np.arange(-2, 3) * n
-    return PchipInterpolator(np.add.outer(laps, here).ravel(), np.add.outer(laps, there).ravel())(np.arange(n))
+    return PchipInterpolator(np.add.outer(laps, phases).ravel(), np.add.outer(laps, clip_phases).ravel())(np.arange(n))

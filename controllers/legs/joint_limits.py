@@ -5,10 +5,10 @@ becomes
 
 .. math:: v' = v + A\,S(|v|)\,(c(v) - v)
 
-A rises from 0 to 1 with the height of the end: on the ground, avoiding foot skate has priority over a joint that is a
-few degrees beyond its limit. S is 1, and falls to 0 as |v| goes to π, where v jumps to its opposite: no limb turns so
-far, and the result stays continuous. Within the limits the joint is unchanged, bit for bit. Joints of the in-betweens
-of walk, run, jump and backflip are 2.4° beyond their limits at most, without saturation 105°.
+A rises from 0 to 1 with the height of the end: on the ground, a joint may be a few degrees beyond its limit, since
+avoiding foot skate has priority. S is 1, and falls to 0 as |v| goes to π, where v jumps to its opposite: no limb turns
+so far, and the result stays continuous. Within the limits the joint is unchanged, bit for bit. In in-betweens of walk,
+run, jump and backflip, joints exceed their limits by at most 2.4°, without saturation by 105°.
 """
 
 import numpy as np
@@ -19,16 +19,17 @@ from controllers.rotations import angular_velocity, exponential, logarithm, rota
 from controllers.saturation import clamped
 from controllers.state import Array, Quat
 
-SATURATION_WIDTH = 0.1  # [rad] excess over a limit at which saturation is complete, at half of that beyond the limit
-_FROM, _TO = 2.9, 3.13  # [rad] range of |v| over which S falls
-_LOW, _HIGH = 0.15, 0.35  # [m] heights of the end over which A rises: on the ground, limits would move a foot by 7 cm
+SATURATION_WIDTH = 0.1  # [rad] excess over a limit from which the joint stays at half of it beyond the limit
+_FADE_START, _FADE_END = 2.9, 3.13  # [rad] range of |v| over which S falls
+# [m] heights of the end between which A rises: on the ground, limits would move a foot by 7 cm
+_GROUND_HEIGHT, _AIR_HEIGHT = 0.15, 0.35
 
 
 @njit
 def in_the_air(height: float) -> tuple[float, float]:
     """A of an end at a height over the ground [m], and its derivative [1/m]."""
-    x = (height - _LOW) / (_HIGH - _LOW)
-    return smooth_step(x), smooth_step_slope(x) / (_HIGH - _LOW)
+    x = (height - _GROUND_HEIGHT) / (_AIR_HEIGHT - _GROUND_HEIGHT)
+    return smooth_step(x), smooth_step_slope(x) / (_AIR_HEIGHT - _GROUND_HEIGHT)
 
 
 @njit
@@ -60,8 +61,8 @@ def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int
     if cx == x and cy == y and cz == z:
         return
     size = np.sqrt(x * x + y * y + z * z)
-    nearly = (size - _FROM) / (_TO - _FROM)
-    left, slope = 1.0 - smooth_step(nearly), -smooth_step_slope(nearly) / (_TO - _FROM)
+    nearly = (size - _FADE_START) / (_FADE_END - _FADE_START)
+    left, slope = 1.0 - smooth_step(nearly), -smooth_step_slope(nearly) / (_FADE_END - _FADE_START)
     share = air * left
     ax, ay, az = cx - x, cy - y, cz - z
     hx, hy, hz = x + share * ax, y + share * ay, z + share * az

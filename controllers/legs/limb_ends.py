@@ -17,10 +17,10 @@ from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 SHARP = 5e-4
-"""Softness of the minimum of a sole's heights where feet are planted or the ground is estimated [m]: four level points
-count 0.7 mm (ln 4 of it) lower."""
+"""Softness of the minimum of sole heights when feet are planted or the ground is estimated [m]: four points at equal
+height count as 0.7 mm (ln 4 times the softness) lower."""
 
-_RARE = 0.02  # share of frames in which a clip may be below the ground that is estimated from it
+_GROUND_QUANTILE = 0.02  # fraction of its frames in which a clip may be below the ground estimated from it
 
 
 def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
@@ -28,10 +28,10 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
     n, m, numbers = channels.shape
     if max(limb.joints) > (numbers - 7) // 4:
         raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb wants {limb.joints}")
-    place, turn = channels[..., :3].reshape(-1, 3), _rotations(channels, 0)
+    place, turn = channels[..., :3].reshape(-1, 3), _joint_rotations(channels, 0)
     for joint, offset in zip(limb.joints, limb.offsets, strict=True):
         place = place + turn.apply(offset)
-        turn = turn * _rotations(channels, joint)
+        turn = turn * _joint_rotations(channels, joint)
     place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
     return place.reshape(n, m, 3), continuous(quaternions)
@@ -75,7 +75,7 @@ def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb
     return np.concatenate([np.diff(places, axis=0) + rolled, turning[..., None]], axis=-1)
 
 
-def _rotations(channels: Array, joint: int) -> Rotation:
+def _joint_rotations(channels: Array, joint: int) -> Rotation:
     return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
 
 
@@ -84,7 +84,7 @@ def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array
 
     .. math:: \frac{d\lambda}{ds} = \frac{|v|^2}{\langle|v|^2\rangle} - 1, \qquad \langle\lambda\rangle = 0
 
-    It falls with slope −1 while the end stands, and makes up for that while it swings.
+    It falls with slope −1 in stance, and rises again in swing.
 
     Parameters
     ----------
@@ -208,4 +208,4 @@ def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
 
     `channels` and `limbs` are as in `lowest_of_limbs`.
     """
-    return np.quantile(lowest_of_limbs(channels, limbs, SHARP), _RARE, axis=0)
+    return np.quantile(lowest_of_limbs(channels, limbs, SHARP), _GROUND_QUANTILE, axis=0)

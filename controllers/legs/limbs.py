@@ -39,18 +39,18 @@ from controllers.motion.vectors import (
 from controllers.state import Array, Vec3
 
 # A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
-# points, limits (3, 3, 2); a limb that steps has the points of its sole behind that (`footsteps`).
+# points, limits (3, 3, 2); for a limb that steps, the points of its sole follow (`footsteps`).
 FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB = 0, 1, 2, 3, 12, 15, 18, 36
-THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # the offsets of the middle and the last joint: the limb's two segments
+THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # offsets of the middle and the last joint: the limb's two segments
 END = 4  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`)
 
-_STRAIGHT = 0.2  # [rad] flexion below which the correction saturates
-_SLACK = 0.03  # [rad] least flexion, for a target out of reach
-_ANY = 2.0 * np.pi  # [rad] beyond any rotation vector: no limit
-# [rad] margin on the range that a clip uses, for poses between its frames: at 120 frames a second a joint that
-# accelerates by 1000 rad/s² goes a Δt²/8 = 0.009 rad beyond them.
-_ROOM = 0.01
-_SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
+_SATURATION_FLEXION = 0.2  # [rad] flexion below which the correction saturates
+_MIN_FLEXION = 0.03  # [rad] least flexion, for a target out of reach
+_NO_LIMIT = 2.0 * np.pi  # [rad] beyond any rotation vector: no limit
+# [rad] margin on the range that a clip uses, for poses between its frames: at 120 frames per second a joint that
+# accelerates by a = 1000 rad/s² exceeds them by a Δt²/8 = 0.009 rad.
+_RANGE_MARGIN = 0.01
+_SOFT_COSINE, _HARD_COSINE = float(np.cos(_SATURATION_FLEXION)), float(np.cos(_MIN_FLEXION))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Limb:
     offsets: Array
     axis: Vec3
     points: Array
-    limits: Array = field(default_factory=lambda: np.tile([-_ANY, _ANY], (3, 3, 1)))
+    limits: Array = field(default_factory=lambda: np.tile([-_NO_LIMIT, _NO_LIMIT], (3, 3, 1)))
 
     def __post_init__(self) -> None:
         numbers = self.packed()
@@ -113,28 +113,28 @@ class Limb:
         ParameterError
             If the poses lack one of its joints.
         """
-        most = min(((poses.shape[1] - 7) // 4 for poses in clips), default=max(self.joints))
-        if max(self.joints) > most:
-            raise ParameterError(f"the poses have {most} joints, a limb wants {self.joints}")
+        joint_count = min(((poses.shape[1] - 7) // 4 for poses in clips), default=max(self.joints))
+        if max(self.joints) > joint_count:
+            raise ParameterError(f"the poses have {joint_count} joints, a limb wants {self.joints}")
         limits = self.limits.copy()
         for joint, interval in zip(self.joints, limits, strict=True):
             for poses in clips:
                 quaternions = poses[:, 3 + 4 * joint : 7 + 4 * joint]
                 vectors = Rotation.from_quat(quaternions, scalar_first=True).as_rotvec()
-                interval[:, 0] = np.minimum(interval[:, 0], vectors.min(axis=0) - _ROOM)
-                interval[:, 1] = np.maximum(interval[:, 1], vectors.max(axis=0) + _ROOM)
+                interval[:, 0] = np.minimum(interval[:, 0], vectors.min(axis=0) - _RANGE_MARGIN)
+                interval[:, 1] = np.maximum(interval[:, 1], vectors.max(axis=0) + _RANGE_MARGIN)
         return replace(self, limits=limits)
 
 
 @njit
 def flexion(c: float) -> tuple[float, float]:
     """Angle f(c) [rad] of a cosine, and f': the arc cosine, levelled off beyond ±cos 0.2; C² for every number."""
-    over = (abs(c) - _SOFT) / (_HARD - _SOFT)
+    over = (abs(c) - _SOFT_COSINE) / (_HARD_COSINE - _SOFT_COSINE)
     soft, slope = c, 1.0
     if over > 0.0:
         # x / (1 + x³)^(1/3) departs from the identity with a C² onset.
         root = np.cbrt(1.0 + over**3)
-        soft, slope = np.copysign(_SOFT + (_HARD - _SOFT) * over / root, c), root**-4
+        soft, slope = np.copysign(_SOFT_COSINE + (_HARD_COSINE - _SOFT_COSINE) * over / root, c), root**-4
     return np.arccos(soft), -slope / np.sqrt(1.0 - soft * soft)
 
 

@@ -1,7 +1,7 @@
 """Offline inverse kinematics of a led clip: height of the root at which limbs reach their ends, and joint rotations.
 
-At run time the map corrects limbs softly and by little (`limbs`). Rows whose joints already reach the ends exactly are
-left unchanged by that correction where the path is straight, so the exact solution is computed here beforehand.
+At run time the map corrects limbs with a soft saturation (`limbs`). Where the path is straight, that correction leaves
+rows unchanged whose joints already reach the ends exactly; so the exact solution is computed here beforehand.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,16 @@ from controllers.legs.limbs import END, Limb
 from controllers.motion.channels import signed_like
 from controllers.state import Array
 
-# Largest extension of a limb over its length: straighter, a led knee stops with 2500 rad/s², beyond its motor. Knees
-# of eight led captures accelerate by up to 1040, with 0.98 by 810, their roots 0.8 cm lower, with 0.998 by 1470.
-_STRETCHED = 0.99
-_LEAST_BEND = 0.03  # [rad] least flexion of the middle joint
+# Largest extension of a limb over its length. A led knee that gets straighter stops with 2500 rad/s², beyond its motor.
+# Knees of eight led captures accelerate by up to 1040 rad/s²; with 0.98 by 810, with the root 0.8 cm lower; with 0.998
+# by 1470.
+_MAX_EXTENSION = 0.99
+_MIN_FLEXION = 0.03  # [rad] least flexion of the middle joint
 
 
 def extension(rows: Array, stride: float, limb: Limb, at: int) -> float:
     """Largest distance between a limb's first and last joint over the lap [m]; parameters as in `shortfall`."""
-    return float(np.linalg.norm(_line(rows, stride, limb, at), axis=1).max())
+    return float(np.linalg.norm(_limb_vector(rows, stride, limb, at), axis=1).max())
 
 
 def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 0.0) -> Array:
@@ -37,12 +38,12 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
     at : int
         First column of the limb's end.
     longest : float
-        Largest allowed extension [m], if more than `_STRETCHED` times the limb's length.
+        Largest allowed extension [m], if more than `_MAX_EXTENSION` times the limb's length.
     """
-    longest = max(_STRETCHED * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
-    line = _line(rows, stride, limb, at)
-    away = np.linalg.norm(line[:, :2], axis=1)
-    return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))
+    longest = max(_MAX_EXTENSION * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
+    line = _limb_vector(rows, stride, limb, at)
+    horizontal = np.linalg.norm(line[:, :2], axis=1)
+    return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - horizontal**2, 0.0)))
 
 
 def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
@@ -56,7 +57,7 @@ def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
         columns = [slice(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints[:2]]
         upper, middle = (Rotation.from_quat(rows[:, column], scalar_first=True) for column in columns)
         root = Rotation.from_quat(rows[:, 3:7], scalar_first=True)
-        line = root.inv().apply(_line(rows, stride, limb, first + END * j))
+        line = root.inv().apply(_limb_vector(rows, stride, limb, first + END * j))
         a, b = limb.offsets[1:]
         axis = np.asarray(limb.axis) / np.linalg.norm(limb.axis)
         # |line|² = |a|² + |b|² + 2 (a·b_axis + B cos δ + C sin δ), with b turned by δ about the axis.
@@ -65,18 +66,18 @@ def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
         cosine, sine = m @ b - along, m @ np.cross(axis, b)
         size, straight = np.hypot(cosine, sine), np.arctan2(sine, cosine)
         wanted = (0.5 * ((line**2).sum(axis=1) - a @ a - b @ b) - along) / size
-        bend = np.arccos(np.clip(wanted, -1.0, np.cos(_LEAST_BEND)))
+        bend = np.arccos(np.clip(wanted, -1.0, np.cos(_MIN_FLEXION)))
         # The side of flexion is that of the mean, so that a knee that is hyperextended in some frames bends normally.
         turn = straight - np.sign(straight.mean()) * bend
         middle = middle * Rotation.from_rotvec(turn[:, None] * axis)
         reach = upper.apply(a + middle.apply(b))
-        upper = _shortest(reach, line) * upper
+        upper = _shortest_rotations(reach, line) * upper
         for column, turned in zip(columns, (upper, middle), strict=True):
             result[:, column] = signed_like(turned.as_quat(scalar_first=True), rows[:, column])
     return result
 
 
-def _line(channels: Array, stride: float, limb: Limb, at: int) -> Array:
+def _limb_vector(channels: Array, stride: float, limb: Limb, at: int) -> Array:
     """Vector from a limb's first joint to its last, in the axes of the path [m], shape (n, 3)."""
     place = 3 + 4 * limb.joints[2]
     end = Rotation.from_quat(channels[:, place : place + 4], scalar_first=True)
@@ -86,7 +87,7 @@ def _line(channels: Array, stride: float, limb: Limb, at: int) -> Array:
     return line - channels[:, :3] - root.apply(limb.offsets[0])
 
 
-def _shortest(u: Array, v: Array) -> Rotation:
+def _shortest_rotations(u: Array, v: Array) -> Rotation:
     """Smallest rotations that turn directions u into v (n, 3), less than half a turn apart."""
     u, v = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (u, v))
     quaternions = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)

@@ -1,16 +1,18 @@
-"""Heights of a sole over the floor between which its foot passes from stance to swing, for all that hold or measure it.
+"""Heights of a sole over the floor at which its foot passes from stance to swing, for every module that needs them.
 
-What corrects a blend's feet, what tracks the motion and what measures skate must agree on them: a foot that is held
-lower than it is measured skates in between, and one that is lifted less than the tracking releases is held back.
+The correction of a blend's feet, the tracking of the motion and the measure of foot skate must use the same heights: a
+foot that is held only up to a lower height than it is measured skates in between, and one that is lifted less than the
+height at which tracking releases it is held back.
 """
 
 STANDS = 0.003
-"""Height up to which a sole stands: its foot keeps its place, and what it moves is skate [m].
+"""Height up to which a sole is in stance: its foot keeps its place, and any motion over the floor is skate [m].
 
-In-betweens of cheer and ginga slide by 1.0 cm at most, with half or twice of it, too. Measured up to twice of it, the
-low swing of walk and run counts as skate, 7.8 cm instead of 0.4; up to half of it, 0.1.
+In-betweens of cheer and ginga slide by at most 1.0 cm, also with half or twice this height. If skate is measured up to
+twice this height, the low swing of walk and run counts as skate: 7.8 cm instead of 0.4; up to half of it, 0.1 cm.
 """
 
 SWINGS = 0.008
-"""Height from which a sole swings: the tracking figure no longer holds its foot on the floor [m]. With half or
-twice of it in tracking alone the residual of a jump is 2.9 or 6.3 % of weight instead of 2.8."""
+"""Height above which a sole is in swing: the tracking figure no longer holds its foot on the floor [m].
+
+With half or twice this height in tracking alone, the residual of a jump is 2.9 or 6.3 % of weight instead of 2.8."""

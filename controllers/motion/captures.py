@@ -1,13 +1,13 @@
 r"""Motion captures of gaits that are led: low-pass filter against noise, and parameters of their footsteps.
 
-A millimetre of noise is 1 m/s² at 5 Hz, and 25 m/s² at 25 Hz: more than ground reaction forces can give. So the
+A millimetre of noise is 1 m/s² at 5 Hz, and 25 m/s² at 25 Hz: more than ground reaction forces can provide. So the
 channels of a lap are filtered by a Butterworth filter of second order, forwards and backwards (zero phase), as is
 usual for captured gaits (Winter 2009, *Biomechanics and Motor Control of Human Movement*, section 3.4),
 
 .. math:: H(f) = \frac{1}{1 + (f/f_c)^4} ,
 
-periodically over the lap, so that its seam is not an end. A led figure moves at varying paces, at which the flight
-phases of a capture would not last as long as gravity requires: they are replaced by steps when the capture is led.
+periodically over the lap, so that nothing special happens at its seam. A led figure moves at varying paces, at which
+the flight phases of a capture would not last as long as gravity requires: they are replaced by steps.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Channels of a motion at successive times: a position, then quaternions (wxyz), then others; signs and norms."""
+"""Channels of a motion at successive times (a position, then quaternions wxyz, then others): signs and norms."""
 
 import numpy as np
 

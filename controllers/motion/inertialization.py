@@ -8,10 +8,10 @@ blend time T:
           \qquad x = s/T
 
 the quintic with o, ȯ, ö at s = 0 and value, velocity and acceleration zero at s = T. So pose, velocity and acceleration
-are continuous at both ends. Every component keeps its own rate, also where it points away from the new motion, which
-Bollo clips: a joint then overshoots by up to 0.2 T ȯ, as by its inertia. That could throw a fast leg beyond its joint
-limits; so where 0.16 T ȯ would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their own,
-for which it equals that swing: the overshoot is then up to 1.24 times the swing.
+are continuous at both ends. Every component keeps its own rate, also where it points away from the new motion (Bollo
+clips it there): a joint then overshoots by up to 0.2 T ȯ, as if by its inertia. That could throw a fast leg beyond its
+joint limits; so where 0.16 T ȯ would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their
+own, for which it equals that swing: the overshoot is then up to 1.24 times the swing.
 
 For the position of the figure on the floor, which need not return, see `stopping_way`.
 """
@@ -23,9 +23,8 @@ from numba import njit
 from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose, Tangent
 
-# Overshoot due to the rate as a share of T ȯ, by which it is limited; its term x (1 + 3x) (1 − x)³ reaches 0.198,
-# which is 16/81.
-_SWING = 0.16
+# Overshoot over T ȯ that is assumed in limiting it; the term of ȯ, x (1 + 3x) (1 − x)³, reaches 16/81 = 0.198.
+_OVERSHOOT_RATIO = 0.16
 
 
 @njit
@@ -48,14 +47,14 @@ def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing:
     x = s / seconds
     value = (1.0 - x) ** 3 * (1.0 + x * (3.0 + 6.0 * x))
     for i in range(offset.shape[0]):
-        own = seconds
-        if _SWING * seconds * abs(change[1, i]) > swing:
-            own = swing / (_SWING * abs(change[1, i]))
+        decay_time = seconds
+        if _OVERSHOOT_RATIO * seconds * abs(change[1, i]) > swing:
+            decay_time = swing / (_OVERSHOOT_RATIO * abs(change[1, i]))
         offset[i] = value * change[0, i]
-        y = s / own
+        y = s / decay_time
         if y < 1.0:
-            moving = own * (1.0 - y) ** 3 * y
-            offset[i] += moving * (1.0 + 3.0 * y) * change[1, i] + 0.5 * moving * own * y * change[2, i]
+            moving = decay_time * (1.0 - y) ** 3 * y
+            offset[i] += moving * (1.0 + 3.0 * y) * change[1, i] + 0.5 * moving * decay_time * y * change[2, i]
 
 
 @njit

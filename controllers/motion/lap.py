@@ -1,8 +1,9 @@
 r"""The frame of the lap: moves the figure over the ground at the seam of the lap, and compensates changes of the drift.
 
-In the frame A ∈ SE(2) of the lap the root is at exp(s ξ), s the share of the lap, ξ the drift per lap. ξ changes when
-the hand changes the blend of clips that travel differently. The distance covered so far must not change with it:
-otherwise a hand that moves aside late in a lap would carry the figure over the floor by metres. So A compensates it,
+In the frame A ∈ SE(2) of the lap the root is at exp(s ξ), with s the elapsed fraction of the lap and ξ the drift per
+lap. ξ changes when the hand changes the blend of clips that travel differently. The distance covered so far must not
+change with it: otherwise a hand that moves sideways late in a lap would carry the figure over the floor by metres. So A
+compensates it,
 
 .. math:: A \leftarrow A\,\exp(\bar s\,\xi_{before})\,\exp(-\bar s\,\xi_{now}), \qquad
           \bar s = \tfrac12 (s_{before} + s_{now}),
@@ -53,10 +54,10 @@ def update_lap(memory: Array, angle: float, drift: Array) -> None:
     memory[LAST_ANGLE] = angle
     # The comparison is false for the NaN of the first tick.
     if abs(angle - before) > np.pi:
-        way = 1.0 if angle < before else -1.0
-        _move_frame(memory, way, last)
-        before -= way * 2.0 * np.pi
-        memory[LAPS] += way
+        direction = 1.0 if angle < before else -1.0
+        _move_frame(memory, direction, last)
+        before -= direction * 2.0 * np.pi
+        memory[LAPS] += direction
     if before == before and (drift[0] != last[0] or drift[1] != last[1] or drift[2] != last[2]):
         s = (before + angle) / (4.0 * np.pi)
         _move_frame(memory, s, last)

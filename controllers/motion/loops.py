@@ -2,7 +2,7 @@ r"""Clips as closed loops: each is split into a steady drift over the ground and
 
 .. math:: X_{root}(s) = \exp(s\,\xi)\,\rho(s), \qquad s \in [0, 1],\; \rho(1) = \rho(0)
 
-ξ = (v, ω) is the planar twist whose exponential is the displacement of one lap: a walk goes on from where the lap
+ξ = (v, ω) is the planar twist whose exponential is the displacement of one lap: a walk continues from where the lap
 ended, a spin returns to its start after a turn of ω = 2π. Everything else (ρ and the joints) is a periodic C² spline,
 in R³ for the root's position and in R⁴, normalised, for each rotation.
 """
@@ -16,12 +16,15 @@ from controllers.errors import ParameterError
 from controllers.motion.channels import continuous, normalise
 from controllers.state import Array
 
-_STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # [m], [rad] a lap that ends this near to its start has no drift
-_UPRIGHT = 0.3  # least vertical component of the pelvis axis at which its turning about the vertical counts
-_SEAM = 0.2  # share of the lap at each end that the closing of an open clip may change
-_CLOSES = 0.01  # components of quaternions, or [m]: largest difference between the ends of a closed clip
-_MOVES, _GOES = 1.5, 0.6  # [rad/s] RMS of the joints, [m/s] of the root: a faster end of a clip does not rest
-_BRAKES = 0.15  # [s] at each end of an open clip that are slowed down to rest, in twice the time
+# [m], [rad] a lap that ends nearer to its start has no drift
+_MAX_STILL_LENGTH, _MAX_STILL_ANGLE = 0.02, np.deg2rad(2.0)
+# least vertical component of the pelvis axis at which turns about the vertical are counted
+_MIN_UPRIGHT_COMPONENT = 0.3
+_SEAM = 0.2  # fraction of the lap at each end that may change when an open clip is closed
+_CLOSING_TOLERANCE = 0.01  # [m], or components of quaternions: largest difference between the ends of a closed clip
+# [rad/s] RMS of the joints, [m/s] of the root: largest speeds at rest
+_MAX_REST_JOINT_SPEED, _MAX_REST_ROOT_SPEED = 1.5, 0.6
+_BRAKING_TIME = 0.15  # [s] at each end of an open clip in which it is brought to rest, which takes twice this time
 
 
 def plane_exponential(twist: Array) -> tuple[Array, Array]:
@@ -69,7 +72,7 @@ def _end_derivatives(s: Array, values: Array) -> Array:
     return np.stack([values[0], fit[1], 2.0 * fit[2] if len(fit) > 2 else np.zeros_like(fit[0])])
 
 
-def _closed(s: Array, values: Array, sign: float) -> Array:
+def _close(s: Array, values: Array, sign: float) -> Array:
     """Close an open motion: move each end half way to the other, so that value, slope and second derivative meet."""
     start, end = _end_derivatives(s, values), _end_derivatives(1.0 - s[::-1], values[::-1])
     gaps = sign * end * [[1.0], [-1.0], [1.0]] - start
@@ -80,7 +83,7 @@ def _closed(s: Array, values: Array, sign: float) -> Array:
     return values + first - last
 
 
-def _full_turns(quaternions: Array, net: float) -> int:
+def _count_full_turns(quaternions: Array, net: float) -> int:
     """Whole turns about the vertical beyond the net turn, counted while the pelvis is upright: no somersaults."""
     upright = 1.0 - 2.0 * (quaternions[:, 1] ** 2 + quaternions[:, 2] ** 2)
     change = quaternions[1:] - quaternions[:-1]
@@ -92,7 +95,7 @@ def _full_turns(quaternions: Array, net: float) -> int:
         + change[:, 2] * middle[:, 1]
         - change[:, 1] * middle[:, 2]
     )
-    counted = vertical[(upright[1:] > _UPRIGHT) & (upright[:-1] > _UPRIGHT)].sum()
+    counted = vertical[(upright[1:] > _MIN_UPRIGHT_COMPONENT) & (upright[:-1] > _MIN_UPRIGHT_COMPONENT)].sum()
     return round(float(counted - net) / (2.0 * np.pi))
 
 
@@ -156,7 +159,7 @@ def turn_of(poses: Array) -> tuple[float, int]:
     # k part of q_last ⊗ q_first⁻¹: the change of heading is the twist of that rotation about the vertical.
     k = float(last[6] * first[3] - last[3] * first[6] + last[5] * first[4] - last[4] * first[5])
     net = float(2.0 * np.arctan2(k * np.sign(w or 1.0), abs(w)))
-    return net, _full_turns(poses[:, 3:7], net)
+    return net, _count_full_turns(poses[:, 3:7], net)
 
 
 def drift_of(poses: Array) -> Array:
@@ -164,7 +167,7 @@ def drift_of(poses: Array) -> Array:
     first, last = poses[0], poses[-1]
     net, turns = turn_of(poses)
     step = last[:2] - turned(np.array(net), first[:2])
-    if abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
+    if abs(net) < _MAX_STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _MAX_STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
     if abs(net) < 1.0:
         turns = 0  # the exponential of a twist of whole turns has no translation, so these stay in the remainder
@@ -195,7 +198,7 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
 
 
 def there_and_back(poses: Array, fps: float) -> Array:
-    r"""Append to an open clip that (nearly) rests at both ends its time reversal; any other clip is left as it is.
+    r"""Append its time reversal to an open clip that (nearly) rests at both ends; return any other clip unchanged.
 
     q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with
     the same torques and contact forces it is equally feasible, its flights are ballistic, and its feet stand in the
@@ -203,21 +206,21 @@ def there_and_back(poses: Array, fps: float) -> Array:
     """
     first, last = poses[0], poses[-1]
     signs = np.sign(np.einsum("jx,jx->j", first[3:].reshape(-1, 4), last[3:].reshape(-1, 4)))
-    turned_away = np.abs(last[7:].reshape(-1, 4) - signs[1:, None] * first[7:].reshape(-1, 4)).max(initial=0.0)
-    if turned_away < _CLOSES and abs(last[2] - first[2]) < _CLOSES:
+    mismatch = np.abs(last[7:].reshape(-1, 4) - signs[1:, None] * first[7:].reshape(-1, 4)).max(initial=0.0)
+    if mismatch < _CLOSING_TOLERANCE and abs(last[2] - first[2]) < _CLOSING_TOLERANCE:
         return poses
     for step in (poses[1] - first, last - poses[-2]):
         joints = 2.0 * fps * np.linalg.norm(step[3:].reshape(-1, 4), axis=1)
-        if np.sqrt(np.mean(joints**2)) > _MOVES or fps * np.linalg.norm(step[:3]) > _GOES:
+        if np.sqrt(np.mean(joints**2)) > _MAX_REST_JOINT_SPEED or fps * np.linalg.norm(step[:3]) > _MAX_REST_ROOT_SPEED:
             return poses
     seconds = (len(poses) - 1) / fps
-    brakes = min(_BRAKES, 0.25 * seconds)
-    # Clip time u: u = t²/(4 brakes) while the pace rises, for 2 brakes; then pace 1; then the same in reverse.
-    times = np.linspace(0.0, seconds + 2.0 * brakes, int(np.ceil((seconds + 2.0 * brakes) * fps)) + 1)
+    braking = min(_BRAKING_TIME, 0.25 * seconds)
+    # Clip time u: u = t²/(4 b) while the pace rises, for 2 b (b: `braking`); then pace 1; then the same in reverse.
+    times = np.linspace(0.0, seconds + 2.0 * braking, int(np.ceil((seconds + 2.0 * braking) * fps)) + 1)
     rest = times[-1] - times
-    own = np.where(times < 2.0 * brakes, times**2 / (4.0 * brakes), times - brakes)
-    own = np.where(rest < 2.0 * brakes, seconds - rest**2 / (4.0 * brakes), own)
-    slow = CubicSpline(np.arange(len(poses)) / fps, poses)(np.clip(own, 0.0, seconds))
+    clip_times = np.where(times < 2.0 * braking, times**2 / (4.0 * braking), times - braking)
+    clip_times = np.where(rest < 2.0 * braking, seconds - rest**2 / (4.0 * braking), clip_times)
+    slow = CubicSpline(np.arange(len(poses)) / fps, poses)(np.clip(clip_times, 0.0, seconds))
     normalise(slow, (slow.shape[1] - 3) // 4)
     return np.concatenate([slow, slow[-2::-1]])
 
@@ -242,6 +245,6 @@ def forward_loop(poses: Array, fps: float) -> Loop:
         values = rest[:, first:stop]
         sign = -1.0 if first and values[-1] @ values[0] < 0.0 else 1.0
         if np.abs(values[-1] - sign * values[0]).max() > 1e-6:
-            values = _closed(s, values, sign)
+            values = _close(s, values, sign)
         splines.append(_periodic_spline(s, values, sign))
     return Loop(drift, (len(poses) - 1) / fps, splines)

@@ -3,12 +3,13 @@ r"""Weighted mean of rotations, and its derivative.
 The mean minimises Σ w_i |R − R_i|², the chordal metric (Markley et al. 2007, "Averaging quaternions"): its
 quaternion is the eigenvector of M = Σ w_i q_i q_iᵀ with the largest eigenvalue λ. We prefer it to the Karcher mean,
 with which it agrees to third order in the spread of the rotations: the sign of a quaternion does not matter, and it
-is smooth except where λ is double (two rotations half a turn apart in equal parts: a point), while the Karcher mean
-jumps as soon as two are half a turn apart, whatever their weights. So a somersault can be blended with a walk.
+is smooth except where λ is double (two rotations half a turn apart with equal weights: a single point), while the
+Karcher mean jumps as soon as two are half a turn apart, whatever their weights. So a somersault can be blended with a
+walk.
 
 With r_i = q⁻¹ ⊗ q_i = (s_i, v_i), the mean satisfies g = Σ w_i s_i v_i = 0 and A = Σ w_i (s_i² I − v_i v_iᵀ), which
-is λI − M seen in the tangent space of q, is positive definite: that proves that the iteration found the largest
-eigenvalue. All of this holds for weights of which some are negative too: M need not be definite.
+is λI − M in the tangent space of q, is positive definite: that proves that the iteration found the largest eigenvalue.
+All of this also holds if some weights are negative: M need not be definite.
 """
 
 import numpy as np
@@ -18,12 +19,12 @@ from controllers.rotations import multiply, relative
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-_Normal = tuple[float, float, float, float, float, float, float, float, float]
+_NormalEquations = tuple[float, float, float, float, float, float, float, float, float]
 
 
 @njit(forceinline=True)
-def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
-    """Entries A11, A12, A13, A22, A23, A33 of A and g1, g2, g3 of g (see the module)."""
+def _normal_equations(unit: Array, weights: Array, q: Quat) -> _NormalEquations:
+    """Entries A11, A12, A13, A22, A23, A33 of A and g1, g2, g3 of g (see the module's docstring)."""
     a11 = a12 = a13 = a22 = a23 = a33 = g1 = g2 = g3 = 0.0
     for i in range(unit.shape[0]):
         w = weights[i]
@@ -41,7 +42,7 @@ def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
 
 
 @njit
-def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _solve(e: _NormalEquations, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A⁻¹ (x, y, z) by cofactors; zero when A is singular (the mean is not unique there)."""
     c11, c12, c13 = e[3] * e[5] - e[4] * e[4], e[2] * e[4] - e[1] * e[5], e[1] * e[4] - e[2] * e[3]
     c22, c23, c33 = e[0] * e[5] - e[2] * e[2], e[1] * e[2] - e[0] * e[4], e[0] * e[3] - e[1] * e[1]
@@ -56,7 +57,7 @@ def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, floa
 
 
 @njit(forceinline=True)
-def _polish(unit: Array, weights: Array, q: Quat) -> bool:
+def _refine(unit: Array, weights: Array, q: Quat) -> bool:
     """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; returns whether A is then positive definite."""
     e = _normal_equations(unit, weights, q)
     for _ in range(8):
@@ -73,15 +74,15 @@ def _polish(unit: Array, weights: Array, q: Quat) -> bool:
 
 
 @njit
-def _dominant(unit: Array, weights: Array, q: Quat) -> None:  # noqa: C901 - loops over a 4 × 4 matrix, which a call would allocate
-    """Eigenvector of the largest eigenvalue of M by squaring M 24 times: slower than `_polish`, but always converges.
+def _dominant_eigenvector(unit: Array, weights: Array, q: Quat) -> None:  # noqa: C901 - loops over a 4 × 4 matrix, which a call would allocate
+    """Eigenvector of the largest eigenvalue of M by squaring M 24 times: slower than `_refine`, but always converges.
 
     In compiled code `numpy.linalg.eigh` allocates and calls LAPACK: 3.3 µs instead of 0.9, and 5 s more to compile.
     """
     m, square = work_array((4, 4)), work_array((4, 4))
     m[:] = 0.0
     for i in range(unit.shape[0]):
-        # A multiple of the identity makes M positive in spite of negative weights, and changes no eigenvector.
+        # A multiple of the identity makes M positive despite negative weights, and changes no eigenvector.
         for j in range(4):
             m[j, j] += max(-weights[i], 0.0)
         for j in range(4):
@@ -136,9 +137,9 @@ def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
     norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     for j in range(4):
         q[j] /= norm
-    if not _polish(unit, weights, q):
-        _dominant(unit, weights, q)
-        _polish(unit, weights, q)
+    if not _refine(unit, weights, q):
+        _dominant_eigenvector(unit, weights, q)
+        _refine(unit, weights, q)
     dot = 0.0
     for j in range(4):
         dot += q[j] * unit[heaviest, j]

@@ -1,6 +1,6 @@
 r"""Repeats of each clip in a lap: travelling clips stride in step with each other, and all play near their own pace.
 
-A walk of two strides and a run of three have no common phase except at the lap's ends, and a jog of 0.8 s beside a
+A walk of two strides and a run of three have no common phase except at the lap's ends. A jog of 0.8 s in a lap with a
 dance of 4 s would be played five times too slowly: its flights would need a 25th of gravity. A loop can be repeated
 any number of times: it stays closed, and its drift and duration scale. So with d_i the duration of a clip, s_i its
 number of strides and T the duration of the lap, clip i is played k_i / s_i times,
@@ -8,9 +8,9 @@ number of strides and T the duration of the lap, clip i is played k_i / s_i time
 .. math:: k = \arg\min_k \max_i w\!\left(\log \frac{k\,d_i}{s_i\,T}\right), \qquad w(x) = \max(-x, 3 x)
 
 where k is common to all travelling clips, which therefore take the same number of strides; for every other clip k_i is
-chosen by itself with s_i = 1. If the legs are those of one clip, strides need not be in step, and k_i is chosen for
-each clip by itself. Faster counts three times as much as slower, since motion played f times as fast needs f² of its
-forces, and a jump cannot fall faster than gravity lets it.
+chosen separately with s_i = 1. If the legs are those of one clip, strides need not be in step, and k_i is chosen
+separately for each clip. Faster counts three times as much as slower, since a motion played f times as fast needs f²
+times its forces, and a jump cannot fall faster than gravity allows.
 """
 
 from collections.abc import Sequence
@@ -21,26 +21,26 @@ import numpy as np
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 
-_SAMPLES = 128  # of a lap: half or twice counts the same strides in the nine embedded clips
-_MOST = 12  # largest number of repeats searched in a clip
-_SAME = 1e-3  # [m], or components of rotations: largest difference between repeats
-_FASTER = 3.0  # cost of playing faster relative to slower
-_SHORTEST, _LONGEST = 3.0, 6.0  # [s] of a natural lap, unless a loop lasts longer
-_FURTHEST = 0.3  # [m] a lap that travels less is not a gait
+_SAMPLES = 128  # per lap; half or twice as many give the same strides for the nine embedded clips
+_MAX_REPEATS = 12  # largest number of repeats that is tried for a clip
+_REPEAT_TOLERANCE = 1e-3  # [m], or components of rotations: largest difference between repeats
+_FASTER_COST = 3.0  # cost of playing faster relative to slower
+_MIN_LAP_DURATION, _MAX_LAP_DURATION = 3.0, 6.0  # [s] limits of a natural lap, unless a loop lasts longer
+_MIN_TRAVEL = 0.3  # [m] a lap that travels less is not a gait
 
 
 def strides(loop: Loop) -> int:
     """Number of strides of a loop: repeats of the same motion in a lap."""
     phase, still = np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES)
     channels = loop.channels(phase, still)
-    if np.ptp(channels, axis=0).max() < _SAME:
+    if np.ptp(channels, axis=0).max() < _REPEAT_TOLERANCE:
         return 1
-    repeats: IntArray = np.arange(_MOST, 1, -1)
+    repeats: IntArray = np.arange(_MAX_REPEATS, 1, -1)
     for n in repeats:
         later = loop.channels(phase + 1.0 / n, still)
         dots = np.einsum("sjx,sjx->sj", *(part[:, 3:].reshape(_SAMPLES, -1, 4) for part in (channels, later)))
         later[:, 3:] *= np.repeat(np.where(dots < 0.0, -1.0, 1.0), 4, axis=1)
-        if np.abs(later - channels).max() < _SAME:
+        if np.abs(later - channels).max() < _REPEAT_TOLERANCE:
             return int(n)
     return 1
 
@@ -56,18 +56,18 @@ def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False
         T [s]. Without it clips are played once, except that travelling clips of several strides get as many strides as
         the first of them.
     apart : bool
-        Whether each clip is fitted by itself, travelling ones too.
+        Whether each clip is fitted separately, travelling ones too.
     """
     counts = [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
     if lap is None:
         wanted = next((count for count in counts if count > 1), 1)
         shares = [wanted / count if count > 1 else 1.0 for count in counts]
     else:
-        travels = [not apart and float(np.hypot(*loop.drift[:2])) > _FURTHEST for loop in loops]
+        travels = [not apart and float(np.hypot(*loop.drift[:2])) > _MIN_TRAVEL for loop in loops]
         durations = np.array([loop.duration / count for loop, count in zip(loops, counts, strict=True)])
-        common = _times(durations[travels], lap) if any(travels) else 1
+        common = _best_repeat_count(durations[travels], lap) if any(travels) else 1
         shares = [
-            (common if goes else _times(np.array([duration]), lap)) / count
+            (common if goes else _best_repeat_count(np.array([duration]), lap)) / count
             for duration, count, goes in zip(durations, counts, travels, strict=True)
         ]
     return [
@@ -76,26 +76,26 @@ def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False
     ]
 
 
-def _times(durations: Array, lap: float) -> int:
-    """Number of repeats of durations [s] (n,) that fits a lap [s] best in the worst case."""
+def _best_repeat_count(durations: Array, lap: float) -> int:
+    """Number of repeats of durations [s] (n,) that minimises the worst mismatch with a lap [s]."""
     logs = np.log(durations / lap)
     first = max(1, int(np.exp(-logs.max())))
     ways = np.arange(first, int(np.exp(-logs.min())) + 2)
     faster = np.log(ways)[:, None] + logs
-    return int(ways[np.maximum(-faster, _FASTER * faster).max(axis=1).argmin()])
+    return int(ways[np.maximum(-faster, _FASTER_COST * faster).max(axis=1).argmin()])
 
 
 def natural_lap(loops: Sequence[Loop]) -> float:
-    """Duration of a lap [s] in which the first loop plays at its own pace, and the others `in_step` as nearly.
+    """Duration of a lap [s] in which the first loop plays at its own pace, and the others as nearly as possible.
 
     Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from 3 to 6 s or
-    the duration of the longest loop; of all within 2 % of the best, the shortest is taken.
-    A lap of several short cycles gives the hand more time to change the blend.
+    the duration of the longest loop; of all within 2 % of the best, the shortest is chosen. A lap of several short
+    cycles gives the hand more time to change the blend.
     """
     first = loops[0]
     stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
-    least = int(np.ceil(_SHORTEST / stride - _SAME))
-    most = int(max(_LONGEST, *(loop.duration for loop in loops)) / stride + _SAME)
-    laps = stride * np.arange(least, max(least, most) + 1)
+    fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
+    highest = int(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)) / stride + _REPEAT_TOLERANCE)
+    laps = stride * np.arange(fewest, max(fewest, highest) + 1)
     worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in in_step(loops, float(lap))) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

@@ -20,19 +20,19 @@ from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.state import Array, IntArray
 
-# A decision: u, u_0 at the entry of the stance, u_1, and the end of the stance at which it was entered
-# (0: begin, 1: end, when going backwards; −1 in flight).
-_HELD, _BEFORE, _AIM, _ENTRY, DECISION = range(5)
+# Indices of a decision: u, u_0 at the entry of the stance, u_1, and the end of the stance at which it was entered
+# (0: its begin; 1: its end, when walking backwards; −1: in flight).
+_SHARE, _START_SHARE, _TARGET_SHARE, _ENTRY_END, DECISION = range(5)
 
-# Share of a stance in which u changes. With less, the floor would have to pull at a landing figure; with more, at one
-# that pushes off: downward accelerations reach 8 m/s² with 0.8, as in the run itself, and 14 with 0.6.
+# Fraction of a stance over which u changes. If it is smaller, the floor would have to pull on a figure that lands; if
+# larger, on one that pushes off: downward accelerations reach 8 m/s² with 0.8, as in the run itself, and 14 with 0.6.
 WITHIN = 0.8
 
 
 def fresh_decision(flies: bool) -> Array:
     """Decision of a figure that has not been led yet: grounded, in a stance; `flies`: the gait has flight phases."""
-    held = float(flies)
-    return np.array([held, held, held, 0.0])
+    share = float(flies)
+    return np.array([share, share, share, 0.0])
 
 
 @njit
@@ -60,16 +60,16 @@ def decide_flight(decision: Array, share: float, speed: float, take_off: float, 
         Speed of the figure, and the least speeds at which flight phases begin, and at which they continue [m/s].
     """
     if share < 0.0:
-        decision[_ENTRY] = -1.0
-        return decision[_HELD]
-    if decision[_ENTRY] < 0.0:
-        flew = decision[_HELD] < 0.5
-        decision[_ENTRY], decision[_BEFORE] = np.floor(share + 0.5), decision[_HELD]
-        decision[_AIM] = 0.0 if speed >= (landing if flew else take_off) else 1.0
-    x = abs(share - decision[_ENTRY])
-    x = min(x / WITHIN, 1.0) if decision[_AIM] < decision[_BEFORE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
-    decision[_HELD] = decision[_BEFORE] + smooth_step(x) * (decision[_AIM] - decision[_BEFORE])
-    return decision[_HELD]
+        decision[_ENTRY_END] = -1.0
+        return decision[_SHARE]
+    if decision[_ENTRY_END] < 0.0:
+        flew = decision[_SHARE] < 0.5
+        decision[_ENTRY_END], decision[_START_SHARE] = np.floor(share + 0.5), decision[_SHARE]
+        decision[_TARGET_SHARE] = 0.0 if speed >= (landing if flew else take_off) else 1.0
+    x = abs(share - decision[_ENTRY_END])
+    x = min(x / WITHIN, 1.0) if decision[_TARGET_SHARE] < decision[_START_SHARE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
+    decision[_SHARE] = decision[_START_SHARE] + smooth_step(x) * (decision[_TARGET_SHARE] - decision[_START_SHARE])
+    return decision[_SHARE]
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,12 +29,12 @@ from controllers.walking.walked_path import (
     path_value,
 )
 
-_ARGUMENT = 7
-_DECIDED = _ARGUMENT + 5
-_PATH = _DECIDED + DECISION
-_SEARCHES = 4  # Newton steps of the search for the nearest point, warm-started
-_STEERING = 0.15  # [m] of path, the length constant with which the curvature follows the stylus
-RESERVE_ROWS = 4  # rows of path kept in reserve, since the filter before the map may evaluate it ahead of the walker
+_ARGUMENT_SIZE = 7
+_FLIGHT_OFFSET = _ARGUMENT_SIZE + 5
+_PATH_OFFSET = _FLIGHT_OFFSET + DECISION
+_NEWTON_STEPS = 4  # Newton steps of the warm-started search for the nearest point
+_STEERING_LENGTH = 0.15  # [m] path length constant with which the curvature follows the stylus
+RESERVE_ROWS = 4  # spare rows of path, since the filter before the map may evaluate it ahead of the walker
 
 
 class Walker(NamedTuple):
@@ -73,17 +73,17 @@ class Walker(NamedTuple):
 @njit
 def walker_at(numbers: Array, at: int) -> Walker:
     """The walker whose numbers begin at ``numbers[at]``."""
-    one = at + _ARGUMENT
+    one = at + _ARGUMENT_SIZE
     return Walker(
         numbers[at:one], numbers[one : one + 1], numbers[one + 1 : one + 2], numbers[one + 2 : one + 3],
-        numbers[one + 3 : one + 4], numbers[one + 4 : one + 5], numbers[at + _DECIDED : at + _PATH],
-        numbers[at + _PATH : at + _PATH + PACKED_PATH],
+        numbers[one + 3 : one + 4], numbers[one + 4 : one + 5], numbers[at + _FLIGHT_OFFSET : at + _PATH_OFFSET],
+        numbers[at + _PATH_OFFSET : at + _PATH_OFFSET + PACKED_PATH],
     )  # fmt: skip
 
 
 def fresh_walker(gait: Gait, ahead: float, path: Array) -> Array:
     """Numbers of a walker at rest at s = 0, on a packed path that is laid up to `ahead` [m]."""
-    numbers = np.zeros(_PATH + PACKED_PATH)
+    numbers = np.zeros(_PATH_OFFSET + PACKED_PATH)
     walker = walker_at.py_func(numbers, 0)
     walker.argument[1], walker.argument[3] = float(gait.flies), 1.0
     walker.goal[0], walker.time[0] = ahead, np.nan
@@ -92,7 +92,7 @@ def fresh_walker(gait: Gait, ahead: float, path: Array) -> Array:
 
 
 class Following(NamedTuple):
-    """Parameters with which a walker follows; packed: the numbers, the lengths of shares and stances, then these.
+    """Parameters of a walker; packed as the scalars, the lengths of `shares` and `stances`, then these arrays.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Following(NamedTuple):
         ω [1/s], largest |s̈| [m/s²], largest speeds [m/s], Ω [rad/s], a [m/s²], κ_max [1/m], speeds of take-off and
         landing [m/s], largest |s̈| with flight phases [m/s²] (see `controllers.walking.walking.Walking`).
     ahead, decay, stride : float
-        D [m], decay factor of the lean per row of the path, and length of a lap [m].
+        D [m], decay factor of the lean per row of the path, and path length of a lap [m].
     shares, stances : Array
         `Walking.shares` and `Gait.stances`, flattened.
     """
@@ -122,12 +122,12 @@ class Following(NamedTuple):
     stances: Array
 
 
-_NUMBERS = len(Following._fields) - 2
+_SCALAR_COUNT = len(Following._fields) - 2
 
 
 def packed_following(following: Following) -> Array:
     """The parameters as an array for `following_at`."""
-    numbers = [float(number) for number in following[:_NUMBERS]]
+    numbers = [float(number) for number in following[:_SCALAR_COUNT]]
     lengths = [len(following.shares), following.stances.size]
     return np.concatenate([numbers, lengths, following.shares, following.stances.ravel()])
 
@@ -135,7 +135,7 @@ def packed_following(following: Following) -> Array:
 @njit
 def following_at(numbers: Array, at: int) -> Following:
     """Parameters packed at ``numbers[at:]``."""
-    first = at + _NUMBERS + 2
+    first = at + _SCALAR_COUNT + 2
     middle = first + int(numbers[first - 2])
     return Following(
         numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3], numbers[at + 4], numbers[at + 5],
@@ -158,11 +158,11 @@ def path_place(path: Array, s: float) -> tuple[float, float, float, float]:
 
 
 @njit
-def _nearest(path: Array, guess: float, x: float, y: float) -> float:
+def _nearest_arc_length(path: Array, guess: float, x: float, y: float) -> float:
     """Arc length of the point nearest to (x, y), near a guess, on the path or its straight continuation."""
     front, back = path_front(path), path_back(path)
     goal = guess
-    for _ in range(_SEARCHES):
+    for _ in range(_NEWTON_STEPS):
         at = min(goal, front)
         a, b, heading, curvature = path_place(path, at)
         c, s = np.cos(heading), np.sin(heading)
@@ -174,8 +174,8 @@ def _nearest(path: Array, guess: float, x: float, y: float) -> float:
 
 
 @njit
-def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
-    """Lay the path up to D ahead of the figure, bent towards the stylus's point (x, y) on the floor by pure pursuit."""
+def _extend_path(follow: Following, walker: Walker, x: float, y: float) -> None:
+    """Extend the path up to D ahead of the figure, towards the stylus's point (x, y) on the floor by pure pursuit."""
     path, speed, ahead = walker.path, max(walker.speed[0], 0.1), follow.ahead
     limit = min(follow.curvature, follow.turn / speed, follow.lateral / (speed * speed))
     phases = float(len(follow.shares))
@@ -185,7 +185,7 @@ def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
         forward, side = c * (x - a) + s * (y - b), c * (y - b) - s * (x - a)
         # Pure pursuit: the arc that is tangent to the path and passes through the stylus's point.
         bend = 2.0 * side / max(forward * forward + side * side, ahead * ahead) if forward > 0.0 else 0.0
-        bend = walker.bend[0] + (min(max(bend, -limit), limit) - walker.bend[0]) * STEP / _STEERING
+        bend = walker.bend[0] + (min(max(bend, -limit), limit) - walker.bend[0]) * STEP / _STEERING_LENGTH
         bend = min(max(bend, -limit), limit)
         walker.bend[0] = bend
         lap = (path[0] + 0.5) * STEP / follow.stride
@@ -195,7 +195,7 @@ def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
 
 
 @njit
-def _bent_speed(follow: Following, path: Array, s: float, speed: float) -> float:
+def _speed_limit(follow: Following, path: Array, s: float, speed: float) -> float:
     """Largest speed at s [m/s] from which the figure can brake for every bend ahead in its direction of motion."""
     pull, front = min(follow.pull, follow.haste), path[0]
     square = follow.forward**2
@@ -206,30 +206,30 @@ def _bent_speed(follow: Following, path: Array, s: float, speed: float) -> float
         bend = max(path[1 + ROW * (int(row) % ROWS) + PATH_BEND], 1e-9)
         # The turn from one row to the next extends over three steps.
         distance = max(abs(s / STEP - row + 0.5) - 1.5, 0.0) * STEP
-        most = min((follow.turn / bend) ** 2, follow.lateral / bend)
-        square = min(square, most + 2.0 * pull * distance)
+        limit = min((follow.turn / bend) ** 2, follow.lateral / bend)
+        square = min(square, limit + 2.0 * pull * distance)
     return np.sqrt(square)
 
 
 @njit
-def _walk(follow: Following, walker: Walker, dt: float) -> None:
+def _integrate_motion(follow: Following, walker: Walker, dt: float) -> None:
     """Integrate s̈ = ω² (g − D − s) − 2 ω ṡ over `dt` [s], with bounded |s̈| and a speed limit where the path bends."""
     on_ground = walker.argument[1] > 0.5 or len(follow.stances) == 0
     pull = follow.pull if on_ground else follow.haste
     s, speed = walker.argument[0], walker.speed[0]
     acceleration = walker_acceleration(walker.goal[0] - follow.ahead - s, speed, follow.rate)
     speed += dt * min(max(acceleration, -pull), pull)
-    most = _bent_speed(follow, walker.path, s, speed)
-    speed = min(max(speed, -follow.backward, -most), most)
+    limit = _speed_limit(follow, walker.path, s, speed)
+    speed = min(max(speed, -follow.backward, -limit), limit)
     s += dt * speed
-    least = path_back(walker.path) + follow.ahead
-    if s < least:
-        s, speed = least, 0.0
+    lowest = path_back(walker.path) + follow.ahead
+    if s < lowest:
+        s, speed = lowest, 0.0
     walker.argument[0], walker.speed[0] = s, speed
 
 
 @njit
-def _decide_flight(follow: Following, walker: Walker) -> None:
+def _update_flight(follow: Following, walker: Walker) -> None:
     """Update u by the phase of the lap and the speed (see `controllers.walking.gait`)."""
     share = share_of_stance(follow.stances, walker.argument[0] / follow.stride)
     walker.argument[1] = decide_flight(
@@ -240,11 +240,11 @@ def _decide_flight(follow: Following, walker: Walker) -> None:
 @njit
 def lead(follow: Following, walker: Walker, time: float, x: float, y: float) -> None:
     """Advance a walker to a time [s], towards the stylus's point (x, y) on the floor [m]; all must be finite."""
-    walker.goal[0] = _nearest(walker.path, walker.goal[0], x, y)
+    walker.goal[0] = _nearest_arc_length(walker.path, walker.goal[0], x, y)
     dt = time - walker.time[0]
     walker.time[0] = time
     # The comparison is false for the NaN of the first tick.
     if dt > 0.0:
-        _walk(follow, walker, min(dt, LONGEST_STEP))
-        _decide_flight(follow, walker)
-        _lay_path(follow, walker, x, y)
+        _integrate_motion(follow, walker, min(dt, LONGEST_STEP))
+        _update_flight(follow, walker)
+        _extend_path(follow, walker, x, y)

@@ -1,4 +1,4 @@
-"""How a figure that is led follows the stylus: the parameters of its walker, and the walker's kernel."""
+"""Following of the stylus by a led figure: the parameters of its walker, and the walker's kernel."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,12 +24,14 @@ from controllers.walking.walker import (
     walker_at,
 )
 
-_HEIGHT = 1.0  # [m] of the linear inverted pendulum that models the figure's sway: its centre of mass stands at 1.02
-_FORESIGHT = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
+_PENDULUM_HEIGHT = (
+    1.0  # [m] height of the linear inverted pendulum that models the lean; the centre of mass stands at 1.02
+)
+_PREVIEW_RATIO = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
 
 
 class Followed(NamedTuple):
-    """What a law of force reads of a walker.
+    """State of a walker that a force law reads.
 
     Attributes
     ----------
@@ -39,7 +41,7 @@ class Followed(NamedTuple):
     x, y, heading : float
         That point, or the path's front if it lies beyond [m], and the heading there [rad].
     along : float
-        Arc length of (x, y) minus s + D, where the figure wants it [m].
+        Arc length of (x, y) minus s + D, where it is in equilibrium [m].
     beyond : float
         Distance of g beyond the path's front [m], 0 on the path.
     room : float
@@ -61,7 +63,7 @@ FOLLOWED = len(Followed._fields)
 
 @njit
 def followed_at(numbers: Array, at: int) -> Followed:
-    """The `Followed` that `follow_hand` left at ``numbers[at:]``."""
+    """The `Followed` that `follow_hand` wrote at ``numbers[at:]``."""
     return Followed(
         numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3], numbers[at + 4], numbers[at + 5],
         numbers[at + 6], numbers[at + 7],
@@ -70,9 +72,9 @@ def followed_at(numbers: Array, at: int) -> Followed:
 
 @njit
 def follow_hand(params: Array, at: int, slot: int, walkers: Array, place: int, hand: Array, memory: Array) -> None:
-    """Kernel of a walker: advance it to the hand's time, and write what a law reads of it.
+    """Kernel of a walker: advance it to the hand's time, and write the state that a law reads.
 
-    A hand that is not finite leaves the walker, and what was written, as they are.
+    If the state of the hand is not finite, nothing is changed.
 
     Parameters
     ----------
@@ -93,12 +95,12 @@ def follow_hand(params: Array, at: int, slot: int, walkers: Array, place: int, h
     goal, front = walker.goal[0], path_front(walker.path)
     nearest, beyond = min(goal, front), max(goal - front, 0.0)
     a, b, heading, _ = path_place(walker.path, nearest)
-    told = Followed(
+    followed = Followed(
         s=walker.argument[0], goal=goal, x=a, y=b, heading=heading, along=nearest - walker.argument[0] - follow.ahead,
         beyond=beyond, room=0.5 * follow.curvature * beyond * beyond,
     )  # fmt: skip
     for k in range(FOLLOWED):
-        memory[slot + k] = told[k]
+        memory[slot + k] = followed[k]
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +207,7 @@ class Walking:
     @property
     def ahead(self) -> float:
         """D, length of path laid ahead of the figure [m]: enough to place a foot, and to lean into a bend in time."""
-        return max(self.gait.reach, _FORESIGHT * self._sway) + RESERVE_ROWS * STEP
+        return max(self.gait.reach, _PREVIEW_RATIO * self._lean_length) + RESERVE_ROWS * STEP
 
     @property
     def lead(self) -> tuple[float, float]:
@@ -213,9 +215,9 @@ class Walking:
         return 2.0 * self.gait.speed / self.rate, 2.0 * self.backward * self.gait.speed / self.rate
 
     @property
-    def _sway(self) -> float:
+    def _lean_length(self) -> float:
         """Distance covered at the gait's own speed while an inverted pendulum falls by a factor of e [m]."""
-        return self.gait.speed * float(np.sqrt(_HEIGHT / GRAVITY))
+        return self.gait.speed * float(np.sqrt(_PENDULUM_HEIGHT / GRAVITY))
 
     def packed(self) -> Array:
         """Parameters of `follow_hand`: S, then a `Following`."""
@@ -224,8 +226,9 @@ class Walking:
             rate=self.rate, pull=self.pull, forward=self.forward * gait.speed, backward=self.backward * gait.speed,
             turn=self.turn_two, lateral=self.lateral, curvature=self.curvature,
             take_off=self.take_off * gait.speed, landing=self.landing * gait.speed,
-            haste=self.haste if gait.flies else np.inf, ahead=self.ahead, decay=float(np.exp(-STEP / self._sway)),
-            stride=gait.stride, shares=self.shares, stances=gait.stances,
+            haste=self.haste if gait.flies else np.inf, ahead=self.ahead,
+            decay=float(np.exp(-STEP / self._lean_length)), stride=gait.stride, shares=self.shares,
+            stances=gait.stances,
         )  # fmt: skip
         return np.concatenate([[self.scale], packed_following(follow)])
 

@@ -9,7 +9,7 @@ rectangle (multidimensional scaling, at every angle and smooth in it): a millime
 figure equally everywhere, so h_* is well conditioned. At a transition T falls to the approach, and v makes the curves
 parallel; elsewhere S keeps them apart. The bending term grows with θ̇: where the radius changes, springs and filters
 track the tangential acceleration 2 θ̇² r' with an error, which shifts the hand's angle and with it the clip's phase.
-`limits` penalises excess of speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the
+`limits` penalises excessive speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the
 rectangle, hence so do the sites.
 """
 
@@ -27,30 +27,32 @@ from controllers.haptic_map.lifting.transitions import Transition
 from controllers.state import Array
 
 ROWS = 64  # control points round the lap
-_PER_ROW = 3
-SAMPLES = ROWS * _PER_ROW  # angles at which the energy is evaluated
-# Sensitivities of the constants in this folder: walk, run, jump and backflip in a room of r from 20 mm.
+_SAMPLES_PER_ROW = 3
+SAMPLES = ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
+# The sensitivities of the constants in this folder were found with walk, run, jump and backflip, in a room with r from
+# 20 mm on. Distances of two clips are those of their curves at the transition.
 
-# [rad] from a transition within which two curves may be nearer than the separation: with half of it walk and run come
-# within 12.7 mm instead of 10.1, jump and backflip within 8.7 instead of 5.0.
+# [rad] distance from a transition within which two curves may be nearer than the separation. With half of it walk and
+# run come within 12.7 mm instead of 10.1, jump and backflip within 8.7 instead of 5.0.
 WINDOW = 0.9
-# Target distance of the most different motions, as a share of the rectangle's diagonal. With 0.6 walk and run come
-# within 5.6 mm of each other at their transition, with 0.8 within 10.1, with 1.0 within 12.9; h_* changes by 11, 12
-# and 10 % a millimetre.
-_FILL = 0.8
-# Least distance at a transition, as a share of the target distance κ d of the poses: walk and run come within 10.1
-# mm, with half of it 7.4 and with twice 15.1; h_* changes by at most 66, 69 and 55 % a millimetre (nine of ten
-# places).
-_STEEP = 0.2
-# Weights. Half or twice the separation moves the transitions of walk, run, jump and backflip by 0.2 mm, the tangent
-# by 0.4, the approach and the bend by 1.8, of 5.0 and 10.1 mm; the condition number of h_* half way moves by 0.6 of
-# 22.7.
-_SEPARATION, _APPROACH, _TANGENT, _BEND, _LIMIT = 40.0, 250.0, 0.7, 0.015, 40.0
-_SLOW = 2.0  # [rad/s], ω: with 3 a captured walk, which lacks 1.7 % of weight, lacks 11 % on its curve, with 2 4.7 %
-_LENGTH = 0.02  # [m] unit of length of slopes and bends in the energy
-# Safety factor on the separation and the limits, for angles between the samples: curves come within 5.0 mm of each
-# other, with 1.0 within 4.5, with 1.2 within 5.6.
-_MARGIN = 1.1
+# Target distance of the most different motions, as a fraction of the rectangle's diagonal. With 0.6 walk and run come
+# within 5.6 mm of each other, with 0.8 within 10.1, with 1.0 within 12.9; h_* changes by 11, 12 and 10 % per
+# millimetre.
+_FILL_FRACTION = 0.8
+# Least distance at a transition, as a fraction of the target distance κ d of the poses. Walk and run come within 10.1
+# mm, with half of it 7.4 and with twice 15.1; at nine of ten places h_* changes by at most 66, 69 and 55 % per
+# millimetre.
+_MIN_DISTANCE_RATIO = 0.2
+# Weights of the terms. Half or twice the separation weight changes the distances at the transitions (5.0 and 10.1 mm)
+# by 0.2 mm, the tangent weight by 0.4, the approach and bend weights by 1.8; the condition number of h_* half way
+# between two curves changes by 0.6 of 22.7.
+_SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
+# [rad/s] ω: a captured walk with a residual of 1.7 % of weight has 4.7 % on its curve, with ω = 3 rad/s 11 %
+_BEND_RATE = 2.0
+_LENGTH_UNIT = 0.02  # [m] unit of length of slopes and bends in the energy
+# Safety factor on the separation and the limits, for angles between the samples. Curves come within 5.0 mm of each
+# other, with 1.0 within 4.5 and with 1.2 within 5.6.
+_SAFETY_FACTOR = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,21 +89,21 @@ class Task:
     def scale(self) -> float:
         """κ: ratio of distances in the rectangle to distances of poses."""
         size = float(np.linalg.norm(self.rectangle.high - self.rectangle.low))
-        return _FILL * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
+        return _FILL_FRACTION * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
 
     def targets(self) -> tuple[Array, Array, Array]:
         """T, S and w of the energy, each of shape (SAMPLES, n, n)."""
-        wanted = np.maximum(self.scale * self.distance, _MARGIN * self.separation)
-        least = np.full(wanted.shape, _MARGIN * self.separation)
+        wanted = np.maximum(self.scale * self.distance, _SAFETY_FACTOR * self.separation)
+        least = np.full(wanted.shape, _SAFETY_FACTOR * self.separation)
         weight = np.ones(wanted.shape)
         for first, second, near in self.windows():
-            nearest = np.maximum(self.approach, _STEEP * self.scale * self.distance[:, first, second])
+            nearest = np.maximum(self.approach, _MIN_DISTANCE_RATIO * self.scale * self.distance[:, first, second])
             target = nearest + (wanted[:, first, second] - nearest) * near
             floor = self.approach + (least[:, first, second] - self.approach) * near
             for i, j in ((first, second), (second, first)):
                 wanted[:, i, j] = target
                 least[:, i, j] = np.minimum(least[:, i, j], floor)
-                weight[:, i, j] += _APPROACH * np.maximum(1.0 - 3.0 * near, 0.0)
+                weight[:, i, j] += _APPROACH_WEIGHT * np.maximum(1.0 - 3.0 * near, 0.0)
         return wanted, least, weight
 
     def windows(self) -> list[tuple[int, int, Array]]:
@@ -121,41 +123,41 @@ class Task:
         return velocity, np.stack([w * w * (ddr - r) + a * dr, 2.0 * w * w * dr + a * r, w * w * ddz + a * dz])
 
 
-class _Splines(NamedTuple):
-    """Value and derivatives by θ at the samples, of periodic cubic B-splines: matrices (SAMPLES, ROWS)."""
+class _SplineMatrices(NamedTuple):
+    """Matrices (SAMPLES, ROWS) that give value and derivatives by θ of periodic cubic B-splines at the samples."""
 
     value: csr_array
     slope: csr_array
     bend: csr_array
 
 
-def _splines() -> _Splines:
+def _spline_matrices() -> _SplineMatrices:
     matrices = np.zeros((3, SAMPLES, ROWS))
     rate = ROWS / (2.0 * np.pi)
     for k in range(SAMPLES):
-        row, u = k // _PER_ROW, (k % _PER_ROW) / _PER_ROW
+        row, u = k // _SAMPLES_PER_ROW, (k % _SAMPLES_PER_ROW) / _SAMPLES_PER_ROW
         value = [(1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3]
         slope = [-3 * (1 - u) ** 2, 9 * u**2 - 12 * u, -9 * u**2 + 6 * u + 3, 3 * u**2]
         bend = [6 * (1 - u), 18 * u - 12, -18 * u + 6, 6 * u]
         columns = (row + np.arange(-1, 3)) % ROWS
         for matrix, numbers, unit in zip(matrices, (value, slope, bend), (1.0, rate, rate**2), strict=True):
             matrix[k, columns] = unit * np.array(numbers) / 6.0
-    return _Splines(*(csr_array(matrix) for matrix in matrices))
+    return _SplineMatrices(*(csr_array(matrix) for matrix in matrices))
 
 
-_SPLINES = _splines()
-_UNIT = SAMPLES * _LENGTH**2
+_MATRICES = _spline_matrices()
+_SLOPE_UNIT = SAMPLES * _LENGTH_UNIT**2
 
 
 def sites_of(controls: Array) -> Array:
     """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), from control points of the same shape."""
-    return on_lap(controls)[0][::_PER_ROW]
+    return on_lap(controls)[0][::_SAMPLES_PER_ROW]
 
 
 def on_lap(controls: Array) -> tuple[Array, Array, Array]:
     """Sites at the samples of the lap and their first and second derivatives by θ, each (SAMPLES, n, 2)."""
     flat = controls.reshape(ROWS, -1)
-    q, dq, ddq = ((matrix @ flat).reshape(SAMPLES, -1, 2) for matrix in _SPLINES)
+    q, dq, ddq = ((matrix @ flat).reshape(SAMPLES, -1, 2) for matrix in _MATRICES)
     return q, dq, ddq
 
 
@@ -164,56 +166,56 @@ class Energy:
 
     def __init__(self, task: Task) -> None:
         self._task = task
-        self._wanted, self._least, self._weight = task.targets()
+        self._target, self._min_distance, self._weight = task.targets()
         n = task.distance.shape[1]
         self._pairs = i, j = np.triu_indices(n, 1)
-        self._ends = np.equal.outer(np.arange(n), i).astype(float) - np.equal.outer(np.arange(n), j)
-        square = self._wanted[:, self._pairs[0], self._pairs[1]] ** 2
-        self._unit = float(square.mean()) if n > 1 else 1.0
+        self._incidence = np.equal.outer(np.arange(n), i).astype(float) - np.equal.outer(np.arange(n), j)
+        square = self._target[:, self._pairs[0], self._pairs[1]] ** 2
+        self._mean_square = float(square.mean()) if n > 1 else 1.0
 
     def __call__(self, flat: Array) -> tuple[float, Array]:
         """E and its gradient at control points (ROWS · n · 2,)."""
         task = self._task
         controls = flat.reshape(ROWS, -1, 2)
         q, dq, ddq = on_lap(controls)
-        apart, g_q = self._apart(q)
-        stiff = _BEND / _UNIT * (1.0 + (task.rate[..., None] / _SLOW) ** 4)
+        apart, g_q = self._distance_terms(q)
+        stiff = _BEND_WEIGHT / _SLOPE_UNIT * (1.0 + (task.rate[..., None] / _BEND_RATE) ** 4)
         bend, g_ddq = (stiff * ddq**2).sum(), 2.0 * stiff * ddq
-        slant, g_slant = self._slant(dq)
+        slant, g_slant = self._parallel_term(dq)
         w, a = task.rate, task.change
         v, u = task.hand_motion(q, dq, ddq)
-        fast, g_v = _excess(v, task.speed / _MARGIN)
-        hard, g_u = _excess(u, task.acceleration / _MARGIN)
+        fast, g_v = _limit_penalty(v, task.speed / _SAFETY_FACTOR)
+        hard, g_u = _limit_penalty(u, task.acceleration / _SAFETY_FACTOR)
         g_dq = np.stack([w * g_v[0] + a * g_u[0] + 2.0 * w * w * g_u[1], w * g_v[2] + a * g_u[2]], axis=-1)
         g_dq = g_dq + g_slant
         g_q = g_q + np.stack([w * g_v[1] - w * w * g_u[0] + a * g_u[1], np.zeros_like(w)], axis=-1)
         g_ddq = g_ddq + np.stack([w * w * g_u[0], w * w * g_u[2]], axis=-1)
         gradient = np.zeros((ROWS, controls.shape[1] * 2))
-        for matrix, g in zip(_SPLINES, (g_q, g_dq, g_ddq), strict=True):
+        for matrix, g in zip(_MATRICES, (g_q, g_dq, g_ddq), strict=True):
             gradient += matrix.T @ g.reshape(SAMPLES, -1)
         return float(apart + slant + bend + fast + hard), gradient.ravel()
 
-    def _apart(self, q: Array) -> tuple[float, Array]:
+    def _distance_terms(self, q: Array) -> tuple[float, Array]:
         """Stress and separation terms, and their gradient by the sites (SAMPLES, n, 2)."""
         i, j = self._pairs
         if not len(i):
             return 0.0, np.zeros_like(q)
         step = q[:, i] - q[:, j]
         distance = np.sqrt((step**2).sum(axis=2) + 1e-12)
-        missed = distance - self._wanted[:, i, j]
-        weight = self._weight[:, i, j] / self._unit
-        short = np.maximum(1.0 - distance / self._least[:, i, j], 0.0)
+        error = distance - self._target[:, i, j]
+        weight = self._weight[:, i, j] / self._mean_square
+        short = np.maximum(1.0 - distance / self._min_distance[:, i, j], 0.0)
         share = 1.0 / SAMPLES
-        total = share * (weight * missed**2).sum() / q.shape[1] + share * _SEPARATION * (short**2).sum()
-        slope = share * 2.0 * (weight * missed / q.shape[1] - _SEPARATION * short / self._least[:, i, j])
+        total = share * (weight * error**2).sum() / q.shape[1] + share * _SEPARATION_WEIGHT * (short**2).sum()
+        slope = share * 2.0 * (weight * error / q.shape[1] - _SEPARATION_WEIGHT * short / self._min_distance[:, i, j])
         pull = (slope / distance)[..., None] * step
-        return float(total), self._ends @ pull
+        return float(total), self._incidence @ pull
 
-    def _slant(self, dq: Array) -> tuple[float, Array]:
+    def _parallel_term(self, dq: Array) -> tuple[float, Array]:
         """Penalty of curves that are not parallel where they meet, and its gradient by the slopes."""
         total, gradient = 0.0, np.zeros_like(dq)
         for first, second, near in self._task.windows():
-            meets = _TANGENT * np.maximum(1.0 - 3.0 * near, 0.0)[:, None] / _UNIT
+            meets = _TANGENT_WEIGHT * np.maximum(1.0 - 3.0 * near, 0.0)[:, None] / _SLOPE_UNIT
             step = dq[:, first] - dq[:, second]
             total += float((meets * step**2).sum())
             gradient[:, first] += 2.0 * meets * step
@@ -221,19 +223,19 @@ class Energy:
         return total, gradient
 
 
-def _excess(v: Array, most: float) -> tuple[float, Array]:
+def _limit_penalty(v: Array, limit: float) -> tuple[float, Array]:
     """Penalty of vectors (3, SAMPLES, n) longer than allowed, and its gradient."""
     size = np.sqrt((v**2).sum(axis=0) + 1e-24)
-    over = np.maximum(size / most - 1.0, 0.0)
-    return _LIMIT * float((over**2).sum()) / SAMPLES, 2.0 * _LIMIT / SAMPLES * (over / (most * size)) * v
+    over = np.maximum(size / limit - 1.0, 0.0)
+    return _LIMIT_WEIGHT * float((over**2).sum()) / SAMPLES, 2.0 * _LIMIT_WEIGHT / SAMPLES * (over / (limit * size)) * v
 
 
 def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
     """Control points (ROWS, n, 2) of the arrangement, and of the first initial guess.
 
     The energy is minimised (L-BFGS-B) from positions that reproduce the motions' mean distances, from a lattice, and
-    from a perturbation of the first; the result of least energy that keeps the curves apart is taken. If none does, the
-    lattice is taken.
+    from a perturbation of the first; the result of least energy that keeps the curves apart is returned. If none does,
+    the lattice is returned.
 
     Parameters
     ----------
@@ -244,23 +246,23 @@ def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
     n = task.distance.shape[1]
     rectangle = task.rectangle
     first = scaled(task.scale * task.distance.mean(axis=0), task.rate.mean(axis=0), rectangle)
-    kept = on_lattice(first, rectangle, task.separation)
+    lattice_layout = on_lattice(first, rectangle, task.separation)
     jitter = 0.1 * (rectangle.high - rectangle.low)
-    layouts = [first, kept, first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter]
+    layouts = [first, lattice_layout, first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter]
     energy = Energy(task)
     bounds = list(zip(np.tile(rectangle.low, ROWS * n), np.tile(rectangle.high, ROWS * n), strict=True))
-    best, least = np.tile(kept, (ROWS, 1, 1)), np.inf
+    best, least = np.tile(lattice_layout, (ROWS, 1, 1)), np.inf
     for layout in layouts:
         # Without noise, coincident sites would have no gradient that separates them.
         noise = 1e-4 * rng.uniform(-1.0, 1.0, (n, 2))
         start = np.clip(layout + noise, rectangle.low, rectangle.high)
-        found = minimize(
+        result = minimize(
             energy, np.tile(start, (ROWS, 1, 1)).ravel(), jac=True, method="L-BFGS-B", bounds=bounds,
             options={"maxiter": 200, "maxcor": 20},
         )  # fmt: skip
-        controls = np.asarray(found.x).reshape(ROWS, n, 2)
-        if float(found.fun) < least and is_apart(task, controls):
-            best, least = controls, float(found.fun)
+        controls = np.asarray(result.x).reshape(ROWS, n, 2)
+        if float(result.fun) < least and is_apart(task, controls):
+            best, least = controls, float(result.fun)
     return best, np.tile(first, (ROWS, 1, 1))
 
 

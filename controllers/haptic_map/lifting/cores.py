@@ -4,11 +4,11 @@ Before the weights are computed, a point q within the core radius b_i(θ) of a s
 
 .. math:: q \mapsto q_i + S\!\left(\frac{|q - q_i|}{b_i}\right) (q - q_i), \qquad S(x) = 10 x^3 - 15 x^4 + 6 x^5 ,
 
-This is C², the identity from b_i on, at most 1.8 times as steep, and of fourth order at the site: a hand that is a
-quarter of the core off is drawn to a fortieth of it. Cores do not overlap.
+This is C², the identity from b_i on, at most 1.8 times as steep, and of fourth order at the site: a hand at a quarter
+of the core radius is drawn to a fortieth of it. Cores do not overlap.
 
-The reason: late in a lap, clips of curves that are millimetres apart differ by metres in the distance travelled. A
-tenth of a millimetre sideways in a fiftieth of a second would demand more than the acceleration of gravity of the body.
+The reason: late in a lap, clips whose curves are millimetres apart differ by metres in the distance travelled. Hand
+motion by a tenth of a millimetre sideways in a fiftieth of a second would accelerate the body by more than gravity.
 """
 
 import numpy as np
@@ -18,11 +18,12 @@ from controllers.curves.splines import round_lap
 from controllers.easing import smooth_step
 from controllers.state import Array
 
-# [m] largest core: with half or twice of it h_* of walk, run, jump and backflip changes by 11 or 13 % a millimetre
-# (12).
-_WIDEST = 8e-3
-_SHARE = 0.45  # of the distance to the nearest other site: less than half, so that cores do not touch
-_FINE = 4  # samples of a distance between two rows
+# [m] largest core radius: h_* of walk, run, jump and backflip changes by 12 % per millimetre, with half or twice the
+# radius by 11 or 13 %.
+_MAX_CORE_RADIUS = 8e-3
+# core radius over the distance to the nearest other site: less than half, so that cores do not touch
+_RADIUS_RATIO = 0.45
+_SAMPLES_PER_ROW = 4  # samples of a distance from one row to the next
 
 
 @njit
@@ -64,13 +65,13 @@ def core_points(sites: Array) -> Array:
     never exceeds.
     """
     rows, m, _ = sites.shape
-    places = round_lap(sites, np.arange(_FINE * rows) * 2.0 * np.pi / (_FINE * rows))
-    least = np.full((_FINE * rows, m), np.inf)
+    places = round_lap(sites, np.arange(_SAMPLES_PER_ROW * rows) * 2.0 * np.pi / (_SAMPLES_PER_ROW * rows))
+    least = np.full((_SAMPLES_PER_ROW * rows, m), np.inf)
     for i in range(m):
         distance = np.linalg.norm(places - places[:, i : i + 1], axis=2)
         distance[:, i] = np.inf
         least[:, i] = distance.min(axis=1)
     # The basis function of control point j is non-zero from two rows before row j − 1 to two rows behind it.
-    window = np.arange(-3 * _FINE, _FINE + 1)
-    around = least[np.mod(_FINE * np.arange(rows + 3)[:, None] + window, len(least))].min(axis=1)
-    return np.minimum(_SHARE * around, _WIDEST)
+    window = np.arange(-3 * _SAMPLES_PER_ROW, _SAMPLES_PER_ROW + 1)
+    around = least[np.mod(_SAMPLES_PER_ROW * np.arange(rows + 3)[:, None] + window, len(least))].min(axis=1)
+    return np.minimum(_RADIUS_RATIO * around, _MAX_CORE_RADIUS)

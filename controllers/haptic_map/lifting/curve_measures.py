@@ -82,25 +82,25 @@ def measure(task: Task, controls: Array) -> ArrangementMeasure:
     curves = [
         CurveMeasure(float(1.0 / bend[:, i].max()), float(speed[:, i].max()), float(pull[:, i].max())) for i in range(n)
     ]
-    apart = np.linalg.norm(q[:, :, None] - q[:, None], axis=-1)
-    away = np.ones((SAMPLES, n, n), dtype=np.bool_)
+    distances = np.linalg.norm(q[:, :, None] - q[:, None], axis=-1)
+    apart = np.ones((SAMPLES, n, n), dtype=np.bool_)
     for first, second, near in task.windows():
-        away[:, first, second] &= near >= 1.0
+        apart[:, first, second] &= near >= 1.0
     meetings: list[Meeting] = []
     for at in task.transitions:
         k, i, j = round(at.angle / (2.0 * np.pi) * SAMPLES) % SAMPLES, at.first, at.second
         along = float(np.clip(v[k, i] @ v[k, j] / (speed[k, i] * speed[k, j]), -1.0, 1.0))
         meetings.append(
-            Meeting(at, float(apart[k, i, j]), float(np.arccos(along)), (float(speed[k, i]), float(speed[k, j])))
+            Meeting(at, float(distances[k, i, j]), float(np.arccos(along)), (float(speed[k, i]), float(speed[k, j])))
         )
     pairs = list(zip(*np.triu_indices(n, 1), strict=True))
-    separation = min((float(apart[away[:, i, j], i, j].min()) for i, j in pairs), default=np.inf)
+    separation = min((float(distances[apart[:, i, j], i, j].min()) for i, j in pairs), default=np.inf)
     nearest = np.inf
     for i, j in pairs:
-        keep = away[:, i, j]
+        keep = apart[:, i, j]
         nearest = min(nearest, float(KDTree(points[keep, j]).query(points[keep, i])[0].min()))
     i, j = np.triu_indices(n, 1)
-    d, wanted = apart[:, i, j], task.distance[:, i, j]
+    d, wanted = distances[:, i, j], task.distance[:, i, j]
     kappa = float((d * wanted).sum() / max(float((wanted**2).sum()), 1e-300))
     stress = float(np.sqrt(((d - kappa * wanted) ** 2).sum() / max(float((d**2).sum()), 1e-300)))
     return ArrangementMeasure(separation, nearest, stress, tuple(curves), tuple(meetings))

@@ -1,6 +1,6 @@
 r"""Clips as functions of the hand's angle: splines with a knot at every frame, so that no frame is altered.
 
-Frame k of a clip is at the angle θ_k, increasing in k. Its channels are those of `combination`: the remainder
+Frame k of a clip is at the angle θ_k, which increases with k. Its channels are those of `combination`: the remainder
 ρ = exp(−(θ_k/2π) ξ) X_root of the root, the joints, and the ends of limbs. One periodic C² cubic spline of θ goes
 through them, stored as values and slopes at its knots (Hermite form: the value at a knot is exactly the stored one).
 
@@ -23,12 +23,12 @@ from controllers.motion.channels import closing_signs, normalise, signed_like
 from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
 from controllers.state import Array
 
-CLOSES = 1e-6  # [m], for quaternions half of [rad]: tolerance within which a closed clip must close
-LEAST_GAP = 0.05  # [rad] least gap that an open clip leaves in the lap
+CLOSES = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
+LEAST_GAP = 0.05  # [rad] least gap that an open clip must leave in the lap
 WIDEST_STEP = 0.5 * np.pi  # [rad] largest angle between two frames
 
 _TURN = 2.0 * np.pi
-_COAST = 0.4  # [rad] of θ over which the motion of an open clip coasts out and in, at most the gap
+_COASTING_ANGLE = 0.4  # [rad] of θ over which the motion of an open clip coasts out and in, limited to the gap
 _KNOTS, _START, _FIRST_KNOT, _FIRST_ROW, _HEADER = range(5)
 
 
@@ -203,7 +203,7 @@ def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array
     gap = angles[0] + _TURN - angles[-1]
     count = max(3, round(gap / 0.1))
     u = np.arange(1, count) / count
-    coast = min(_COAST, gap)
+    coast = min(_COASTING_ANGLE, gap)
     # One-sided slopes, damped to zero over the coast.
     out = (channels[-1] - channels[-2]) / (angles[-1] - angles[-2])
     back = signs * (channels[1] - channels[0]) / (angles[1] - angles[0])

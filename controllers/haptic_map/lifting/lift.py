@@ -3,7 +3,7 @@
 Four steps, each a module: motions become points of a Euclidean space (`motion_features`); all are aligned in time to
 one lap (`common_lap`); moments at which two motions nearly agree are found (`transitions`); and the curves are arranged
 to reproduce the distances of the motions, far apart where motions differ and near at transitions (`arrangement`). The
-result are the angles and sites of a `Lifted` map, which is exact on every clip for any angles and sites.
+results are the angles and sites of a `Lifted` map, which is exact on every clip for any angles and sites.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import Comparison, Transition, compare, find_transitions, same_motions
 from controllers.state import Array, Mask
 
-_FEWEST = 4  # frames, for a cubic spline
+_MIN_FRAMES = 4  # frames that a cubic spline needs
 
 
 class Lifting(NamedTuple):
@@ -38,7 +38,7 @@ class Lifting(NamedTuple):
     transitions : tuple of Transition
         Transitions, the best first.
     same : tuple of (int, int)
-        Pairs of clips with the same motion; their curves are kept apart nevertheless.
+        Pairs of clips with the same motion, whose curves are still kept apart.
     still : tuple of int
         Clips in which nothing moves.
     before, after : ArrangementMeasure
@@ -80,21 +80,21 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     if not clips:
         raise ParameterError("no clips to lift; expected one or more")
     for motion in clips:
-        _check(motion)
+        _check_motion(motion)
     _check_room(len(clips), room)
-    own = [features(motion, weights, STEPS) for motion in clips]
-    phases = common_lap(clips, own)
+    clip_features = [features(motion, weights, STEPS) for motion in clips]
+    phases = common_lap(clips, clip_features)
     laps = np.array([clip.duration / (1.0 - phase.gap) for clip, phase in zip(clips, phases, strict=True)])
-    compared = _compared(own, phases, laps)
+    compared = _compare_clips(clip_features, phases, laps)
     transitions = find_transitions(compared, room.alike)
-    rate, change = _rates(clips, phases)
+    rate, change = _angular_rates(clips, phases)
     _check_speeds(clips, rate, change, room)
     task = Task(
         room.rectangle, room.separation, room.approach, room.speed, room.acceleration, compared.distance, transitions,
         rate, change,
     )  # fmt: skip
     controls, start = arrange(task, rng)
-    still = [i for i, each in enumerate(own) if float(np.abs(each.velocity).max()) < 1e-6]
+    still = [i for i, each in enumerate(clip_features) if float(np.abs(each.velocity).max()) < 1e-6]
     pairs = np.triu_indices(len(clips), 1)
     return Lifting(
         angles=tuple(phase.angles(len(motion.poses)) for motion, phase in zip(clips, phases, strict=True)),
@@ -108,11 +108,11 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     )
 
 
-def _check(motion: Motion) -> None:
-    if len(motion.poses) < _FEWEST:
+def _check_motion(motion: Motion) -> None:
+    if len(motion.poses) < _MIN_FRAMES:
         raise ParameterError(
-            f"clip {motion.name!r} has {len(motion.poses)} frames, and a curve needs {_FEWEST}; give a longer clip, "
-            "or one with more frames a second"
+            f"clip {motion.name!r} has {len(motion.poses)} frames, and a curve needs {_MIN_FRAMES}; give a longer "
+            "clip, or one with more frames a second"
         )
     gap = closing_gap(motion.poses) if motion.closed else 0.0
     if gap > CLOSES:
@@ -149,11 +149,11 @@ def _check_speeds(clips: list[Motion], rate: Array, change: Array, room: Room) -
             )
 
 
-def _compared(own: list[Features], phases: list[Phase], laps: Array) -> Comparison:
+def _compare_clips(clip_features: list[Features], phases: list[Phase], laps: Array) -> Comparison:
     lap = np.arange(SAMPLES) / SAMPLES
     moments: list[Features] = []
     inside: list[Mask] = []
-    for each, phase in zip(own, phases, strict=True):
+    for each, phase in zip(clip_features, phases, strict=True):
         s = phase.share(lap)
         if phase.gap == 0.0:
             moments.append(each.at(np.mod(s, 1.0)))
@@ -166,7 +166,7 @@ def _compared(own: list[Features], phases: list[Phase], laps: Array) -> Comparis
     return compare(moments, np.stack(inside, axis=1), laps)
 
 
-def _rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:
+def _angular_rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:
     """θ̇ and θ̈ of each clip at its own pace, at equal steps of θ, shape (SAMPLES, n)."""
     lap = np.arange(SAMPLES) / SAMPLES
     rates: list[Array] = []
@@ -183,4 +183,4 @@ def _rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:
 
 def closes(poses: Array) -> bool:
     """Whether a clip that passed `checked_clip` can be lifted as a closed curve."""
-    return len(poses) >= _FEWEST and closing_gap(poses) <= CLOSES
+    return len(poses) >= _MIN_FRAMES and closing_gap(poses) <= CLOSES

@@ -112,20 +112,20 @@ def features(motion: Motion, weights: Array, samples: int) -> Features:
     value, rate = np.asarray(spline(t)), np.asarray(spline(t, 1))
     q, dq = value[:, 3:].reshape(samples, -1, 4), rate[:, 3:].reshape(samples, -1, 4)
     norm = np.linalg.norm(q, axis=2, keepdims=True)
-    matrix, spin = _matrices(q / norm), _spins(q / norm, dq / norm) * weights[:, None]
+    matrix, spin = _rotation_matrices(q / norm), _local_velocities(q / norm, dq / norm) * weights[:, None]
     root = matrix[:, 0]
     tilt = weights[0] * root[:, 2, :]
     turns = (matrix[:, 1:] * (weights[1:, None, None] / np.sqrt(2.0))).reshape(samples, -1)
     advance = np.einsum("nji,nj->ni", root, rate[:, :3])
-    bears = np.stack([np.interp(t, times, foot) for foot in motion.supports.T.astype(float)], axis=1)
+    support = np.stack([np.interp(t, times, foot) for foot in motion.supports.T.astype(float)], axis=1)
     return Features(
         np.concatenate([value[:, 2:3], tilt, turns], axis=1),
         np.concatenate([advance, spin.reshape(samples, -1)], axis=1),
-        bears,
+        support,
     )
 
 
-def _matrices(q: Array) -> Array:
+def _rotation_matrices(q: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     rows = [
@@ -136,7 +136,7 @@ def _matrices(q: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _spins(q: Array, dq: Array) -> Array:
+def _local_velocities(q: Array, dq: Array) -> Array:
     """Local angular velocities 2 Im(q⁻¹ ⊗ q̇), shape (..., 3)."""
     vector = q[..., :1] * dq[..., 1:] - dq[..., :1] * q[..., 1:] - np.cross(q[..., 1:], dq[..., 1:])
     return 2.0 * vector

@@ -1,10 +1,10 @@
 """Transitions: moments of the common lap at which two motions nearly agree in pose, velocity and standing feet.
 
-Distances are relative: that of the poses to the distance of two moments of these motions picked at random, that of the
-velocities to the speeds of the two motions, and that of the feet is the share of feet that bear load in one motion
-only. As in motion graphs (Kovar, Gleicher & Pighin 2002) windows of frames are compared, about as long as a hand takes
-to change over: a walking figure can break into a run where its feet are in step for a while, and falls where two poses
-agree for a moment by chance.
+Distances are relative: that of poses to the distance between two random moments of these motions, that of velocities to
+the speeds of the two motions; that of the feet is the fraction of feet that bear load in only one of the motions. As in
+motion graphs (Kovar, Gleicher & Pighin 2002) windows of frames are compared, about as long as a hand takes to change
+over: a walking figure can break into a run where its feet are in step for a while, but falls where two poses agree by
+chance for a moment.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from controllers.haptic_map.lifting.motion_features import Features
 from controllers.state import Array, IntArray, Mask
 
 SAME = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
-# [rad] least distance between two transitions of one clip. With half of it backflip meets both jump and walk, 63°
-# apart, and the condition number of h_* is up to 132 instead of 81; twice changes nothing.
-_APART = 1.2
-# [s] before and after a transition, over which motions are compared: with half of it walk and run meet at 317° instead
-# of 311°, with twice at 338°; the condition number of h_* is up to 77 and 82 instead of 81.
-_WINDOW = 0.2
+# [rad] least distance between two transitions of one clip. With half of it backflip has transitions to both jump and
+# walk, 63° apart, and the condition number of h_* is up to 132 instead of 81; twice changes nothing.
+_MIN_ANGLE_APART = 1.2
+# [s] time before and after a transition over which motions are compared. With half of it the transition of walk and run
+# is at 317° instead of 311°, with twice at 338°; the condition number of h_* is up to 77 and 82 instead of 81.
+_WINDOW_TIME = 0.2
 
 
 class Transition(NamedTuple):
@@ -50,7 +50,7 @@ class Transition(NamedTuple):
 
 
 class MapTransition(NamedTuple):
-    """What a lifted map keeps of a `Transition`.
+    """Part of a `Transition` that is stored with a lifted map.
 
     Attributes
     ----------
@@ -96,11 +96,11 @@ class Comparison(NamedTuple):
 
     def window(self, i: int, j: int) -> IntArray:
         """Steps, relative to a moment, of the window in which two clips are compared."""
-        reach = round(_WINDOW / float(self.laps[[i, j]].mean()) * len(self.pose))
+        reach = round(_WINDOW_TIME / float(self.laps[[i, j]].mean()) * len(self.pose))
         return np.arange(-reach, reach + 1)
 
 
-def _pairwise(points: Array) -> Array:
+def _pairwise_distances(points: Array) -> Array:
     """Distances (m, n, n) between points (m, n, p)."""
     square = (points * points).sum(axis=2)
     both = square[:, :, None] + square[:, None, :] - 2.0 * points @ points.transpose(0, 2, 1)
@@ -119,14 +119,14 @@ def compare(moments: list[Features], inside: Mask, laps: Array) -> Comparison:
     """
     poses = np.stack([each.pose for each in moments], axis=1)
     velocities = np.stack([each.velocity for each in moments], axis=1)
-    bears = np.stack([each.support for each in moments], axis=1)
-    distance, change = _pairwise(poses), _pairwise(velocities)
-    alone = _pairwise(bears) / np.sqrt(max(bears.shape[2], 1))
+    support = np.stack([each.support for each in moments], axis=1)
+    distance, change = _pairwise_distances(poses), _pairwise_distances(velocities)
+    unequal_support = _pairwise_distances(support) / np.sqrt(max(support.shape[2], 1))
     spread = np.sqrt(2.0 * poses.reshape(-1, poses.shape[2]).var(axis=0).sum())
     square = (velocities**2).sum(axis=2).mean(axis=0)
     speed = np.sqrt(square[:, None] + square)
     return Comparison(
-        distance, distance / max(float(spread), 1e-9), change / np.maximum(speed, 1e-9), alone,
+        distance, distance / max(float(spread), 1e-9), change / np.maximum(speed, 1e-9), unequal_support,
         np.linalg.norm(velocities[:, :, :3], axis=2), inside, laps,
     )  # fmt: skip
 
@@ -158,25 +158,25 @@ def find_transitions(compared: Comparison, most: float) -> list[Transition]:
                 continue
             around = (np.arange(steps)[:, None] + compared.window(i, j)) % steps
             parts = [part[:, i, j][around] for part in (compared.pose, compared.velocity, compared.support)]
-            over = np.sqrt([np.square(part).mean(axis=1) for part in parts])
-            row = np.sqrt(np.square(over).mean(axis=0))
+            means = np.sqrt([np.square(part).mean(axis=1) for part in parts])
+            row = np.sqrt(np.square(means).mean(axis=0))
             row[~(compared.inside[:, i] & compared.inside[:, j])] = np.inf
-            least = (row <= np.roll(row, 1)) & (row < np.roll(row, -1)) & (row <= most)
-            for k in np.flatnonzero(least):
-                pose, velocity, support = (float(value) for value in over[:, k])
+            minima = (row <= np.roll(row, 1)) & (row < np.roll(row, -1)) & (row <= most)
+            for k in np.flatnonzero(minima):
+                pose, velocity, support = (float(value) for value in means[:, k])
                 here, there = (float(value) for value in compared.speed[around[k]][:, [i, j]].mean(axis=0))
                 angle = 2.0 * np.pi * float(k) / steps
                 candidates.append((float(row[k]), Transition(i, j, angle, pose, velocity, support, (here, there))))
     taken: list[Transition] = []
-    for _, found in sorted(candidates):
-        meets = [other for other in taken if {found.first, found.second} & {other.first, other.second}]
-        near = any(_between(found.angle, other.angle) < _APART for other in meets)
-        if not near and not any(other[:2] == found[:2] for other in meets):
-            taken.append(found)
+    for _, candidate in sorted(candidates):
+        meets = [other for other in taken if {candidate.first, candidate.second} & {other.first, other.second}]
+        near = any(_angle_between(candidate.angle, other.angle) < _MIN_ANGLE_APART for other in meets)
+        if not near and not any(other[:2] == candidate[:2] for other in meets):
+            taken.append(candidate)
     return taken
 
 
-def _between(a: float, b: float) -> float:
+def _angle_between(a: float, b: float) -> float:
     return abs((a - b + np.pi) % (2.0 * np.pi) - np.pi)
 
 

@@ -55,7 +55,7 @@ def test_every_frame_of_every_clip_is_exact_on_its_curve():
 
 @pytest.mark.parametrize("i", range(4))
 def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
-    clip = MAP._placed[i]
+    clip = MAP._placed_clips[i]
     spline = lap_spline(clip.angles, clip.remainder, 4, clip.closed)
     angles = np.concatenate([np.linspace(0.0, TURN, 200), np.mod(spline[0], TURN), [np.nextafter(TURN, 0.0)]])
     packed, value, slope = packed_frames([spline]), *np.empty((2, clip.poses.shape[1]))

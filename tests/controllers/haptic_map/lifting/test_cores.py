@@ -5,7 +5,7 @@ import pytest
 from test_lifted_weights import wandering
 
 from controllers.curves.splines import basis, round_lap
-from controllers.haptic_map.lifting.cores import _WIDEST, core_points, draw_in
+from controllers.haptic_map.lifting.cores import _MAX_CORE_RADIUS, core_points, draw_in
 from tests.controllers.clips_for_maps import stylus
 from tests.controllers.haptic_map.test_lifted_map import MAP
 
@@ -26,8 +26,8 @@ def test_cores_do_not_overlap_and_are_as_wide_as_there_is_room(m):
         places, cores = round_lap(sites, angle), cores_at(points, angle)
         distance = np.linalg.norm(places[:, None] - places, axis=2) + np.diag(np.full(m, np.inf))
         assert (cores[:, None] + cores < distance).all()
-        assert (cores <= _WIDEST + 1e-12).all()
-        shares.append(cores / np.minimum(0.45 * distance.min(axis=1), _WIDEST))
+        assert (cores <= _MAX_CORE_RADIUS + 1e-12).all()
+        shares.append(cores / np.minimum(0.45 * distance.min(axis=1), _MAX_CORE_RADIUS))
     assert np.mean(shares) > 0.7
 
 

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from controllers.curves.splines import round_lap
-from controllers.haptic_map.lifting.neighbours import _MOST, SITE, near_clips, near_weights, packed_neighbours, reaches
+from controllers.haptic_map.lifting.neighbours import (
+    _MAX_PLANE_TERM,
+    SITE,
+    near_clips,
+    near_weights,
+    packed_neighbours,
+    reaches,
+)
 
 TURN = 2.0 * np.pi
 R, Z = (0.028, 0.072), (-0.022, 0.022)
@@ -86,15 +93,15 @@ def test_they_are_bounded_everywhere_and_hardly_negative_between_curves():
     for m in (2, 3, 4, 9, 36):
         weights = Weights(wandering(m))
         w = np.array([weights(*place)[0] for place in places(2000, seed=m)])
-        assert w.min() > -_MOST
-        assert w.max() < 1.0 + _MOST
+        assert w.min() > -_MAX_PLANE_TERM
+        assert w.max() < 1.0 + _MAX_PLANE_TERM
         # The lattice of these fills the domain.
         if m in (4, 9, 36):
             assert np.median(w.min(axis=1)) > -0.06
     # Curves that nearly cross, with nothing beyond them, want to be extrapolated most.
     pair = Weights(np.tile(np.array([[0.03, 0.0], [0.032, 0.0]]), (16, 1, 1)))
     w = np.array([pair(*place)[0] for place in places(500)])
-    assert -_MOST < w.min() < -0.01
+    assert -_MAX_PLANE_TERM < w.min() < -0.01
 
 
 def test_the_clips_that_are_found_are_those_within_whose_reach_a_place_lies():
