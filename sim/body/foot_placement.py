@@ -88,7 +88,7 @@ def _contact_displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, shi
 def _leg_displacement(
     bodies: IntArray, points: Array, xpos: Array, xmat: Array, shift: Array, drift: Array, offset: Array, rate: Array
 ) -> None:
-    """Write the shift δ of a leg's joints (9,) [rad] for displacements of its contact points, and its rate."""
+    """Write the displacement δ of a leg's joints (9,) [rad] for displacements of its contact points, and its rate."""
     normal, J = work_array((N_LEG, N_LEG)), work_array((3, N_LEG))
     axis, arm = work_array(3), work_array(3)
     offset[:], rate[:], normal[:] = 0.0, 0.0, 0.0

@@ -183,7 +183,7 @@ def note_change(
 ) -> None:
     """Store the offset of the shown motion from the new one with its derivatives, and plan the steps.
 
-    `pose`, `before` and `after` are poses of the new motion current, one period before and one period after;
+    `pose`, `before` and `after` are poses of the new motion now, one period before and one period after;
     `transition.shown` holds those of the shown motion in the same order. `transition.change` is set to o, ȯ, ö by
     central differences. `second` is the leg that must step second (−1: any).
     """

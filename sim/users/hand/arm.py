@@ -94,7 +94,7 @@ def grab_force(
 ) -> float:
     """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
 
-    The motion to the place and the carried_slope have the minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵.
+    The motion to the place and the carrying have the minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def grab_force(
 class CompiledArm(NamedTuple):
     """An `Arm` as plain numbers and arrays.
 
-    Its state is `begun`, the start time of each push; `held`, the hand's position at the start of each grab; `switch` (1,).
+    Its state is `begun`, the start time of each push; `held`, the hand's position when each grab began; `switch` (1,).
     """
 
     stiffness: float

@@ -46,7 +46,7 @@ BEND = 0.1  # [s] half-width of the velocity difference that estimates a path's 
 
 @njit
 def want(person: PersonState, switch: Array) -> None:
-    """Read the current wish, begin a submovement if one is due, and activation_step the one in progress."""
+    """Read the current wish, begin a submovement if one is due, and follow the one in progress."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = work_array((3, 3)), work_array((3, 3))
     wanted[:], goal[:] = 0.0, 0.0

@@ -16,7 +16,7 @@ _N_HARMONICS = 6  # Fourier terms of the logarithm of the speed along a lap
 def natural_times(points: Array, seconds: float) -> Array:
     """Times [s], shape (n,), at which a closed path of a given duration passes its points (n, 3).
 
-    The last point must equal the initial_jerk. The speed along the path is exp of a Fourier series in arc length, whose
+    The last point must equal the first. The speed along the path is exp of a Fourier series in arc length, whose
     coefficients minimise the jerk.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
