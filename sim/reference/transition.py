@@ -26,7 +26,7 @@ _MAX_VERTICAL_ACCELERATION = 6.0
 # [m/s²] the same horizontally, where the root also travels. With twice the value the feet of the worst change rise
 # 4 mm higher.
 _MAX_HORIZONTAL_ACCELERATION = 5.0
-_PEAK_ACCELERATION = 5.77  # largest |ö| T² of a unit offset that decays from rest: 10/√3
+_ACCELERATION_FACTOR = 5.77  # largest |ö| T² of a unit offset that decays from rest: 10/√3
 # Largest factor on the shortest blend time by which a horizontal offset prolongs a change. With 1 the feet of the worst
 # of 40 changes are 7 mm higher and slide 4 mm less; with twice the value those of the median are 2 mm lower.
 _MAX_PROLONGATION = 1.9
@@ -121,12 +121,12 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
     """Set the duration of a change from the root's offset: vertical, as `note_change` found it, and `aside` [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
-        vertical_time = np.sqrt(_PEAK_ACCELERATION * abs(transition.change[0, 2]) / _MAX_VERTICAL_ACCELERATION)
+        vertical_time = np.sqrt(_ACCELERATION_FACTOR * abs(transition.change[0, 2]) / _MAX_VERTICAL_ACCELERATION)
         # Bounded, since a figure in flight would keep flying, and a running one would leave both feet behind.
         previous, next_ = transition.shown[1], transition.shown[2]
         pace = 0.5 * np.hypot(next_[0] - previous[0], next_[1] - previous[1]) / period
         horizontal_time = min(
-            np.sqrt(_PEAK_ACCELERATION * aside / _MAX_HORIZONTAL_ACCELERATION),
+            np.sqrt(_ACCELERATION_FACTOR * aside / _MAX_HORIZONTAL_ACCELERATION),
             _MAX_PROLONGATION * transition.seconds,
             _MAX_TRAVEL / max(pace, 1e-9),
         )
