@@ -1,6 +1,6 @@
 """When a change of clip may begin: not while the figure takes off or flies.
 
-A transition that began during a leap would omit the landing of the old motion, which arrests its fall. So a change
+A transition that began during a leap would omit the landing of the old motion, which absorbs the leap. So a change
 waits until the figure stands and the new motion has no flight within the transition, for at most a second.
 """
 
