@@ -1,1 +1,1 @@
-"""The live page, on which a person takes the stylus: engine process, state and actions, panels, access gate."""
+"""The live page, on which a person holds the stylus: engine process, state and actions, panels, access gate."""

@@ -10,7 +10,7 @@ from sim.devices.hardware_list import found_devices, open_hid
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
-RESTS = 0.3  # [s] without a push of the cap after which the hand releases the stylus
+RESTS = 0.3  # [s] without a push of the cap, after which the hand releases the stylus
 
 
 class CapHand:
@@ -24,7 +24,7 @@ class CapHand:
 
     def __init__(self, mouse: SpaceMouse):
         self._mouse, self._reading = mouse, np.zeros(READING_SIZE)
-        self._pushed = -np.inf
+        self._last_push_time = -np.inf
         self.holds = False
 
     def wish(self, stylus: Array) -> tuple[Array, bool] | None:
@@ -33,7 +33,7 @@ class CapHand:
         Parameters
         ----------
         stylus : Array
-            Position of the stylus in H [m], shape (3,), where the hand begins when it takes hold.
+            Position of the stylus in H [m], shape (3,); the hand starts there when it grasps the stylus.
 
         Raises
         ------
@@ -45,8 +45,8 @@ class CapHand:
         self._mouse.read(self._reading, 0.0)
         now = time.monotonic()
         if self._mouse.pushed:
-            self._pushed = now
-        self.holds = now - self._pushed < RESTS
+            self._last_push_time = now
+        self.holds = now - self._last_push_time < RESTS
         return (self._mouse.tip, bool(self._reading[READING_SWITCH])) if self.holds else None
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from experiments.live.panels.run_panel import FOR_EVER
 from experiments.setups.parts.clips import load_clips
 from sim.errors import SimError
 
-LEAST_TOKEN = 16  # [characters] of a given token, so that it cannot be guessed
+LEAST_TOKEN = 16  # [characters] shortest token that may be given, so that it cannot be guessed
 
 
 def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") -> None:
@@ -29,15 +29,15 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     out : Path
         Folder for takes and clips.
     given : str
-        Token; by default a new one is made if the host needs one.
+        Token; by default a new one is generated if the host needs one.
 
     Raises
     ------
     ParameterError
-        If the token is too easily guessed, the run has no figure to show, or a simulated user or a replayed hand of its
-        own.
+        If the token is too easily guessed, the run has no figure to show, or the run already has a simulated user or a
+        replayed hand.
     ModelError
-        If there is no such clip, or a file cannot be read.
+        If a clip does not exist, or a file cannot be read.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
@@ -49,7 +49,7 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     token = token_for(host, given)
     if out.exists() and not out.is_dir():
         raise SimError(f"{out}: is a file; expected a folder for takes and clips")
-    # The page reads them again in its process, where an error would be seen in a browser alone.
+    # The page reads them again in its own process, where an error would be visible in a browser only.
     if isinstance(config.map, MapFile):
         load_figure_map(Path(config.map.file))
     else:
@@ -58,7 +58,7 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     try:
         gate = Gate(host, port, page.port, token)
         try:
-            print("\n".join(_lines(host, gate.port, out, token)), flush=True)
+            print("\n".join(_startup_lines(host, gate.port, out, token)), flush=True)
             page.serve()
         finally:
             gate.close()
@@ -83,7 +83,7 @@ def token_for(host: str, given: str) -> str | None:
     return given or secrets.token_hex(16)
 
 
-def _lines(host: str, port: int, out: Path, token: str | None) -> list[str]:
+def _startup_lines(host: str, port: int, out: Path, token: str | None) -> list[str]:
     if token is None:
         return [f"Open http://127.0.0.1:{port} and drag the orange ball; Ctrl-C ends.", f"Takes go to {out}."]
     return [

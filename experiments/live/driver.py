@@ -10,7 +10,7 @@ class Driver:
 
     def __init__(self) -> None:
         self._client: int | None = None
-        self._acted = 0.0
+        self._last_action_time = 0.0
 
     @property
     def client(self) -> int | None:
@@ -23,19 +23,19 @@ class Driver:
             self._client = client
         if client != self._client:
             return False
-        self._acted = time.monotonic()
+        self._last_action_time = time.monotonic()
         return True
 
     def take_over(self, client: int | None) -> bool:
         """Let another browser drive, if the driver has been idle for `IDLE`; returns whether it drives now."""
-        if self._client is not None and client != self._client and time.monotonic() - self._acted < IDLE:
+        if self._client is not None and client != self._client and time.monotonic() - self._last_action_time < IDLE:
             return False
-        self._client, self._acted = client, time.monotonic()
+        self._client, self._last_action_time = client, time.monotonic()
         return True
 
     def leave(self, client: int) -> bool:
         """Handle the disconnection of a browser; returns whether it was the driver."""
-        was = client == self._client
-        if was:
+        was_driver = client == self._client
+        if was_driver:
             self._client = None
-        return was
+        return was_driver

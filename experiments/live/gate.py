@@ -1,8 +1,8 @@
 """Access gate of the live page: admits only clients with the token, and refuses requests from other web pages.
 
 viser has no authentication, so it listens on 127.0.0.1 only, and outside connections pass through this gate. A
-connection is judged by its first request and carries no further one, so that nothing passes on another request's
-token: each file of the page takes its own connection, and its web socket, once admitted, is piped both ways.
+connection is admitted by its first request and carries no further one, so that nothing passes with the token of another
+request: each file of the page uses its own connection, and its web socket, once admitted, is piped both ways.
 """
 
 import asyncio
@@ -16,8 +16,8 @@ from sim.errors import SimError
 
 HERE = ("127.0.0.1", "localhost", "::1")
 _COOKIE = "hvf_token"
-_PATIENCE = 10.0  # [s] timeout for the head of a request
-_MOST = 65536  # most bytes of a request's head, and of a chunk that is piped
+_HEAD_TIMEOUT = 10.0  # [s] for the head of a request
+_MAX_BYTES = 65536  # largest head of a request, and largest chunk that is piped
 _DENIED = (
     "<!doctype html><meta name=viewport content='width=device-width'><p style='font:16px system-ui;margin:2em'>"
     "This page needs its token: open the address that <code>hvf live</code> has printed, with <code>?token=…</code>."
@@ -70,22 +70,22 @@ def answer(request: Request, token: str | None) -> bytes | None:
         return _response(403, "Forbidden", "This page is not to be used by another one.")
     if token is None:
         # A foreign host name that resolves to this machine (DNS rebinding) is refused.
-        known = urlsplit(f"//{host}").hostname in HERE
-        return None if known else _response(403, "Forbidden", "Open this page as http://127.0.0.1 or http://localhost.")
+        local = urlsplit(f"//{host}").hostname in HERE
+        return None if local else _response(403, "Forbidden", "Open this page as http://127.0.0.1 or http://localhost.")
     parts = urlsplit(request.path)
-    given = parse_qs(parts.query).get("token", [""])[0]
-    if given and secrets.compare_digest(given.encode(), token.encode()):
+    query_token = parse_qs(parts.query).get("token", [""])[0]
+    if query_token and secrets.compare_digest(query_token.encode(), token.encode()):
         cookie = f"Set-Cookie: {_COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict\r\n"
         return _response(303, "See Other", "", f"Location: {parts.path or '/'}\r\n{cookie}")
     cookies = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
-    kept = next((value for name, _, value in cookies if name == _COOKIE), "")
-    return None if secrets.compare_digest(kept.encode(), token.encode()) else _response(403, "Forbidden", _DENIED)
+    stored = next((value for name, _, value in cookies if name == _COOKIE), "")
+    return None if secrets.compare_digest(stored.encode(), token.encode()) else _response(403, "Forbidden", _DENIED)
 
 
-def _response(code: int, said: str, body: str, more: str = "") -> bytes:
+def _response(code: int, status: str, body: str, extra_headers: str = "") -> bytes:
     content = body.encode()
-    head = f"HTTP/1.1 {code} {said}\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: {len(content)}\r\n"
-    return f"{head}{more}Cache-Control: no-store\r\nConnection: close\r\n\r\n".encode() + content
+    head = f"HTTP/1.1 {code} {status}\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: {len(content)}\r\n"
+    return f"{head}{extra_headers}Cache-Control: no-store\r\nConnection: close\r\n\r\n".encode() + content
 
 
 class Gate:
@@ -109,14 +109,14 @@ class Gate:
     """
 
     def __init__(self, host: str, port: int, behind: int, token: str | None):
-        self._behind, self._token = behind, token
+        self._page_port, self._token = behind, token
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="hvf-gate", daemon=True)
         self._thread.start()
         try:
             self._server = asyncio.run_coroutine_threadsafe(self._listen(host, port), self._loop).result()
         except OSError as error:
-            self._end()
+            self._stop_loop()
             raise SimError(
                 f"cannot listen on {host}, port {port}: {error}; expected an address of this machine"
             ) from None
@@ -125,16 +125,16 @@ class Gate:
     def close(self) -> None:
         """Stop listening and close all connections."""
         self._loop.call_soon_threadsafe(self._server.close)
-        self._end()
+        self._stop_loop()
 
-    def _end(self) -> None:
-        async def leave() -> None:
-            others = asyncio.all_tasks() - {asyncio.current_task()}
-            for task in others:
+    def _stop_loop(self) -> None:
+        async def cancel_tasks() -> None:
+            tasks = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in tasks:
                 task.cancel()
-            await asyncio.gather(*others, return_exceptions=True)
+            await asyncio.gather(*tasks, return_exceptions=True)
 
-        asyncio.run_coroutine_threadsafe(leave(), self._loop).result(5.0)
+        asyncio.run_coroutine_threadsafe(cancel_tasks(), self._loop).result(5.0)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(5.0)
         self._loop.close()
@@ -143,45 +143,45 @@ class Gate:
         last = OSError("no port is free")
         for candidate in range(port, port + 20) if port else (0,):
             try:
-                return await asyncio.start_server(self._come, host, candidate, limit=_MOST)
+                return await asyncio.start_server(self._handle_connection, host, candidate, limit=_MAX_BYTES)
             except OSError as error:
                 last = error
         raise last
 
-    async def _come(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _handle_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
-            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
+            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT)
             try:
                 request = Request.of(head)
-                said = answer(request, self._token)
+                response = answer(request, self._token)
             except ValueError:
-                said = _response(400, "Bad Request", "")
+                response = _response(400, "Bad Request", "")
                 request = Request("", {})
-            if said is None:
-                await self._pass(request, head, reader, writer)
+            if response is None:
+                await self._forward(request, head, reader, writer)
             else:
-                writer.write(said)
+                writer.write(response)
                 await writer.drain()
         writer.close()
 
-    async def _pass(
+    async def _forward(
         self, request: Request, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._behind)
+        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._page_port)
         inner_writer.write(head)
-        ways = [asyncio.ensure_future(_pipe(inner_reader, writer))]
+        pipes = [asyncio.ensure_future(_pipe(inner_reader, writer))]
         if request.headers.get("upgrade", "").lower() == "websocket":
-            ways.append(asyncio.ensure_future(_pipe(reader, inner_writer)))
+            pipes.append(asyncio.ensure_future(_pipe(reader, inner_writer)))
         try:
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(pipes, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for way in ways:
-                way.cancel()
+            for pipe in pipes:
+                pipe.cancel()
             inner_writer.close()
 
 
 async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     with contextlib.suppress(OSError):
-        while piece := await reader.read(_MOST):
+        while piece := await reader.read(_MAX_BYTES):
             writer.write(piece)
             await writer.drain()

@@ -39,14 +39,14 @@ from sim.viewer.shown import Shown
 from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 
-FASTEST = 1.0 / 60.0  # [s] least time between two pictures
-SHARE = 0.5  # share of a core that drawing may take; a slower machine draws fewer pictures
+FASTEST = 1.0 / 60.0  # [s] shortest time between two frames
+SHARE = 0.5  # share of a core that drawing may take; a slower machine draws fewer frames
 POLL = 0.2  # [s] between two updates of texts and plots
-LINES = 4  # most recent messages that are shown
+LINES = 4  # number of most recent messages that are shown
 
 
 class Page:
-    """The page, served to browsers; `serve` draws until it is closed.
+    """The page, served to browsers; `serve` draws it until it is closed.
 
     Parameters
     ----------
@@ -62,21 +62,21 @@ class Page:
 
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
         self.desk, self.driver = Desk(folder, self.say), Driver()
-        self._said: list[str] = []
-        self._closed, self._turn = threading.Event(), threading.RLock()
+        self._messages: list[str] = []
+        self._closed, self._lock = threading.Event(), threading.RLock()
         with contextlib.redirect_stdout(io.StringIO()):  # the command prints the address of the gate instead
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self.stage: LiveStage | None = None
         self._ball: HandBall | None = None
-        self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
+        self._drawn_builds, self._drawn_curve, self._drawn_moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
-        self._lay_out(config, shadows)
+        self._add_panels(config, shadows)
         open_with(self.server, _first_view)
-        self.server.on_client_disconnect(self._left)
-        self._cap, said = cap_there()
-        if said:
-            self.say(said)
+        self.server.on_client_disconnect(self._on_disconnect)
+        self._cap, message = cap_there()
+        if message:
+            self.say(message)
         self.desk.build(config)
 
     @property
@@ -85,23 +85,23 @@ class Page:
         return self.server.get_port()
 
     def say(self, line: str) -> None:
-        """Show a line to all browsers; one that is shown already comes last."""
-        self._show([*(one for one in self._said if one != line), line][-LINES:])
+        """Show a line to all browsers; a line that is already shown moves to the end."""
+        self._show_messages([*(one for one in self._messages if one != line), line][-LINES:])
 
-    def _show(self, said: list[str]) -> None:
-        self._said = said
+    def _show_messages(self, messages: list[str]) -> None:
+        self._messages = messages
         if hasattr(self, "_lines"):
-            lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._said)
+            lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._messages)
             self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Wrap an event handler: it runs for the driving browser only, between two pictures, and shows errors.
+        """Wrap an event handler: it runs for the driving browser only, between two frames, and shows errors.
 
-        What it said goes when it runs again.
+        Its messages are removed when it runs again.
         """
-        mine: list[str] = []
+        own_messages: list[str] = []
 
-        def done(event: Any) -> None:
+        def handle(event: Any) -> None:
             if event.client_id is None:
                 return  # the value was set by the page itself, not by a browser
             if not self.driver.may(event.client_id):
@@ -111,18 +111,18 @@ class Page:
                         auto_close_seconds=4.0,
                     )  # fmt: skip
                 return
-            with self._turn:
-                before = [one for one in self._said if one not in mine]
-                self._show(before)
+            with self._lock:
+                before = [one for one in self._messages if one not in own_messages]
+                self._show_messages(before)
                 try:
                     does(event)
                 except (ControllerError, ModelError, SimError, OSError) as error:
                     self.say(str(error))
-                mine[:] = [one for one in self._said if one not in before]
+                own_messages[:] = [one for one in self._messages if one not in before]
 
-        return done
+        return handle
 
-    def _lay_out(self, config: RunConfig, shadows: bool) -> None:
+    def _add_panels(self, config: RunConfig, shadows: bool) -> None:
         gui = self.server.gui
         self._status = gui.add_html("")
         self._progress = gui.add_progress_bar(0.0, visible=False)
@@ -131,7 +131,7 @@ class Page:
         with tabs.add_tab("Play", viser.Icon.HAND_STOP):
             self._clock = ClockPanel(gui, self.desk, self.acts)
             self._run = RunPanel(gui, self.desk, self.acts, config)
-            self._seen(shadows)
+            self._add_view_controls(shadows)
         with tabs.add_tab("Gains", viser.Icon.ADJUSTMENTS):
             self._gains = GainsPanel(gui, self.desk, self.acts)
         with tabs.add_tab("Takes", viser.Icon.PLAYER_RECORD):
@@ -144,7 +144,7 @@ class Page:
             gui.add_markdown(FIRST_STEPS)
         add_hand_keys(gui, self.desk, self.acts, lambda: self._clock.pressed)
 
-    def _seen(self, shadows: bool) -> None:
+    def _add_view_controls(self, shadows: bool) -> None:
         gui = self.server.gui
         add_view_buttons(gui)
         drive = gui.add_button("Drive", icon=viser.Icon.STEERING_WHEEL, hint="Several may watch, one drives.")
@@ -159,24 +159,24 @@ class Page:
         self._shadows.on_update(self.acts(lambda event: light(self.server.scene, self._shadows.value)))
         self._field.on_update(self.acts(lambda event: self.desk.look(self._field.value)))
 
-    def _left(self, client: viser.ClientHandle) -> None:
+    def _on_disconnect(self, client: viser.ClientHandle) -> None:
         if self.driver.leave(client.client_id):
             self.desk.let_go()
 
     def serve(self) -> None:
         """Draw until `close` is called, or the servo's process ends."""
-        written, due = 0.0, 0.0
+        last_update, due = 0.0, 0.0
         while not self._closed.is_set():
             begin = time.perf_counter()
-            with self._turn:  # viser calls event handlers in other threads
+            with self._lock:  # viser calls event handlers in other threads
                 self.desk.poll()
-                if self.desk.builds != self._builds:
+                if self.desk.builds != self._drawn_builds:
                     self._set_stage()
-                self._push()
+                self._move_by_cap()
                 self._draw()
-                if begin - written > POLL:
-                    written = begin
-                    self._write()
+                if begin - last_update > POLL:
+                    last_update = begin
+                    self._update_panels()
             now = time.perf_counter()
             due = max(due + FASTEST, begin + (now - begin) / SHARE)
             self._closed.wait(max(due - now, 1e-3))
@@ -191,7 +191,7 @@ class Page:
             self.server.stop()
 
     def _set_stage(self) -> None:
-        built, self._builds = self.desk.built, self.desk.builds
+        built, self._drawn_builds = self.desk.built, self.desk.builds
         assert built is not None
         stature, mass, servo_period, physics_step = (float(n) for n in np.asarray(built.drawn["scene"]))
         world = World(SceneConfig(stature, mass, servo_period, physics_step), built.config.figure.kind)
@@ -204,13 +204,13 @@ class Page:
             "animation h(p)" if isinstance(built.config.map, RiverClips) else "default animation",
         )  # fmt: skip
         self._ball = HandBall(self.server.scene)
-        self._ball.on_drag(self._dragged)
+        self._ball.on_drag(self._on_drag)
         self._takes.stage_set(world.full_model())
-        self._curve, self._moment = -1.0, (-1.0, -1.0)
+        self._drawn_curve, self._drawn_moment = -1.0, (-1.0, -1.0)
         self._run.show(built)
         self._gains.rebuild()
 
-    def _dragged(self, event: Any, target: Array, shift: bool) -> None:
+    def _on_drag(self, event: Any, target: Array, shift: bool) -> None:
         if not self.driver.may(event.client_id):
             return
         if event.phase == "end" and not self._clock.keeps:
@@ -218,11 +218,11 @@ class Page:
         else:
             self.desk.hold(target, shift or self._clock.pressed)
 
-    def _push(self) -> None:
+    def _move_by_cap(self) -> None:
         """Let a connected SpaceMouse move the hand while no mouse drags it."""
         if self._cap is None or self._ball is None or self._ball.dragged:
             return
-        held = self._cap.holds
+        was_holding = self._cap.holds
         try:
             wish = self._cap.wish(self.desk.now["p"])
         except DriverFault:
@@ -230,16 +230,16 @@ class Page:
             self.say("The SpaceMouse is gone.")
         if wish is not None:
             self.desk.hold(wish[0], wish[1] or self._clock.pressed)
-        elif held and not self._clock.keeps:
+        elif was_holding and not self._clock.keeps:
             self.desk.let_go()
 
     def _draw(self) -> None:
         stage, ball, desk = self.stage, self._ball, self.desk
         now = desk.at(self._clock.seconds_ago)
         moment = float(now["t"][0]), float(now["curve"][0])
-        if stage is None or ball is None or (moment == self._moment and not self._takes.compares):
+        if stage is None or ball is None or (moment == self._drawn_moment and not self._takes.compares):
             return
-        self._moment = moment
+        self._drawn_moment = moment
         self.pictures += 1
         nq = stage.configuration_size
         with self.server.atomic():
@@ -254,8 +254,8 @@ class Page:
                     now["target"],
                 )
             )
-            if now["curve"][0] != self._curve and desk.built is not None and desk.built.bends:
-                self._curve = now["curve"][0]
+            if now["curve"][0] != self._drawn_curve and desk.built is not None and desk.built.bends:
+                self._drawn_curve = now["curve"][0]
                 stage.draw_course(0, now["course"].reshape(COURSE_POINTS, 3))
             arrows = now["slice"].reshape(SLICE_SIDE**2, 6)
             stage.draw_slice(arrows[:, :3] if self._field.value else arrows[:0, :3], arrows[:, 3:])
@@ -263,16 +263,16 @@ class Page:
                 ball.rest(desk.target if desk.holds else now["p"])
             stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
-        self.server.flush()  # otherwise viser waits 1/60 s after its last transmission and drops pictures
+        self.server.flush()  # otherwise viser waits 1/60 s after its last transmission and drops frames
 
-    def _write(self) -> None:
+    def _update_panels(self) -> None:
         desk = self.desk
-        now, going = desk.now, desk.progress
+        now, progress = desk.now, desk.progress
         desk.watched(len(self.server.get_clients()))
-        self._progress.visible = going is not None
-        if going is not None:
-            self._progress.value = 100.0 * going.share
-        self._status.content = status_html(now, self.driver.client, "" if going is None else going.text, desk)
+        self._progress.visible = progress is not None
+        if progress is not None:
+            self._progress.value = 100.0 * progress.share
+        self._status.content = status_html(now, self.driver.client, "" if progress is None else progress.text, desk)
         self._clock.write()
         self._gains.write()
         self._takes.write()
@@ -282,5 +282,5 @@ class Page:
 
 
 def _first_view(client: viser.ClientHandle) -> View:
-    """Workspace and stage; on a phone the workspace, above the panel."""
+    """Workspace and stage; on a phone only the workspace, above the panel."""
     return VIEWS["workspace" if is_phone(*window_of(client.camera)) else "both"]

@@ -13,11 +13,11 @@ from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, USER
 
-POINTS = 3000  # drawn points of a path, at most
+POINTS = 3000  # largest number of drawn points of a path
 
 
 def crossing_rivers(runs: Path) -> Figure:
-    """Figure 8: three rivers, the path of a hand in the colour of the river that has it, and the times of changes."""
+    """Figure 8: three rivers, the path of a hand in the colour of its active river, and the times of changes."""
     with Recording(recording_in(runs / RIVERS)) as recording:
         drawn, changes = courses(recording.static), river_changes(recording)
         t, p, user, river = ticks(recording, 0.0, np.inf, "p", "user", "river")
@@ -26,13 +26,13 @@ def crossing_rivers(runs: Path) -> Figure:
     colors = [drawn[k].line if k >= 0 else "#b9bec8" for k in river]
     figure = Figure(figsize=(7.2, 6.2), layout="constrained")
     grid = figure.add_gridspec(3, 1, height_ratios=(3.4, 1.0, 0.7))
-    every = MILLIMETRES * np.concatenate([course.points for course in drawn])
-    ax = workspace(figure, grid[0], np.concatenate((every, hand)), 30.0, 1.2)
+    all_points = MILLIMETRES * np.concatenate([course.points for course in drawn])
+    ax = workspace(figure, grid[0], np.concatenate((all_points, hand)), 30.0, 1.2)
     for course in drawn:
         path(ax, MILLIMETRES * course.points, course.line, "", 0.9, (0, (4, 3)))
     colored_path(ax, hand, colors, 1.6)
-    at = [int(np.searchsorted(t, change.t)) for change in changes]
-    ax.plot(*hand[at].T, "o", color=CURVE, ms=5.0)
+    change_rows = [int(np.searchsorted(t, change.t)) for change in changes]
+    ax.plot(*hand[change_rows].T, "o", color=CURVE, ms=5.0)
     handles = [Line2D([], [], color=course.line, lw=2.0, label=f"river “{course.name}”") for course in drawn]
     handles.append(Line2D([], [], color=CURVE, marker="o", ms=5.0, lw=0.0, label="change of river"))
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.36, 1.0))

@@ -28,7 +28,7 @@ from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
-SECONDS = 0.25  # duration of motion that the length of an arrow of Figure 1 stands for [s]
+SECONDS = 0.25  # duration of motion that an arrow of Figure 1 represents [s]
 LONGEST = 22.0  # longest arrow of Figure 4 [mm]
 PER_NEWTON = 6.0  # drawn length of a force [mm/N]
 POSES = 12  # poses around the curve
@@ -51,8 +51,8 @@ def trajectory_and_vectors(runs: Path) -> Figure:
     speed = MILLIMETRES * np.array([curve.velocity(phase) for phase in at])
     arrows(ax, MILLIMETRES * curve.point(at), SECONDS * speed, TUBE, "its vectors dφ/dt", 1.8)
     path(ax, hand, USER, "a hand that pushes", 1.1)
-    felt = slice(None, None, max(1, len(hand) // 26))
-    arrows(ax, hand[felt], PER_NEWTON * force[felt], FIELD, "force of the field")
+    force_rows = slice(None, None, max(1, len(hand) // 26))
+    arrows(ax, hand[force_rows], PER_NEWTON * force[force_rows], FIELD, "force of the field")
     ax.legend(loc="upper left", bbox_to_anchor=(-0.05, 1.02))
     return figure
 
@@ -66,30 +66,30 @@ def field_and_map(runs: Path) -> Figure:
         t, lap = ticks(recording, 0.0, curve.duration * 1.05, "p")
         ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
         middle = ring.mean(axis=0)[:2]
-        around = np.unwrap(np.arctan2(*(MILLIMETRES * lap[:, :2] - middle).T[::-1]))
-        wanted = around[0] + np.sign(around[-1] - around[0]) * 2.0 * np.pi * np.arange(POSES) / POSES
-        rows = np.argmin(np.abs(around[:, None] - wanted), axis=0)
+        angles = np.unwrap(np.arctan2(*(MILLIMETRES * lap[:, :2] - middle).T[::-1]))
+        target_angles = angles[0] + np.sign(angles[-1] - angles[0]) * 2.0 * np.pi * np.arange(POSES) / POSES
+        rows = np.argmin(np.abs(angles[:, None] - target_angles), axis=0)
         poses = poses_at(recording, t[rows])
     figure = Figure(figsize=(6.4, 6.2), layout="constrained")
     ax = figure.subplots()
     ax.add_collection(PatchCollection([Circle((float(x), float(y)), radius) for x, y in ring[:, :2]], color=PALE_TUBE))
     ax.plot(ring[:, 0], ring[:, 1], color=CURVE, lw=1.8, label="curve φ")
-    felt = slice(None, None, max(1, len(p) // 48))
-    hand, push = MILLIMETRES * p[felt, :2], PER_NEWTON * force[felt, :2]
+    force_rows = slice(None, None, max(1, len(p) // 48))
+    hand, push = MILLIMETRES * p[force_rows, :2], PER_NEWTON * force[force_rows, :2]
     ax.plot([], [], color=PALE_TUBE, lw=7.0, label="domain of the map")
     ax.quiver(
         *hand.T, *push.T, color=FIELD, angles="xy", scale_units="xy", scale=1.0, width=0.0035, zorder=4,
         label=f"force on the hand, {PER_NEWTON:g} mm for 1 N",
     )  # fmt: skip
-    people, size = Silhouettes(), RING * float(np.linalg.norm(ring[0, :2] - middle))
+    silhouettes, size = Silhouettes(), RING * float(np.linalg.norm(ring[0, :2] - middle))
     for row, pose in zip(rows, poses, strict=True):
-        place = MILLIMETRES * lap[row, :2]
-        away = (place - middle) / np.linalg.norm(place - middle)
-        foot = middle + size * away - np.array([0.0, 0.5 * 1.75 * STATURE])
-        people.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, float(heading(pose[3:7])) + np.pi - 0.4)
-        (x, y), (u, v) = place + 4.0 * away, middle + (size - 0.42 * STATURE) * away
+        point = MILLIMETRES * lap[row, :2]
+        outward = (point - middle) / np.linalg.norm(point - middle)
+        foot = middle + size * outward - np.array([0.0, 0.5 * 1.75 * STATURE])
+        silhouettes.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, float(heading(pose[3:7])) + np.pi - 0.4)
+        (x, y), (u, v) = point + 4.0 * outward, middle + (size - 0.42 * STATURE) * outward
         ax.annotate("", (u, v), (x, y), arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
-        ax.plot(*place, "o", ms=3.5, color=CURVE, zorder=5)
+        ax.plot(*point, "o", ms=3.5, color=CURVE, zorder=5)
     ax.annotate("h", (middle[0] + 0.74 * size, middle[1] + 2.5), fontsize=12, style="italic")
     reach = size + 1.15 * STATURE
     ax.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]), aspect="equal")
@@ -100,7 +100,7 @@ def field_and_map(runs: Path) -> Figure:
 
 
 def v_plus_u(runs: Path) -> Figure:
-    """Figure 4: a river V, a performance that left it, the field U of the performance, and the integral of V + U."""
+    """Figure 4: a river V, a performance that leaves it, the field U of the performance, and the integral of V + U."""
     with Recording(recording_in(runs / CYLINDER)) as recording:
         curve, mode = curve_of(recording), config_of(recording).mode
         start, end = pushed_lap(recording)
@@ -111,7 +111,7 @@ def v_plus_u(runs: Path) -> Figure:
     performed = performance(t, p)
     times = t[::8] - t[0]
     course = integrate(Edited(river, (performed,), (1.0,)).flow, performed.point(0.0), times).points
-    apart = MILLIMETRES * np.sqrt(np.mean(np.sum((course - performed.point(times)) ** 2, axis=1)))
+    rms_error = MILLIMETRES * np.sqrt(np.mean(np.sum((course - performed.point(times)) ** 2, axis=1)))
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -122,25 +122,25 @@ def v_plus_u(runs: Path) -> Figure:
         ax.set(aspect="equal", xlabel="x [mm]")
     left.set_ylabel("y [mm]")
     at = np.linspace(0.0, float(times[-1]), 30)
-    there = performed.point(at)
-    v = np.array([river.flow(0.0, place) for place in there])
+    points = performed.point(at)
+    v = np.array([river.flow(0.0, place) for place in points])
     u = np.array([performed.velocity(time) for time in at]) - v
     seconds = LONGEST / (MILLIMETRES * float(np.linalg.norm(u[:, :2], axis=1).max()))
     tips: list[Array] = []
     for vectors, color, name in ((v, TUBE, "V"), (u, FIELD, "U")):
         tips.append(MILLIMETRES * seconds * vectors[:, :2])
         left.quiver(
-            *(MILLIMETRES * there[:, :2]).T, *tips[-1].T, color=color, angles="xy", scale_units="xy", scale=1.0,
+            *(MILLIMETRES * points[:, :2]).T, *tips[-1].T, color=color, angles="xy", scale_units="xy", scale=1.0,
             width=0.005, zorder=4, label=name,
         )  # fmt: skip
     left.set_title(f"V and U along φ', {1e3 * seconds:.0f} ms of motion")
     right.plot(line[:, 0], line[:, 1], color=FIELD, lw=4.0, alpha=0.45, label="integral curve of V + U")
-    right.set_title(f"it is {apart:.1g} mm RMS from φ'")
-    named = [ax.get_legend_handles_labels() for ax in (left, right)]
-    handles = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
+    right.set_title(f"it is {rms_error:.1g} mm RMS from φ'")
+    legends = [ax.get_legend_handles_labels() for ax in (left, right)]
+    handles = {label: handle for pair in legends for handle, label in zip(*pair, strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
-    every = np.concatenate((ring[:, :2], hand[:, :2], *(MILLIMETRES * there[:, :2] + tip for tip in tips)))
-    reach = 1.04 * np.abs(every - ring.mean(axis=0)[:2]).max()
+    all_points = np.concatenate((ring[:, :2], hand[:, :2], *(MILLIMETRES * points[:, :2] + tip for tip in tips)))
+    reach = 1.04 * np.abs(all_points - ring.mean(axis=0)[:2]).max()
     middle = ring.mean(axis=0)
     left.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
     return figure

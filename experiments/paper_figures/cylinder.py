@@ -26,7 +26,7 @@ from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 
-FRAMES = 9  # poses of the lap, evenly
+FRAMES = 9  # evenly spaced poses of the lap
 APART = 1.15  # between two frames [m]
 RED, BLUE, GREY = "#b8433a", "#2f6db3", "#c9ced6"
 LEGS = ("pelvis", "thigh", "shank", "foot")
@@ -38,7 +38,7 @@ def four_motion_cylinder(runs: Path) -> Figure:
         config, curve = config_of(recording), curve_of(recording)
         names = [clip.name for clip in clips_of(recording)]
         start, end = pushed_lap(recording)
-        _, alone = ticks(recording, 0.0, start, "p")
+        _, unpushed = ticks(recording, 0.0, start, "p")
         t, pushed = ticks(recording, start, end, "p")
         times = np.linspace(t[0], t[-1], FRAMES)
         poses = poses_at(recording, times)
@@ -57,11 +57,11 @@ def four_motion_cylinder(runs: Path) -> Figure:
         corners = MILLIMETRES * np.array([edges[i][k] for i in (0, 1, 3, 2, 0)])
         path(ax, corners, "#d9dde4", "", 0.7)
     path(ax, MILLIMETRES * ring, CURVE, "curve φ", 1.0, (0, (4, 3)))
-    path(ax, MILLIMETRES * alone, FIELD, "hand in FOLLOW, left alone", 1.4)
+    path(ax, MILLIMETRES * unpushed, FIELD, "hand in FOLLOW, left alone", 1.4)
     path(ax, MILLIMETRES * pushed, USER, "hand in FOLLOW, pushing", 1.4)
     ax.legend(loc="upper left", bbox_to_anchor=(-0.34, 1.0))
     strip = figure.add_subplot(grid[1])
-    _strip(strip, poses, [f"{time:.1f} s" for time in times])
+    _draw_strip(strip, poses, [f"{time:.1f} s" for time in times])
     strip.set_title("frames of the animation h(p) while the hand pushes")
     return figure
 
@@ -74,45 +74,45 @@ def red_and_blue_inputs(runs: Path) -> Figure:
         times = np.linspace(start, min(end, start + curve.duration), FRAMES)
         poses = poses_at(recording, times)
     rows: list[tuple[str, Array, Paint]] = [
-        (f"red input: {clips[0].name}", _lap(clips[0]), _painted(RED, GREY)),
-        (f"blue input, inside: {clips[1].name}", _lap(clips[1]), _painted(GREY, BLUE)),
-        (f"blue input, outside: {clips[2].name}", _lap(clips[2]), _painted(GREY, "#6ea3d8")),
-        ("what the hand made of them", poses, _painted(RED, BLUE)),
+        (f"red input: {clips[0].name}", _lap_poses(clips[0]), _leg_paint(RED, GREY)),
+        (f"blue input, inside: {clips[1].name}", _lap_poses(clips[1]), _leg_paint(GREY, BLUE)),
+        (f"blue input, outside: {clips[2].name}", _lap_poses(clips[2]), _leg_paint(GREY, "#6ea3d8")),
+        ("what the hand made of them", poses, _leg_paint(RED, BLUE)),
     ]
     figure = Figure(figsize=(7.2, 6.6), layout="constrained")
     for ax, (title, row, paint) in zip(figure.subplots(len(rows), 1), rows, strict=True):
-        shown = [f"{time:.1f} s" for time in times] if row is poses else []
-        _strip(ax, row, shown, paint)
+        labels = [f"{time:.1f} s" for time in times] if row is poses else []
+        _draw_strip(ax, row, labels, paint)
         ax.set_title(title)
     return figure
 
 
-def _edge(ring: Array, middle: Array, aside: float, above: float) -> Array:
+def _edge(ring: Array, middle: Array, radial_offset: float, height: float) -> Array:
     """An edge of the cylinder: the curve's circle, wider and higher [m], shape (n, 3)."""
     outwards = ring - middle
     outwards[:, 2] = 0.0
-    return ring + aside * outwards / np.linalg.norm(outwards, axis=1)[:, None] + np.array([0.0, 0.0, above])
+    return ring + radial_offset * outwards / np.linalg.norm(outwards, axis=1)[:, None] + np.array([0.0, 0.0, height])
 
 
-def _lap(clip: Clip) -> Array:
+def _lap_poses(clip: Clip) -> Array:
     return clip.poses[np.linspace(0, clip.n_frames - 1, FRAMES).astype(int)]
 
 
-def _painted(legs: str, rest: str) -> Paint:
+def _leg_paint(legs: str, rest: str) -> Paint:
     return lambda body, _rgba: legs if body.endswith(LEGS) else rest
 
 
-def _strip(ax: Axes, poses: Array, words: list[str], paint: Paint | None = None) -> None:
-    """Poses side by side on a floor, all seen from the side to which the first faces, with words below."""
-    people = Silhouettes()
+def _draw_strip(ax: Axes, poses: Array, labels: list[str], paint: Paint | None = None) -> None:
+    """Poses side by side on a floor, each seen from the same side relative to its heading, with labels below."""
+    silhouettes = Silhouettes()
     for k, pose in enumerate(poses):
         azimuth = float(heading(pose[3:7])) + np.pi - 0.5
         if paint is None:
-            people.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth)
+            silhouettes.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth)
         else:
-            people.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth, paint=paint)
-    for k, word in enumerate(words):
-        ax.annotate(word, (APART * k, -0.12), ha="center", va="top", fontsize=7.5)
+            silhouettes.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth, paint=paint)
+    for k, label in enumerate(labels):
+        ax.annotate(label, (APART * k, -0.12), ha="center", va="top", fontsize=7.5)
     ax.axhline(0.0, color="#b9bec8", lw=0.6, zorder=1)
     ax.set(aspect="equal", xlim=(-0.7, APART * (len(poses) - 1) + 0.7), ylim=(-0.35, 2.05))
     ax.axis("off")

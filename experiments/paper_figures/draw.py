@@ -1,4 +1,4 @@
-"""Draws all figures of the paper: makes the runs that they need, the drawings as PDF and PNG, and a page."""
+"""Draws all figures of the paper: performs the runs that they need, writes the drawings as PDF and PNG, and a page."""
 
 import html
 from collections.abc import Callable
@@ -36,9 +36,9 @@ class Drawing(NamedTuple):
     shows : str
         What is drawn here, and from which run.
     runs : tuple of str
-        Runs that it needs.
+        Runs that the figure needs.
     draw : callable
-        Makes the figure from the folder of runs.
+        Draws the figure from the folder of runs.
     """
 
     number: int
@@ -77,7 +77,7 @@ DRAWINGS = (
 
 
 def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
-    """Draw all figures into a folder, from the runs in its folder ``runs``; missing runs are made first.
+    """Draw all figures into a folder, from the runs in its folder ``runs``; missing runs are performed first.
 
     Parameters
     ----------
@@ -102,11 +102,11 @@ def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
         raise SimError(f"{out}: holds figures; choose another --out, or --overwrite them (their runs are kept)")
     console = Console(stderr=True)
     runs = out / "runs"
-    wanted = configs()
-    missing = [name for name in wanted if not _recorded(runs / name)]
+    run_configs = configs()
+    missing = [name for name in run_configs if not _has_recording(runs / name)]
     for k, name in enumerate(missing):
         console.print(f"Run {k + 1} of {len(missing)} that are missing: {name}.", highlight=False)
-        run(wanted[name], runs / name, True, started)
+        run(run_configs[name], runs / name, True, started)
     files: list[Path] = []
     columns = (TextColumn("drawing"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
@@ -128,7 +128,7 @@ def draw_one(drawing: Drawing, runs: Path, out: Path) -> Path:
     return stem.with_suffix(".png")
 
 
-def _recorded(folder: Path) -> bool:
+def _has_recording(folder: Path) -> bool:
     file = recording_in(folder)
     if not file.exists():
         return False
@@ -144,14 +144,14 @@ def _page() -> str:
         f"<br><i>Here:</i> {html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
         for d in DRAWINGS
     ]
-    return html_page("Figures 1 to 8 of the paper, from runs of this program", _ABOUT + "\n".join(parts), _STYLE)
+    return html_page("Figures 1 to 8 of the paper, from runs of this program", _INTRO + "\n".join(parts), _CSS)
 
 
-_STYLE = """figure { margin: 2.5rem 0; }
+_CSS = """figure { margin: 2.5rem 0; }
 img { width: 100%; }
 figcaption { font-size: .95rem; color: #566072; }
 figcaption b { color: #222a38; }"""
-_ABOUT = """<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. In bold, in our
+_INTRO = """<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. In bold, in our
 words, what the paper's figure of that number shows (its captions are not repeated); then what is drawn here, from
 recordings. A click gives the PDF.</p>
 """

@@ -14,7 +14,7 @@ from models.world.scene import FIRST_HIDDEN_GROUP
 
 Paint = Callable[[str, Array], str | tuple[float, ...]]
 
-_CORNERS = 28  # corners of an outline
+_N_CORNERS = 28  # of an outline
 
 
 class Outline(NamedTuple):
@@ -55,22 +55,22 @@ class Silhouettes:
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         c, s = np.cos(azimuth), np.sin(azimuth)
-        onto, away = np.array([[s, -c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
+        projection, depth = np.array([[s, -c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
         origin = np.array([pose[0], pose[1], 0.0])
-        found: list[Outline] = []
+        result: list[Outline] = []
         for geom in range(model.ngeom):
             if model.geom_group[geom] >= FIRST_HIDDEN_GROUP:
                 continue
             centre, turn = data.geom_xpos[geom] - origin, data.geom_xmat[geom].reshape(3, 3)
             size = model.geom_size[geom]
             if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
-                corners = _capsule(onto @ (size[1] * turn[:, 2]), float(size[0]))
+                corners = _capsule(projection @ (size[1] * turn[:, 2]), float(size[0]))
             else:
                 axes = size if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_ELLIPSOID else np.full(3, size[0])
-                corners = _circle() @ np.linalg.cholesky((onto @ turn * axes**2) @ (onto @ turn).T).T
+                corners = _circle() @ np.linalg.cholesky((projection @ turn * axes**2) @ (projection @ turn).T).T
             body = model.body(model.geom_bodyid[geom]).name
-            found.append(Outline(body, model.geom_rgba[geom], float(away @ centre), onto @ centre + corners))
-        return sorted(found, key=lambda outline: -outline.depth)
+            result.append(Outline(body, model.geom_rgba[geom], float(depth @ centre), projection @ centre + corners))
+        return sorted(result, key=lambda outline: -outline.depth)
 
     def draw(
         self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
@@ -84,13 +84,13 @@ class Silhouettes:
 
 
 def _circle() -> Array:
-    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
+    angle = np.linspace(0.0, 2.0 * np.pi, _N_CORNERS, endpoint=False)
     return np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 def _capsule(half: Array, radius: float) -> Array:
     """Hull of two discs at ±half, shape (n, 2)."""
     start = np.arctan2(half[1], half[0]) - 0.5 * np.pi
-    angle = start + np.linspace(0.0, np.pi, _CORNERS // 2)
+    angle = start + np.linspace(0.0, np.pi, _N_CORNERS // 2)
     cap = radius * np.column_stack((np.cos(angle), np.sin(angle)))
     return np.concatenate((half + cap, -half - cap))

@@ -17,7 +17,7 @@ MILLIMETRES = 1e3  # in a metre
 
 
 def configs() -> dict[str, RunConfig]:
-    """Configurations of the runs by name of their folder; each is a run that `hvf run` could make."""
+    """Configurations of the runs by name of their folder; each can also be run by `hvf run`."""
     return {
         CYLINDER: demo_config(),
         COMPOSITE: RunConfig(map=Composite(), user=User(does="push"), seconds=9.0),

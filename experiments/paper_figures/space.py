@@ -24,13 +24,13 @@ def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis._axinfo["grid"].update(color="#e6e8ec", linewidth=0.6)
-        axis.set_major_locator(_steps(float(np.max(high - low))))
+        axis.set_major_locator(_tick_locator(float(np.max(high - low))))
         axis.labelpad = 2.0
     ax.tick_params(pad=0.0, labelsize=7.5)
     return ax
 
 
-def _steps(extent: float) -> Any:
+def _tick_locator(extent: float) -> Any:
     from matplotlib.ticker import MultipleLocator
 
     return MultipleLocator(10.0 if extent < 60.0 else 25.0 if extent < 150.0 else 50.0)

@@ -26,11 +26,11 @@ from sim.viewer.palette import FIELD, TUBE, USER
 Show = Literal["both", "workspace", "stage"]
 
 WORKSPACE_SHARE = 0.42  # of the width, if both are shown
-LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # smallest frame on which letters can be read [pixels]
+LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # smallest frame on which text is legible [pixels]
 MOST_SIZE = 8192  # of either side [pixels]: the widest frame of H.264's levels
-_SHIRT = "#3d6ba1"  # colour of the figure's shirt in its model
-_NAMES = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
-_GHOSTS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
+_SHIRT_COLOR = "#3d6ba1"  # colour of the figure's shirt in its model
+_FIGURE_LABELS = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
+_GHOST_LABELS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Frames:
 
     def __init__(self, recording: Recording, folder: Path, film: Film, backend: str):
         self._film = film
-        self._bent_from, bent = _bent(recording, folder)
+        self._bent_start_time, bent = _bent_curve(recording, folder)
         self._world = shown_world(recording, film.width, film.height, bent)
         self.moments: Timeline = timeline(
             recording, folder, self._world, film.fps, film.start, film.seconds, film.ghost
@@ -113,17 +113,17 @@ class Frames:
     def frame(self, row: int) -> Image:
         """The frame of a row, shape (height, width, 3)."""
         self.stage.put(row)
-        self._world.show_bent(bool(self.moments.t[row] >= self._bent_from))
+        self._world.show_bent(bool(self.moments.t[row] >= self._bent_start_time))
         height, time = self._film.height, f"{self.moments.t[row]:.1f} s"
         parts: list[Image] = []
         if self._left:
-            bare = self._workspace.picture(self._canvas, row, self._left, height)
+            scene = self._workspace.picture(self._canvas, row, self._left, height)
             field, user = self._workspace.newtons(row)
             legend = (Entry(FIELD, f"field {field:.1f} N"), Entry(USER, f"hand {user:.1f} N"))
-            parts.append(self._captions.on(bare, "workspace", "" if self._right else time, legend))
+            parts.append(self._captions.on(scene, "workspace", "" if self._right else time, legend))
         if self._right:
-            bare = self.stage.picture(self._canvas, row, self._right, height)
-            parts.append(self._captions.on(bare, "stage", time, _cast(self._world, self.moments.kind), True))
+            scene = self.stage.picture(self._canvas, row, self._right, height)
+            parts.append(self._captions.on(scene, "stage", time, _stage_legend(self._world, self.moments.kind), True))
         picture = np.concatenate(parts, axis=1)
         if len(parts) == 2:
             picture[:, self._left - 1 : self._left + 1] = 255
@@ -134,22 +134,22 @@ class Frames:
         self._canvas.close()
 
 
-def _bent(recording: Recording, folder: Path) -> tuple[float, Array | None]:
+def _bent_curve(recording: Recording, folder: Path) -> tuple[float, Array | None]:
     """Time from which a bent curve is performed [s], and its points; infinity and None if there is none."""
-    told = (recording.summary or {}).get("performance")
-    if not isinstance(told, dict) or not (folder / CURVE_FILE).exists():
+    performance = (recording.summary or {}).get("performance")
+    if not isinstance(performance, dict) or not (folder / CURVE_FILE).exists():
         return np.inf, None
     curve = load_curve(folder / CURVE_FILE)
-    return float(cast(dict[str, float], told)["start"]), curve.point(np.linspace(curve.start, curve.end, 400))
+    return float(cast(dict[str, float], performance)["start"]), curve.point(np.linspace(curve.start, curve.end, 400))
 
 
-def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
+def _stage_legend(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
     """Legend of the stage: the figure and its ghost."""
-    actors = (Entry(_SHIRT, _NAMES[world.kind]),)
+    actors = (Entry(_SHIRT_COLOR, _FIGURE_LABELS[world.kind]),)
     if not world.has_figure or ghost == "none":
         return actors
     red, green, blue, _ = (round(255 * share) for share in mixed_with_white(TUBE, GHOST_WHITE))
-    return (*actors, Entry(f"#{red:02x}{green:02x}{blue:02x}", _GHOSTS[ghost]))
+    return (*actors, Entry(f"#{red:02x}{green:02x}{blue:02x}", _GHOST_LABELS[ghost]))
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class Filmed:
         Files written.
     frames : int
     clearance : mapping of str to Clearance
-        How low the figure and the ghost reach, for those that are shown.
+        Lowest points of the figure and the ghost, for those that are shown.
     """
 
     files: tuple[str, ...]
@@ -170,7 +170,7 @@ class Filmed:
     clearance: Mapping[str, Clearance]
 
     def lines(self) -> list[str]:
-        """How low the figures reach, one line each."""
+        """Lowest points of the figures, one line each."""
         return [
             f"The lowest point of the {name} was {1e3 * lowest:+.1f} mm from the floor at {at:.1f} s"
             f"{', and was drawn higher by that' if lowest < 0.0 else ''}."
@@ -196,29 +196,31 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
     Raises
     ------
     SimError
-        If the recording cannot be filmed, the target not be written, or this machine cannot draw.
+        If the recording cannot be filmed, the target cannot be written, or this machine cannot draw.
     """
-    beside = target.with_suffix(".gif") if gif and target.suffix.lower() != ".gif" else None
-    targets = (target,) if beside is None else (target, beside)
+    gif_target = target.with_suffix(".gif") if gif and target.suffix.lower() != ".gif" else None
+    targets = (target,) if gif_target is None else (target, gif_target)
     for file in targets:
         check_target(file, overwrite)
     console = Console(stderr=True)
     with Recording(folder / RECORDING) as recording, ExitStack() as files:
         frames = Frames(recording, folder, film, offscreen_backend())
         files.callback(frames.close)
-        whole = files.enter_context(FilmFile(target, film.width, film.height, film.fps))
-        half = beside and files.enter_context(FilmFile(beside, film.width // 2, film.height // 2, film.fps / 2.0))
+        film_file = files.enter_context(FilmFile(target, film.width, film.height, film.fps))
+        gif_file = gif_target and files.enter_context(
+            FilmFile(gif_target, film.width // 2, film.height // 2, film.fps / 2.0)
+        )
         for row in _with_progress(range(len(frames)), console):
             picture = frames.frame(row)
-            whole.add(picture)
-            if half and row % 2 == 0:
-                half.add(halved(picture))
+            film_file.add(picture)
+            if gif_file and row % 2 == 0:
+                gif_file.add(halved(picture))
         complete = recording.complete
     if not complete:
         console.print(f"The run was cut short: the film shows the {frames.moments.t[-1]:.1f} s that are recorded.")
     console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
-    reach = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
-    return Filmed(tuple(map(str, targets)), len(frames), reach)
+    clearance = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
+    return Filmed(tuple(map(str, targets)), len(frames), clearance)
 
 
 def _with_progress(rows: range, console: Console) -> Iterator[int]:

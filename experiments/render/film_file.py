@@ -1,4 +1,4 @@
-"""Writes a film as H.264 or GIF by ffmpeg; the file gets its name only when it is complete."""
+"""Writes a film as H.264 or GIF by ffmpeg; the file gets its final name only when it is complete."""
 
 from collections.abc import Generator
 from contextlib import suppress
@@ -12,22 +12,22 @@ from sim.errors import SimError
 from sim.viewer.palette import FIELD, TUBE, USER
 
 SUFFIXES = (".mp4", ".gif")
-_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
-# One palette for all frames. To choose it, the colours of arrows and tube are painted over a corner, so that thin
-# arrows keep theirs.
-_MEANT = "".join(
+_OPTIONS = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
+# One palette for all frames. While it is chosen, the colours of arrows and tube are painted over a corner, so that
+# thin arrows keep their colours.
+_PALETTE_COLORS = "".join(
     f"drawbox=x={k}*iw/6:y=0:w=iw/6:h=ih/6:color=0x{color[1:]}:t=fill," for k, color in enumerate((FIELD, USER, TUBE))
 )
-_PALETTE = f"split[a][b];[a]{_MEANT}palettegen=max_colors=160[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"
+_PALETTE = f"split[a][b];[a]{_PALETTE_COLORS}palettegen=max_colors=160[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"
 
 
 def check_target(target: Path, overwrite: bool) -> None:
-    """Refuse a film that cannot be written, or may not be replaced.
+    """Check that a film can be written, and does not replace a file unasked.
 
     Raises
     ------
     SimError
-        With what is expected.
+        If it cannot; the message says what is expected.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise SimError(f"{target}: films are written as {' or '.join(SUFFIXES)}; expected a name that ends so")
@@ -56,36 +56,36 @@ class FilmFile:
     """
 
     def __init__(self, target: Path, width: int, height: int, fps: float):
-        self._target, self._part = target, target.with_name(f".{target.stem}.part{target.suffix.lower()}")
+        self._target, self._partial_file = target, target.with_name(f".{target.stem}.part{target.suffix.lower()}")
         target.parent.mkdir(parents=True, exist_ok=True)
-        self._pen = _pen(self._part, width, height, fps)
-        self._pen.send(None)
+        self._encoder = _encoder(self._partial_file, width, height, fps)
+        self._encoder.send(None)
 
     def add(self, frame: Image) -> None:
         """Add a frame, shape (height, width, 3)."""
-        self._pen.send(np.ascontiguousarray(frame))
+        self._encoder.send(np.ascontiguousarray(frame))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         if kind is None:
-            self._pen.close()
-            self._part.replace(self._target)
+            self._encoder.close()
+            self._partial_file.replace(self._target)
             return
-        with suppress(KeyboardInterrupt):  # at which ffmpeg is killed, before it tells of a film without frames
-            self._pen.throw(KeyboardInterrupt)
-        self._part.unlink(missing_ok=True)
+        with suppress(KeyboardInterrupt):  # ffmpeg is killed before it reports a film without frames
+            self._encoder.throw(KeyboardInterrupt)
+        self._partial_file.unlink(missing_ok=True)
 
 
-def _pen(file: Path, width: int, height: int, fps: float) -> Generator[None, Any, None]:
+def _encoder(file: Path, width: int, height: int, fps: float) -> Generator[None, Any, None]:
     try:
         from imageio_ffmpeg import write_frames
     except ImportError:
         raise SimError(
             "films are written by ffmpeg, which is not installed; expected pip install 'haptic-vector-fields[video]'"
         ) from None
-    # Untyped, since its annotations forbid a fractional frame rate, and None as quality where parameters give it.
+    # Untyped, since its annotations forbid a fractional frame rate, and None as quality where options give it.
     write: Any = write_frames
     if file.suffix == ".gif":
         return write(
@@ -93,5 +93,11 @@ def _pen(file: Path, width: int, height: int, fps: float) -> Generator[None, Any
             macro_block_size=1, output_params=["-filter_complex", _PALETTE, "-loop", "0"],
         )  # fmt: skip
     return write(
-        str(file), (width, height), fps=fps, codec="libx264", quality=None, macro_block_size=1, output_params=_QUALITY
+        str(file),
+        (width, height),
+        fps=fps,
+        codec="libx264",
+        quality=None,
+        macro_block_size=1,
+        output_params=_OPTIONS,
     )

@@ -16,7 +16,7 @@ Image = npt.NDArray[np.uint8]
 
 OFFSCREEN = ("egl", "osmesa")  # EGL uses a graphics card or Mesa's software renderer, OSMesa only the latter
 INSTALL = "apt-get install libegl1 libgl1-mesa-dri, or libosmesa6"
-_SECONDS = 60.0  # [s] timeout for a backend's trial
+_TIMEOUT = 60.0  # [s] for the trial of a backend
 _TRIAL = """
 import mujoco, sys
 from importlib import import_module
@@ -45,29 +45,29 @@ def offscreen_backend() -> str:
     NoGraphics
         If none works; the message says what to install.
     """
-    asked = os.environ.get("MUJOCO_GL", "").lower().strip()
-    candidates = (asked,) if asked in OFFSCREEN else OFFSCREEN
-    said: list[str] = []
+    requested = os.environ.get("MUJOCO_GL", "").lower().strip()
+    candidates = (requested,) if requested in OFFSCREEN else OFFSCREEN
+    failures: list[str] = []
     for name in candidates:
-        failure = _failure(name)
+        failure = _backend_failure(name)
         if not failure:
             return name
-        said.append(f"{name}: {failure}")
-    raise NoGraphics(f"nothing can be drawn on this machine ({'; '.join(said)}); expected EGL or OSMesa: {INSTALL}")
+        failures.append(f"{name}: {failure}")
+    raise NoGraphics(f"nothing can be drawn on this machine ({'; '.join(failures)}); expected EGL or OSMesa: {INSTALL}")
 
 
-def _failure(backend: str) -> str:
-    """Why a backend fails, in a few words; empty if it works."""
+def _backend_failure(backend: str) -> str:
+    """Reason why a backend fails, in a few words; empty if it works."""
     try:
-        tried = subprocess.run(
-            [sys.executable, "-c", _TRIAL, backend], capture_output=True, text=True, timeout=_SECONDS, check=False
+        result = subprocess.run(
+            [sys.executable, "-c", _TRIAL, backend], capture_output=True, text=True, timeout=_TIMEOUT, check=False
         )
     except subprocess.TimeoutExpired:
-        return f"no answer in {_SECONDS:g} s"
-    if "drawn" in tried.stdout:
+        return f"no answer in {_TIMEOUT:g} s"
+    if "drawn" in result.stdout:
         return ""
-    lines = tried.stderr.strip().splitlines()
-    return lines[-1][:120] if lines else f"exit code {tried.returncode}"
+    lines = result.stderr.strip().splitlines()
+    return lines[-1][:120] if lines else f"exit code {result.returncode}"
 
 
 class View(NamedTuple):
@@ -123,7 +123,7 @@ class Canvas:
         self._gl.make_current()
         self._context: mujoco.MjrContext = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        self._model, self._option, self._perturbed = model, mujoco.MjvOption(), mujoco.MjvPerturb()
+        self._model, self._option, self._perturbation = model, mujoco.MjvOption(), mujoco.MjvPerturb()
         self.scene = mujoco.MjvScene(model, most_geoms)
 
     def look(self, data: mujoco.MjData, view: "View", group: int) -> None:
@@ -131,7 +131,7 @@ class Canvas:
         self._option.geomgroup[:] = 0
         self._option.geomgroup[group] = 1
         mujoco.mjv_updateScene(
-            self._model, data, self._option, self._perturbed, view.camera(), mujoco.mjtCatBit.mjCAT_ALL, self.scene
+            self._model, data, self._option, self._perturbation, view.camera(), mujoco.mjtCatBit.mjCAT_ALL, self.scene
         )
         # The sun is behind the left shoulder of the viewer, so that the visible sides are lit.
         for light in self.scene.lights[: self.scene.nlight]:
@@ -142,7 +142,7 @@ class Canvas:
     def add(self, data: mujoco.MjData) -> None:
         """Add the moving geoms in the world's current state to the scene."""
         mujoco.mjv_addGeoms(
-            self._model, data, self._option, self._perturbed, mujoco.mjtCatBit.mjCAT_DYNAMIC, self.scene
+            self._model, data, self._option, self._perturbation, mujoco.mjtCatBit.mjCAT_DYNAMIC, self.scene
         )
 
     def connect(

@@ -21,17 +21,17 @@ def seen_geoms(model: mujoco.MjModel, prefix: str) -> tuple[int, ...]:
 
 
 def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int]) -> float:
-    r"""Least height of the geoms' surfaces [m], after `mj_kinematics`.
+    r"""Smallest height of the geoms' surfaces [m], after `mj_kinematics`.
 
     .. math:: z - h(R^T e_z), \quad h(d) = \max_{x} d \cdot x \text{ over the geom about its own centre}
 
     with h = r for a sphere, r + ℓ|d_z| for a capsule, ‖s d‖ for an ellipsoid, Σ sᵢ|dᵢ| for a box, r√(1−d_z²) + ℓ|d_z|
     for a cylinder.
     """
-    return min(float(data.geom_xpos[g][2]) - _reach(model, g, data.geom_xmat[g][6:9]) for g in geoms)
+    return min(float(data.geom_xpos[g][2]) - _support(model, g, data.geom_xmat[g][6:9]) for g in geoms)
 
 
-def _reach(model: mujoco.MjModel, geom: int, d: Array) -> float:
+def _support(model: mujoco.MjModel, geom: int, d: Array) -> float:
     """Support of a geom in the direction d of its own frame; of a mesh, which is not symmetric, in the direction −d."""
     kind, s = model.geom_type[geom], model.geom_size[geom]
     if kind == _GEOM.mjGEOM_SPHERE:

@@ -19,9 +19,9 @@ from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
 FINER = 3  # supersampling factor of rows and columns
-DEVICE_REACH = 0.8  # half width of the region that casts shadows on the device [m]
+DEVICE_REACH = 0.8  # half-width of the region that casts shadows on the device [m]
 DEVICE_SHARE = 0.34  # share of the width for the device
-MOMENTS = 4  # poses of the figure, evenly over the second half of the run
+MOMENTS = 4  # poses of the figure, evenly spaced over the second half of the run
 SPACING = 1.1  # distance between them [m]
 GHOST_AT = np.array([-0.95, 0.45])  # position of the ghost relative to the figure: behind, and to its left [m]
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
@@ -45,17 +45,17 @@ def draw_picture(folder: Path, target: Path, overwrite: bool) -> None:
         moments = timeline(recording, folder, world, FPS, 0.0, None, "default")
         left, backend = round(DEVICE_SHARE * WIDTH) if world.has_figure else WIDTH, offscreen_backend()
         with Canvas(world.model, backend, 20_000, DEVICE_REACH) as canvas:
-            picture = _device(recording, world, moments, canvas, FINER * left)
+            picture = _draw_device(recording, world, moments, canvas, FINER * left)
         if world.has_figure:
             with Canvas(world.model, backend, 20_000, SHADOW_REACH) as canvas:
-                figures = _figures(recording, world, moments, canvas, FINER * (WIDTH - left))
+                figures = _draw_figures(recording, world, moments, canvas, FINER * (WIDTH - left))
             picture = np.hstack((picture, figures))
     # Supersampling: each pixel is the mean of several, which smooths edges of shadows and limbs.
     pixels = picture.reshape(HEIGHT, FINER, WIDTH, FINER, 3).mean(axis=(1, 3))
     matplotlib.image.imsave(target, np.rint(pixels).astype(np.uint8))
 
 
-def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
+def _draw_device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
     """The workspace at the hardest push across x, the direction of the stylus, which would hide an arrow along it."""
     user = recording.channel("ticks", "user")
     row = int(np.argmax([np.linalg.norm(user[int(tick)][1:]) for tick in moments.ticks]))
@@ -63,17 +63,17 @@ def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: 
     return Workspace(recording, world, moments).picture(canvas, row, width, FINER * HEIGHT)
 
 
-def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
+def _draw_figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
     """Poses side by side, turned to the camera together with their ghosts."""
     qpos, at = recording.channel("frames", "qpos"), world.figure_at
-    n, across = len(moments.t), 0.5 * (MOMENTS - 1) * SPACING
+    n, half_width = len(moments.t), 0.5 * (MOMENTS - 1) * SPACING
     for k, row in enumerate(np.linspace(n // 2, n - 1, MOMENTS).astype(int)):
         state = qpos[int(moments.frames[row])].copy()
-        pose, place = state[at : at + N_POSE].copy(), np.array([0.0, across - k * SPACING])
+        pose, position = state[at : at + N_POSE].copy(), np.array([0.0, half_width - k * SPACING])
         ghost = None if moments.ghost is None else moments.ghost[row]
-        state[at : at + N_POSE] = _facing_the_camera(pose, place).moved(pose)
+        state[at : at + N_POSE] = _displacement_to(pose, position).moved(pose)
         if ghost is not None:
-            ghost = _facing_the_camera(ghost, place + GHOST_AT).moved(ghost)
+            ghost = _displacement_to(ghost, position + GHOST_AT).moved(ghost)
         world.put(state, ghost)
         if k == 0:
             canvas.look(world.data, _VIEW, STAGE)
@@ -82,10 +82,10 @@ def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas:
     return canvas.picture(width, FINER * HEIGHT)
 
 
-def _facing_the_camera(pose: Array, place: Array) -> PlanarDisplacement:
+def _displacement_to(pose: Array, position: Array) -> PlanarDisplacement:
     """The planar displacement that moves a pose to a place on the floor, facing +x."""
     yaw = float(heading(pose[3:7]))
     c, s = np.cos(-yaw), np.sin(-yaw)
     return PlanarDisplacement(
-        float(place[0] - c * pose[0] + s * pose[1]), float(place[1] - s * pose[0] - c * pose[1]), -yaw
+        float(position[0] - c * pose[0] + s * pose[1]), float(position[1] - s * pose[0] - c * pose[1]), -yaw
     )

@@ -19,7 +19,7 @@ from sim.viewer.palette import FIELD, USER
 
 Camera = Literal["three-quarter", "front", "side", "back", "above"]
 
-# Viewing directions: azimuth relative to the figure's heading (180 looks at it from in front), elevation [degrees].
+# Viewing directions: azimuth relative to the figure's heading (180: from the front), elevation [degrees].
 CAMERAS: dict[Camera, tuple[float, float]] = {
     "three-quarter": (205.0, -9.0),
     "front": (180.0, -6.0),
@@ -29,8 +29,8 @@ CAMERAS: dict[Camera, tuple[float, float]] = {
 }
 APART = 0.95  # distance of the ghost from the figure, to the side [m]
 BEHIND = 0.35  # and away from the camera [m]
-FRAME_SCALE = 1.1  # size of the picture relative to what must be in it
-ARM_REACH = 0.45  # least visible distance to either side of a root [m]
+FRAME_SCALE = 1.1  # size of the picture relative to its required contents
+ARM_REACH = 0.45  # smallest visible distance to either side of a root [m]
 LEGEND = 0.1  # room for the legend at the bottom [m]
 ARROW = 0.06  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.6  # [s] of the stylus's path that are drawn behind it
@@ -79,8 +79,8 @@ class Workspace:
         """Draw a moment; the world has been put there."""
         canvas.look(self._world.data, self._view, BENCH)
         tick = int(self._moments.ticks[row])
-        way = self._p_WH + self._p[max(0, tick - self._trail) : tick + 1 : max(1, self._trail // 30)]
-        for start, end in itertools.pairwise(way):
+        trail = self._p_WH + self._p[max(0, tick - self._trail) : tick + 1 : max(1, self._trail // 30)]
+        for start, end in itertools.pairwise(trail):
             if np.linalg.norm(end - start) > 1e-5:
                 canvas.connect(_ROD, start, end, 0.0014, mixed_with_white(FIELD, 0.0))
         tip = self._p_WH + self._p[tick]
@@ -101,7 +101,7 @@ class Stage:
         self._geoms = {prefix: seen_geoms(world.model, prefix) for prefix in prefixes}
         self.clearance: dict[str, Clearance] = {}
         self._azimuth, self._elevation = CAMERAS[camera]
-        self._distance, self._height = self._framed(aspect)
+        self._distance, self._height = self._frame_camera(aspect)
 
     def put(self, row: int) -> None:
         """Set the world to the state of a row; a figure that is below the floor is lifted onto it."""
@@ -109,7 +109,7 @@ class Stage:
         ghost = None
         if self._moments.ghost is not None:
             ghost = self._moments.ghost[row].copy()
-            ghost[:2] += self._beside(row)
+            ghost[:2] += self._to_ghost(row)
         elif world.has_figure:
             ghost = np.zeros(N_POSE)
             ghost[2], ghost[3::4] = -10.0, 1.0  # out of sight
@@ -133,32 +133,32 @@ class Stage:
         return canvas.picture(width, height)
 
     def _view(self, row: int) -> View:
-        x, y = self._moments.floor[row] + (0.5 * self._beside(row) if self._moments.ghost is not None else 0.0)
-        return View((float(x), float(y), self._height), self._distance, self._looking(row), self._elevation)
+        x, y = self._moments.floor[row] + (0.5 * self._to_ghost(row) if self._moments.ghost is not None else 0.0)
+        return View((float(x), float(y), self._height), self._distance, self._view_azimuth(row), self._elevation)
 
-    def _looking(self, row: int) -> float:
+    def _view_azimuth(self, row: int) -> float:
         """Azimuth of the view [degrees]."""
         return float(self._moments.heading[row]) + self._azimuth
 
-    def _beside(self, row: int) -> Array:
+    def _to_ghost(self, row: int) -> Array:
         """Vector from the figure to its ghost over the floor: right in the view, and away from the viewer [m]."""
-        a = np.deg2rad(self._looking(row))
+        a = np.deg2rad(self._view_azimuth(row))
         return APART * np.array([np.sin(a), -np.cos(a)]) + BEHIND * np.array([np.cos(a), np.sin(a)])
 
-    def _framed(self, aspect: float) -> tuple[float, float]:
+    def _frame_camera(self, aspect: float) -> tuple[float, float]:
         """Distance of the camera and height of its target [m], such that everything that moves is in the picture."""
         rows = np.unique(np.linspace(0, len(self._moments.t) - 1, 40).astype(int))
-        every = [geom for geoms in self._geoms.values() for geom in geoms]
-        if not every:
+        all_geoms = [geom for geoms in self._geoms.values() for geom in geoms]
+        if not all_geoms:
             return 1.0, 0.0  # the stage is empty
         points: list[Array] = []
         for row in (int(row) for row in rows):
             self.put(row)
-            centre = self._moments.floor[row] + (0.5 * self._beside(row) if self._moments.ghost is not None else 0.0)
-            a = np.deg2rad(self._looking(row))
-            places = self.world.data.geom_xpos[every]
-            across = (places[:, :2] - centre) @ np.array([np.sin(a), -np.cos(a)])
-            points.append(np.column_stack((across, places[:, 2])))
+            centre = self._moments.floor[row] + (0.5 * self._to_ghost(row) if self._moments.ghost is not None else 0.0)
+            a = np.deg2rad(self._view_azimuth(row))
+            positions = self.world.data.geom_xpos[all_geoms]
+            across = (positions[:, :2] - centre) @ np.array([np.sin(a), -np.cos(a)])
+            points.append(np.column_stack((across, positions[:, 2])))
         self.clearance.clear()
         side = max(ARM_REACH, float(np.max([np.abs(cloud[:, 0]).max() for cloud in points]))) + 0.1
         top = float(np.max([cloud[:, 1].max() for cloud in points])) + 0.15

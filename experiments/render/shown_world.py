@@ -25,12 +25,12 @@ Rgba = tuple[float, float, float, float]
 GHOST = "ghost/"
 BENT = "bent"
 CURVE_RADIUS = 0.0009  # [m]
-TUBE_OPACITY = 0.17  # the wall lies twice over what is inside: (1 − 0.17)², 69 %, of it is seen
+TUBE_OPACITY = 0.17  # the wall covers the inside twice: (1 − 0.17)², 69 %, of it is visible
 GHOST_WHITE = 0.45  # share of white in the ghost's colour
-SHADOW_REACH = 5.5  # half width of the shadow map [m]
+SHADOW_REACH = 5.5  # half-width of the shadow map [m]
 FIELD_OF_VIEW_DEG = 30.0  # vertical [degrees]: a ball at the upper edge is drawn 1/cos 15°, 4 % longer than wide
-_WOOD = (0.8, 0.71, 0.6, 1.0)
-_WHITE, _LINES = 0.97, 0.8  # brightness of the floor and of its lines
+_WOOD_COLOR = (0.8, 0.71, 0.6, 1.0)
+_FLOOR_BRIGHTNESS, _LINE_BRIGHTNESS = 0.97, 0.8  # brightness of the floor and of its lines
 STAGE, BENCH = 1, 2  # geom groups: figure, ghost or arm on the floor; the device with its curves
 
 
@@ -90,7 +90,7 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
     width, height : int
         Largest size of a picture [pixels].
     bent : array (n, 3), optional
-        Points of the curve as the hand bent it, in H [m]; hidden until `ShownWorld.show_bent`.
+        Points of the bent curve, in H [m]; hidden until `ShownWorld.show_bent`.
 
     Raises
     ------
@@ -107,11 +107,11 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
         for geom in figure.geoms:
             geom.rgba = np.array(mixed_with_white(TUBE, GHOST_WHITE))
         spec.attach(figure, prefix=GHOST, frame=spec.worldbody.add_frame())
-    _draw_courses(spec, recording)
+    _add_courses(spec, recording)
     if bent is not None:
-        _draw(spec, BENT, bent, 1.5 * CURVE_RADIUS, mixed_with_white(FIELD, 0.0, 0.0))
-    _sort(spec)
-    _light(spec)
+        _add_tube(spec, BENT, bent, 1.5 * CURVE_RADIUS, mixed_with_white(FIELD, 0.0, 0.0))
+    _assign_groups(spec)
+    _set_lighting(spec)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     model = spec.compile()
     recorded = model.nq - (N_POSE if kind in ("physical", "kinematic") else 0)
@@ -124,17 +124,17 @@ def mixed_with_white(color: str, white: float, opacity: float = 1.0) -> Rgba:
     return red, green, blue, opacity
 
 
-def _draw_courses(spec: mujoco.MjSpec, recording: Recording) -> None:
-    """Every curve as a thin rod, in its tube."""
+def _add_courses(spec: mujoco.MjSpec, recording: Recording) -> None:
+    """Add every curve as a thin rod, in its tube."""
     radius = drawn_tube(recording)
     for k, course in enumerate(courses(recording.static)):
-        looks = [("curve", CURVE_RADIUS, mixed_with_white(course.line, 0.0))]
-        looks += [("tube", radius, mixed_with_white(course.tube, 0.0, TUBE_OPACITY))] * (radius > 0.0)
-        for name, thickness, color in looks:
-            _draw(spec, f"{name}{k}", course.points, thickness, color)
+        tubes = [("curve", CURVE_RADIUS, mixed_with_white(course.line, 0.0))]
+        tubes += [("tube", radius, mixed_with_white(course.tube, 0.0, TUBE_OPACITY))] * (radius > 0.0)
+        for name, thickness, color in tubes:
+            _add_tube(spec, f"{name}{k}", course.points, thickness, color)
 
 
-def _draw(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color: Rgba) -> None:
+def _add_tube(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color: Rgba) -> None:
     """Add a tube around points in H as one mesh."""
     vertices, faces = tube(P_WH + points, thickness)
     spec.add_mesh(
@@ -146,7 +146,7 @@ def _draw(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color
     )
 
 
-def _sort(spec: mujoco.MjSpec) -> None:
+def _assign_groups(spec: mujoco.MjSpec) -> None:
     """Assign visible geoms to their groups, and give the table a lighter wood."""
     for geom in spec.geoms:
         name = geom.parent.name
@@ -155,10 +155,10 @@ def _sort(spec: mujoco.MjSpec) -> None:
         elif geom.group < FIRST_HIDDEN_GROUP:
             geom.group = BENCH
             if name == "world" and geom.type == mujoco.mjtGeom.mjGEOM_BOX:
-                geom.rgba = np.array(_WOOD)
+                geom.rgba = np.array(_WOOD_COLOR)
 
 
-def _light(spec: mujoco.MjSpec) -> None:
+def _set_lighting(spec: mujoco.MjSpec) -> None:
     """Daylight with soft fill, a pale floor of tiles of half a metre, and a sky of the same white."""
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
@@ -175,8 +175,8 @@ def _light(spec: mujoco.MjSpec) -> None:
         if texture.name == "sky":
             texture.rgb1, texture.rgb2 = np.array([0.97, 0.975, 0.98]), np.array([0.88, 0.91, 0.95])
         if texture.name == "grid":
-            texture.rgb1, texture.rgb2 = np.full(3, _WHITE), np.full(3, _WHITE)
-            texture.mark, texture.markrgb = mujoco.mjtMark.mjMARK_EDGE, np.full(3, _LINES)
+            texture.rgb1, texture.rgb2 = np.full(3, _FLOOR_BRIGHTNESS), np.full(3, _FLOOR_BRIGHTNESS)
+            texture.mark, texture.markrgb = mujoco.mjtMark.mjMARK_EDGE, np.full(3, _LINE_BRIGHTNESS)
     for material in spec.materials:
         if material.name == "floor":
             material.texrepeat, material.reflectance, material.specular = np.full(2, 2.0), 0.0, 0.0

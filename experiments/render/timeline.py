@@ -31,7 +31,7 @@ class Timeline:
     t : array (n,)
         Time in the recording [s].
     ticks, frames : array (n,)
-        IntArray of the recording's two groups.
+        Rows of the recording's two groups.
     ghost : array (n, 75) or None
         Poses of the ghost.
     kind : Ghost
@@ -69,7 +69,7 @@ def timeline(
     seconds : float or None
         Duration of the filmed part [s]; by default up to the end.
     ghost : Ghost
-        Requested ghost; an interrupted run has no default animation, and gets the other one.
+        Requested ghost; an interrupted run has no default animation, and shows that of the hand's path instead.
 
     Raises
     ------
@@ -80,25 +80,25 @@ def timeline(
     end = float(ticks_t[-1])
     if not 0.0 <= start < end:
         raise SimError(f"--start is {start:g} s; expected a time from 0 to {end:.3g} s, which are recorded")
-    until = end if seconds is None else min(end, start + seconds)
-    t = start + np.arange(int((until - start) * fps) + 1) / fps
-    ticks, frames = (np.clip(np.searchsorted(of, t), 0, len(of) - 1) for of in (ticks_t, frames_t))
+    stop = end if seconds is None else min(end, start + seconds)
+    t = start + np.arange(int((stop - start) * fps) + 1) / fps
+    ticks, frames = (np.clip(np.searchsorted(times, t), 0, len(times) - 1) for times in (ticks_t, frames_t))
     if not world.has_figure:
         return Timeline(t, ticks, frames, None, "none", np.zeros((len(t), 2)), np.zeros(len(t)))
     qpos, at = recording.channel("frames", "qpos"), world.figure_at
     roots = np.array([qpos[int(k)][at : at + 7] for k in frames])
     path = followed(roots[:, :2], fps)
     middle = np.zeros(2) if np.any(path) else np.median(roots[:, :2], axis=0)
-    heading = _slow_heading(roots[:, 3:7], fps)
-    return Timeline(t, ticks, frames, *_ghost(recording, folder, frames, ghost), path + middle, heading)
+    heading = _averaged_heading(roots[:, 3:7], fps)
+    return Timeline(t, ticks, frames, *_ghost_poses(recording, folder, frames, ghost), path + middle, heading)
 
 
-def _ghost(recording: Recording, folder: Path, frames: IntArray, wanted: Ghost) -> tuple[Array | None, Ghost]:
+def _ghost_poses(recording: Recording, folder: Path, frames: IntArray, requested: Ghost) -> tuple[Array | None, Ghost]:
     """Poses of the ghost at rows of the recording's frames, and its kind."""
-    if wanted == "none":
-        return None, wanted
+    if requested == "none":
+        return None, requested
     file = folder / DEFAULT
-    if wanted == "animation" or not file.exists():
+    if requested == "animation" or not file.exists():
         reference = recording.channel("frames", "reference")
         return np.array([reference[int(k)] for k in frames]), "animation"
     clip = load_clip(file)
@@ -106,12 +106,12 @@ def _ghost(recording: Recording, folder: Path, frames: IntArray, wanted: Ghost) 
     return clip.poses[np.minimum(frames // stride, clip.n_frames - 1)], "default"
 
 
-def _slow_heading(q: Array, fps: float) -> Array:
+def _averaged_heading(q: Array, fps: float) -> Array:
     """Averaged heading of root rotations (n, 4) [degrees]; the initial one if it turns too fast for the camera."""
-    turns = np.unwrap(heading(q))
+    headings = np.unwrap(heading(q))
     window = int(TURN_SECONDS * fps) | 1
-    padded = np.pad(turns, window // 2, mode="reflect", reflect_type="odd") if len(turns) > 1 else turns
-    slow = np.convolve(padded, np.full(window, 1.0 / window), mode="valid") if len(turns) > 1 else turns
-    if len(slow) > 1 and np.rad2deg(np.max(np.abs(np.diff(slow)))) * fps > FASTEST_TURN:
-        slow = np.full(len(slow), turns[0])
-    return np.rad2deg(slow)
+    padded = np.pad(headings, window // 2, mode="reflect", reflect_type="odd") if len(headings) > 1 else headings
+    averaged = np.convolve(padded, np.full(window, 1.0 / window), mode="valid") if len(headings) > 1 else headings
+    if len(averaged) > 1 and np.rad2deg(np.max(np.abs(np.diff(averaged)))) * fps > FASTEST_TURN:
+        averaged = np.full(len(averaged), headings[0])
+    return np.rad2deg(averaged)

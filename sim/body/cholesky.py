@@ -1,7 +1,7 @@
-"""Cholesky factors of small symmetric positive definite matrices, in place: no call of LAPACK in a tick.
+"""Cholesky factors of small symmetric positive definite matrices, in place, without calls of LAPACK in a control tick.
 
-`mju_cholFactor` and `mju_cholSolve` would take 0.60 µs for a leg's nine equations instead of 0.69, with the same
-result; but they take whole matrices, not blocks of a larger one, and no column of several right sides.
+`mju_cholFactor` and `mju_cholSolve` give the same result and take 0.60 µs instead of 0.69 for a leg's nine equations,
+but they accept neither a block of a larger matrix nor a column of several right-hand sides.
 """
 
 import numpy as np

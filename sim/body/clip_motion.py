@@ -17,7 +17,7 @@ from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.motion.clip import CLOSES, Clip
 
-_MARGIN = 8  # frames of the neighbouring laps beyond both ends: the cubic spline's ends decay by 0.27 a frame, to 3e-5
+_N_MARGIN_FRAMES = 8  # of the neighbouring laps at each end: the effect of a spline's end decays to 0.27⁸ = 3e-5
 
 
 class ClipMotion(NamedTuple):
@@ -40,7 +40,7 @@ class ClipMotion(NamedTuple):
 
 
 def clip_motion(clip: Clip, times: Array) -> ClipMotion:
-    """Sample a clip. A closed clip is repeated, each lap displaced by the clip's travel; another holds its last pose.
+    """Sample a clip. A closed clip is repeated, each lap displaced by the clip's travel; any other holds its last pose.
 
     Parameters
     ----------
@@ -58,31 +58,31 @@ def clip_motion(clip: Clip, times: Array) -> ClipMotion:
     shape = (n, -1, 4)
     q, dq, ddq = s[:, 3:].reshape(shape), ds[:, 3:].reshape(shape), dds[:, 3:].reshape(shape)
     square = np.sum(q * q, axis=-1, keepdims=True)
-    omega = 2.0 * _relative(q, dq) / square
-    alpha = 2.0 * _relative(q, ddq) / square - 2.0 * np.sum(q * dq, axis=-1, keepdims=True) / square * omega
+    omega = 2.0 * _relative_vector(q, dq) / square
+    alpha = 2.0 * _relative_vector(q, ddq) / square - 2.0 * np.sum(q * dq, axis=-1, keepdims=True) / square * omega
     poses[:, 3:] = (q / np.sqrt(square)).reshape(n, -1)
     velocities[:, 3:], accelerations[:, 3:] = omega.reshape(n, -1), alpha.reshape(n, -1)
     return ClipMotion(times, poses, velocities, accelerations)
 
 
-def _relative(q: Array, r: Array) -> Array:
+def _relative_vector(q: Array, r: Array) -> Array:
     """Vector part of the quaternion product q̄ r, shape (..., 3)."""
     return q[..., :1] * r[..., 1:] - r[..., :1] * q[..., 1:] - np.cross(q[..., 1:], r[..., 1:])
 
 
 def _frames(clip: Clip, end: float) -> tuple[Array, int]:
     """Frames from before time 0 to beyond `end` [s], and the index of the frame at time 0."""
-    wanted = int(np.ceil(end * clip.fps)) + _MARGIN + 1
+    n_needed = int(np.ceil(end * clip.fps)) + _N_MARGIN_FRAMES + 1
     if not clip.closes(CLOSES):
-        held = np.repeat(clip.poses[-1:], max(wanted - clip.n_frames, 1), axis=0)
-        return np.concatenate((clip.poses, held)), 0
+        held_frames = np.repeat(clip.poses[-1:], max(n_needed - clip.n_frames, 1), axis=0)
+        return np.concatenate((clip.poses, held_frames)), 0
     lap = clip.poses[:-1]
     laps = [lap]
-    while sum(map(len, laps)) < wanted:
+    while sum(map(len, laps)) < n_needed:
         laps.append(clip.displacement.moved(laps[-1]))
-    back = clip.displacement.inverse().moved(lap)
-    margin = min(_MARGIN, len(lap))
-    frames = np.concatenate((back[len(back) - margin :], *laps))
+    previous_lap = clip.displacement.inverse().moved(lap)
+    margin = min(_N_MARGIN_FRAMES, len(lap))
+    frames = np.concatenate((previous_lap[len(previous_lap) - margin :], *laps))
     rotations = frames[:, 3:].reshape(len(frames), -1, 4)
     flips = np.sign(np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True))
     rotations[1:] *= np.cumprod(np.where(flips == 0.0, 1.0, flips), axis=0)

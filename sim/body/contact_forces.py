@@ -11,7 +11,7 @@ unloaded gradually. The optimality conditions are x_j = s_j max(0, a_jᵀ y) wit
 .. math:: y + \sum_j s_j \max(0, a_j^T y)\, a_j = b ,
 
 the stationarity condition of a strictly convex, piecewise quadratic function of y ∈ R⁶. Newton's method with exact
-Hessians ends in a handful of steps however many edges there are, and y is the wrench that the ground cannot give.
+Hessians takes a handful of steps however many edges there are, and y is the wrench that the ground cannot provide.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ from controllers.work_array import work_array
 from sim.body.cholesky import factor, substitute
 
 N_EDGES = 4  # edges of a linearised friction cone
-_STEPS = 40  # most Newton steps; a handful is usual
-_TOLERANCE = 1e-10  # of the gradient's norm, in units of b, which is of order one: far below a residual that matters
+_MAX_NEWTON_STEPS = 40  # a handful is usual
+_TOLERANCE = 1e-10  # on the norm of the gradient, in units of b (of order one): far below any residual of interest
 
 
 @njit
@@ -50,7 +50,7 @@ def cone_edges(point: Array, friction: float, edges: Array) -> None:
 
 @njit
 def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, force: Array) -> int:
-    """Forces along cone edges that give a wrench as nearly as their shares allow (see the module's equations).
+    """Forces along cone edges that come as near to a wrench as their shares allow (see the module's equations).
 
     Parameters
     ----------
@@ -68,13 +68,13 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
     Returns
     -------
     int
-        Newton steps taken, at most `_STEPS`.
+        Newton steps taken, at most `_MAX_NEWTON_STEPS`.
     """
     n = share.size
     H, step, gradient, trial = work_array((6, 6)), work_array(6), work_array(6), work_array(6)
     slope = 0.0
-    for taken in range(_STEPS):
-        value = _stationarity(edges, share, wrench, residual, force, H, step)
+    for taken in range(_MAX_NEWTON_STEPS):
+        value = _differentiate_dual(edges, share, wrench, residual, force, H, step)
         norm = 0.0
         for i in range(6):
             norm += step[i] * step[i]
@@ -87,18 +87,18 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
         length = 1.0
         for i in range(6):
             trial[i] = residual[i] - step[i]
-        while _dual(edges, share, wrench, trial) > value + 1e-4 * length * slope + 1e-15 and length > 1e-6:
+        while _dual_value(edges, share, wrench, trial) > value + 1e-4 * length * slope + 1e-15 and length > 1e-6:
             length *= 0.5
             for i in range(6):
                 trial[i] = residual[i] - length * step[i]
         residual[:] = trial
     for j in range(n):
         force[j] = share[j] * max(0.0, np.dot(edges[j], residual))
-    return _STEPS
+    return _MAX_NEWTON_STEPS
 
 
 @njit
-def _stationarity(
+def _differentiate_dual(
     edges: Array, share: Array, wrench: Array, y: Array, force: Array, H: Array, gradient: Array
 ) -> float:
     """Value, gradient and generalised Hessian of the dual function at y; leaves x in `force`."""
@@ -113,13 +113,13 @@ def _stationarity(
         force[j] = 0.0
         if share[j] <= 0.0:
             continue
-        reach = 0.0
+        edge_residual = 0.0
         for i in range(6):
-            reach += edges[j, i] * y[i]
-        if reach <= 0.0:
+            edge_residual += edges[j, i] * y[i]
+        if edge_residual <= 0.0:
             continue
-        force[j] = share[j] * reach
-        value += 0.5 * force[j] * reach
+        force[j] = share[j] * edge_residual
+        value += 0.5 * force[j] * edge_residual
         for i in range(6):
             gradient[i] += force[j] * edges[j, i]
             for k in range(i + 1):
@@ -128,15 +128,15 @@ def _stationarity(
 
 
 @njit
-def _dual(edges: Array, share: Array, wrench: Array, y: Array) -> float:
+def _dual_value(edges: Array, share: Array, wrench: Array, y: Array) -> float:
     value = 0.0
     for i in range(6):
         value += y[i] * (0.5 * y[i] - wrench[i])
     for j in range(share.size):
         if share[j] > 0.0:
-            reach = 0.0
+            edge_residual = 0.0
             for i in range(6):
-                reach += edges[j, i] * y[i]
-            if reach > 0.0:
-                value += 0.5 * share[j] * reach * reach
+                edge_residual += edges[j, i] * y[i]
+            if edge_residual > 0.0:
+                value += 0.5 * share[j] * edge_residual * edge_residual
     return value

@@ -25,12 +25,12 @@ from sim.reference.reference_state import CompiledReference
 
 BodyState: TypeAlias = FigureState | RobotState | KinematicFigure | NoFigure
 
-_DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotState: robot_torque}
+_TORQUE_FUNCTIONS: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotState: robot_torque}
 
 
 def drive_unit(body: FigureState | RobotState) -> Unit:
     """The unit that sets a body's torques for the reference pose, velocity and acceleration of a control tick."""
-    return Unit.of(_DRIVES[type(body)], Lent(typeof(body)), VECTOR, VECTOR, VECTOR)
+    return Unit.of(_TORQUE_FUNCTIONS[type(body)], Lent(typeof(body)), VECTOR, VECTOR, VECTOR)
 
 
 def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, ...]:
@@ -58,28 +58,29 @@ def follow(units: IntArray, body: BodyState, reference: CompiledReference, argum
     raise NotImplementedError("compiled code only")
 
 
-def _follow_in_physics(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
+def _update_and_drive(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0 or units[1] == 0:
         raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
     call_as_given(units[0], (lend(reference), argument, trace))
     call_as_given(units[1], (lend(body), reference.pose, reference.velocity, reference.acceleration))
 
 
-def _show(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
+def _update_reference(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0:
         raise SimError("what updates the figure is not compiled; take the servo's `linked`")
     call_as_given(units[0], (lend(reference), argument, trace))
 
 
-def _stay_away(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
+def _do_nothing(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     pass
 
 
-_FOLLOWS: dict[type, Any] = {
-    FigureState: _follow_in_physics, RobotState: _follow_in_physics, KinematicFigure: _show, NoFigure: _stay_away,
+_FOLLOW_BY_TYPE: dict[type, Any] = {
+    FigureState: _update_and_drive, RobotState: _update_and_drive, KinematicFigure: _update_reference,
+    NoFigure: _do_nothing,
 }  # fmt: skip
 
 
 @overload(follow, strict=False)
-def _follow(units: Any, body: Any, reference: Any, argument: Any, trace: Any) -> Any:
-    return _FOLLOWS[body.instance_class]
+def _select_follow(units: Any, body: Any, reference: Any, argument: Any, trace: Any) -> Any:
+    return _FOLLOW_BY_TYPE[body.instance_class]

@@ -1,15 +1,15 @@
 r"""Fall detection and recovery: a fallen figure lies for a second and is then set back onto the animation.
 
 The figure has fallen when trunk, head or legs touch the floor while the reference has them well above it, or when it
-touches the floor with its root half a metre from the reference's. Its motors are then off. When it has lain for
-`LIES`, it tracks for `RISES` an interpolation from the pose (p₀, R₀) in which it lay to the reference (p, R), of the
-root's position p and of every rotation R, whose offset from the reference decays:
+touches the floor with its root half a metre from the reference's. Its motors are then off. After lying for
+`LIES`, it tracks for `RISES` an interpolation from the pose (p₀, R₀) in which it lay to the reference (p, R). The
+position p of the root is interpolated, and the offset of every rotation R from the reference decays:
 
 .. math:: p(u) = p_0 + S(u)\,(p - p_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad
           R(u) = R\,\exp((1 - S(u))\,\log(R^T R_0)|_{u=0}) , \qquad 0 \le u \le 1 ,
 
 with the smooth step S and an additional height h for foot clearance. Meanwhile an unbounded wrench at the root carries
-the figure; it is recorded as the residual, and this time is left out of all measures of the figure.
+the figure. It is recorded as the residual, and this time is excluded from all measures of the figure.
 """
 
 from typing import NamedTuple
@@ -24,13 +24,15 @@ from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTAC
 from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 
 UP, DOWN, SET_BACK = 0.0, 1.0, 2.0
-TOUCHES = 2e-3  # [m] height below which a body touches the floor: MuJoCo's contacts are about as soft
+TOUCHES = 2e-3  # [m] height below which a body touches the floor: about the softness of MuJoCo's contacts
 FALLEN = 0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
-LIES, RISES = 1.0, 1.0  # [s] of lying on the floor, and of the way back onto the animation
-_HELD_ABOVE = 0.05  # [m] height from which a body of the reference is clear of the floor; a standing shank is at 0.058
+LIES, RISES = 1.0, 1.0  # [s] duration of lying on the floor, and of the return to the animation
+_REFERENCE_CLEARANCE = (
+    0.05  # [m] height above which a reference body is clear of the floor; a standing shank is at 0.058
+)
 _CLEARANCE = 0.25  # [m] h at the default stature; the interpolation alone takes the feet 0.15 m below the floor
-_MODE, _SINCE, _FALLS = 0, 1, 2  # places in `FallState.state`
-_ARMS = ("clavicle", "arm", "forearm", "hand")  # left out: a figure that props itself on a hand has not fallen
+_MODE, _MODE_TIME, _FALL_COUNT = 0, 1, 2  # indices in `FallState.state`
+_ARM_SEGMENTS = ("clavicle", "arm", "forearm", "hand")  # left out: a figure that props itself on a hand has not fallen
 _SPHERE, _CAPSULE = int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE)
 
 
@@ -50,7 +52,7 @@ class FallState(NamedTuple):
     pos, mat, twin_pos, twin_mat : Array
         Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the twin.
     state : Array
-        `UP`, `DOWN` or `SET_BACK`; time that it has lain or been set back [s]; number of falls; shape (3,).
+        `UP`, `DOWN` or `SET_BACK`; time spent lying or being set back [s]; number of falls; shape (3,).
     lying, way : Array
         p₀ (3,), and the tangent from the reference pose to the pose in which it lay, at that time (57,).
     target, before, velocity, still : Array
@@ -77,7 +79,7 @@ class FallState(NamedTuple):
 
 
 @njit
-def _lowest(kind: int, size: Array, pos: Array, mat: Array) -> float:
+def _lowest_height(kind: int, size: Array, pos: Array, mat: Array) -> float:
     """Lowest height of a sphere z − r, capsule z − r − ℓ|d_z| or ellipsoid z − ‖s d‖; d: the vertical in its frame."""
     if kind == _SPHERE:
         return pos[2] - size[0]
@@ -103,27 +105,27 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
     """
     state, lowest, fallen = fall.state, sole, False
     if state[_MODE] == SET_BACK:
-        state[_SINCE] += fall.period
-        if state[_SINCE] > RISES:
+        state[_MODE_TIME] += fall.period
+        if state[_MODE_TIME] > RISES:
             state[_MODE] = UP
         return state[_MODE]
     for k in range(fall.geoms.shape[0]):
         kind, size, geom, twin = fall.kinds[k], fall.sizes[k], fall.geoms[k], fall.twin_geoms[k]
-        height = _lowest(kind, size, fall.pos[geom], fall.mat[geom])
+        height = _lowest_height(kind, size, fall.pos[geom], fall.mat[geom])
         lowest = min(lowest, height)
-        if height < 0.0 and _lowest(kind, size, fall.twin_pos[twin], fall.twin_mat[twin]) > _HELD_ABOVE:
+        if height < 0.0 and _lowest_height(kind, size, fall.twin_pos[twin], fall.twin_mat[twin]) > _REFERENCE_CLEARANCE:
             fallen = True
     touches = lowest < TOUCHES
     if state[_MODE] == UP:
-        away = np.sqrt((pose[0] - q_r[0]) ** 2 + (pose[1] - q_r[1]) ** 2 + (pose[2] - q_r[2]) ** 2)
-        if fallen or (touches and away > FALLEN):
-            state[_MODE], state[_SINCE] = DOWN, 0.0
-            state[_FALLS] += 1.0
+        root_distance = np.sqrt((pose[0] - q_r[0]) ** 2 + (pose[1] - q_r[1]) ** 2 + (pose[2] - q_r[2]) ** 2)
+        if fallen or (touches and root_distance > FALLEN):
+            state[_MODE], state[_MODE_TIME] = DOWN, 0.0
+            state[_FALL_COUNT] += 1.0
         return state[_MODE]
     if touches:
-        state[_SINCE] += fall.period
-    if state[_SINCE] > LIES:
-        state[_MODE], state[_SINCE] = SET_BACK, 0.0
+        state[_MODE_TIME] += fall.period
+    if state[_MODE_TIME] > LIES:
+        state[_MODE], state[_MODE_TIME] = SET_BACK, 0.0
         fall.lying[:] = pose[:3]
         fall.before[:] = pose
         mj_differentiate_pos(model, fall.way.ctypes, 1.0, q_r.ctypes, pose.ctypes)
@@ -136,7 +138,7 @@ def follow_back(model: int, fall: FallState, q_r: Array) -> None:
 
     `model` is the address of the twin's model.
     """
-    u = fall.state[_SINCE] / RISES
+    u = fall.state[_MODE_TIME] / RISES
     share = smooth_step(u)
     fall.target[:] = q_r
     mj_integrate_pos(model, fall.target.ctypes, fall.way.ctypes, 1.0 - share)
@@ -152,15 +154,15 @@ def fall_state(
     period: float, stature: float,
 ) -> FallState:  # fmt: skip
     """The state of a figure that has not fallen; for the arguments see `sim.body.figure.Figure`."""
-    own = [
+    body_geoms = [
         geom
         for geom in range(twin.ngeom)
         if twin.geom_conaffinity[geom]
         and twin.geom(geom).name not in FOOT_CONTACTS + HAND_CONTACTS
-        and not twin.body(twin.geom_bodyid[geom]).name.endswith(_ARMS)
+        and not twin.body(twin.geom_bodyid[geom]).name.endswith(_ARM_SEGMENTS)
     ]
     first = int(model.body_geomadr[model.body(prefix + twin.body(1).name).id]) - int(twin.body_geomadr[1])
-    geoms = np.array(own, dtype=np.int64)
+    geoms = np.array(body_geoms, dtype=np.int64)
     return FallState(
         period=period, clearance=_CLEARANCE * stature / DEFAULT_STATURE, geoms=geoms + first, twin_geoms=geoms,
         kinds=twin.geom_type[geoms].astype(np.int64), sizes=twin.geom_size[geoms].copy(), pos=data.geom_xpos,

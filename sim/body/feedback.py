@@ -49,7 +49,7 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
     """Write a* = a_r + 2ω (v_r − v) + ω² (q_r ⊖ q) to `s.acceleration`.
 
     Angular v_r and a_r are rotated by the orientation error from the reference's frame to that of the joint. Errors
-    and accelerations are saturated by the gains.
+    and accelerations are saturated at the limits in the gains.
 
     Parameters
     ----------
@@ -59,25 +59,25 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
         Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
     """
     a, gains = s.acceleration, s.gains
-    error, moved = s.rotation[0], s.rotation[1]
+    error, rotated = s.rotation[0], s.rotation[1]
     rate = gains.root_rate
     for i in range(3):
         a[i] = 2.0 * rate * (v_r[i] - s.qvel[i]) + rate**2 * (q_r[i] - s.qpos[i])
     shorten(a[:3], gains.root_pull)
-    moved[:] = a_r[:3]
-    shorten(moved, gains.linear_limit)
-    a[:3] += moved
+    rotated[:] = a_r[:3]
+    shorten(rotated, gains.linear_limit)
+    a[:3] += rotated
     for body in range(s.xpos.shape[0]):
         rate = gains.root_rate if body == 0 else gains.joint_rate
         p, t = 3 + 4 * body, 3 + 3 * body
         rotation_error(s.qpos[p : p + 4], q_r[p : p + 4], error)
-        turned(error, v_r[t : t + 3], moved)
+        turned(error, v_r[t : t + 3], rotated)
         size = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-        pull = rate**2 * min(1.0, gains.joint_reach / max(size, 1e-12))
+        stiffness = rate**2 * min(1.0, gains.joint_reach / max(size, 1e-12))
         for i in range(3):
-            a[t + i] = 2.0 * rate * (moved[i] - s.qvel[t + i]) + pull * error[i]
+            a[t + i] = 2.0 * rate * (rotated[i] - s.qvel[t + i]) + stiffness * error[i]
         if body == 0:
             shorten(a[3:6], gains.root_turn)
-        turned(error, a_r[t : t + 3], moved)
-        shorten(moved, gains.angular_limit)
-        a[t : t + 3] += moved
+        turned(error, a_r[t : t + 3], rotated)
+        shorten(rotated, gains.angular_limit)
+        a[t : t + 3] += rotated

@@ -12,10 +12,10 @@ contact forces,
 .. math:: (M a^* + c)_r = J_r^T f + w ,
 
 met by f within the friction cones of the points in contact (`sim.body.contact_forces`). The residual wrench w is the
-rest, bounded in proportion to the support, and zero while the reference flies or nothing touches the floor: then the
-root falls freely. The torques follow from the other 51 rows. Where a motor would exceed its limit, its joint's
-acceleration is reduced to what the limit allows and the plan is made again; torque that saturated joints of a standing
-leg lack becomes residual too. No spring holds the root. A figure that falls is set back (`sim.body.falls`).
+rest. It is bounded in proportion to the support, and zero while the reference flies or nothing touches the floor: then
+the root falls freely. The torques follow from the other 51 rows. Where a motor would exceed its limit, its joint's
+acceleration is reduced to what the limit allows and the plan is repeated; torque that saturated joints of a standing
+leg lack is added to the residual. No spring holds the root. A figure that falls is set back (`sim.body.falls`).
 """
 
 from dataclasses import dataclass, field
@@ -50,9 +50,9 @@ from sim.errors import SimError
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
-# Share of the coefficient of friction that contact forces are planned with: with 0.7 and 1.0 the residual of walk, run
-# and jump moves by 0.3 % of weight at most (the jump's: 3.1 and 2.7, with 0.9 2.8).
-_RELIED_ON = 0.9
+# Share of the coefficient of friction with which contact forces are planned. With 0.7 or 1.0 the residual of walk, run
+# and jump changes by at most 0.3 % of weight (jump: 3.1 and 2.7 %, instead of 2.8 with 0.9).
+_PLANNED_FRICTION_RATIO = 0.9
 _N_MOTORS = N_TANGENT - 6
 _MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")
 
@@ -83,7 +83,7 @@ class Figure:
     Raises
     ------
     SimError
-        If the world has no figure of that prefix, or a gain is not finite and positive (those of `_MAY_BE_ZERO`: ≥ 0).
+        If the world has no figure with that prefix, or a gain is not finite and positive (`_MAY_BE_ZERO`: ≥ 0).
     """
 
     model: mujoco.MjModel
@@ -98,8 +98,8 @@ class Figure:
     def __post_init__(self) -> None:
         for name, value in self.gains._asdict().items():
             if not (np.isfinite(value) and value >= 0.0) or (value == 0.0 and name not in _MAY_BE_ZERO):
-                may = ", may be 0" if name in _MAY_BE_ZERO else " > 0"
-                raise SimError(f"FigureGains.{name} is {value}; expected a finite number{may}")
+                condition = ", may be 0" if name in _MAY_BE_ZERO else " > 0"
+                raise SimError(f"FigureGains.{name} is {value}; expected a finite number{condition}")
         object.__setattr__(self, "twin_data", mujoco.MjData(self.twin))
         object.__setattr__(self, "state", self._state())
 
@@ -145,7 +145,7 @@ class Figure:
             legs=np.array(legs), torque_limit=m.actuator_ctrlrange[motors, 1].copy(),
             weight=float(m.body_subtreemass[body]) * float(np.linalg.norm(m.opt.gravity)),
             stature=stature, radius=radius,
-            friction=_RELIED_ON * float(m.geom_friction[spheres[0], 0]),
+            friction=_PLANNED_FRICTION_RATIO * float(m.geom_friction[spheres[0], 0]),
             acceleration=np.zeros(N_TANGENT), wanted_root=np.zeros(6), rotation=np.zeros((2, 3)), loaded=np.zeros(2),
             share=np.zeros(n), near=np.zeros(n), points=np.zeros((n, 3)), edges=np.zeros((N_EDGES * n, 6)),
             edge_share=np.zeros(N_EDGES * n), edge_force=np.zeros(N_EDGES * n), scaled=np.zeros(6),

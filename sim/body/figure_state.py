@@ -10,7 +10,7 @@ from sim.body.mass_matrix import MassMatrix
 N_FOOT = 4  # contact points of a foot
 
 REPORT_SUPPORT, REPORT_SATURATED, REPORT_RESIDUAL, REPORT_FLIES, REPORT_DOWN, REPORT_SIZE = 0, 1, 2, 8, 9, 10
-"""Places in a figure's report: support (0 while the reference flies or nothing touches the floor), number of saturated
+"""Indices in a figure's report: support (0 while the reference flies or nothing touches the floor), number of saturated
 motors, residual (6), 1 while the reference flies, and the mode: 1 while the figure lies after a fall, 2 while it is set
 back, else 0."""
 
@@ -27,44 +27,44 @@ class FigureGains(NamedTuple):
         that is led retraces its path less exactly.
     joint_reach : float
         Joint error at which the feedback saturates [rad]: a larger error decays at a constant speed, ω/2 times this, so
-        that the motors have torque left to stop the joint. Half or twice changes the residual of walk, run
-        and jump by 0.1 % of weight at most.
+        that the motors have torque left to stop the joint. Half or twice the value changes the residual of walk, run
+        and jump by at most 0.1 % of weight.
     root_pull, root_turn : float
         Largest linear and angular acceleration that feedback may ask of the root [m/s²], [rad/s²], so that a late
-        landing is absorbed. Half or twice leaves the residual of walk, run and jump.
+        landing is absorbed. Half or twice the values leave the residual of walk, run and jump unchanged.
     linear_limit, angular_limit : float
-        Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is rough. Half or twice of the
-        first leaves the residual of walk, run and jump; half of the second raises the last two by 0.8 and 1.8 %.
+        Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is noisy. Half or twice the
+        first leaves the residual of walk, run and jump unchanged; half the second raises the last two by 0.8 and 1.8 %.
     force_bound, moment_bound : float
-        Largest residual force as a share of body weight, and moment as a share of body weight × stature: the least
-        values tried with which every motion that should stand does (docs/validation/residual-bounds.md).
+        Largest residual force as a share of body weight, and moment as a share of body weight × stature: the
+        smallest values tried with which every motion that should stand does (docs/validation/residual-bounds.md).
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
-        Half or twice of the first changes the residual of walk, run and jump by 0.1 % of weight at most; of the second,
-        that of the jump by 0.5 and 0.3 %.
+        Half or twice the first changes the residual of walk, run and jump by at most 0.1 % of weight; half or twice
+        the second changes that of the jump by 0.5 and 0.3 %.
     settling_reach : float
-        As `contact_reach`, for a point of a foot that bears load on another point [m]: a point about to be set down is
-        planned with, since otherwise the ankle would hold it up. Half or twice changes the residual of walk, run
-        and jump by 0.1 % of weight at most.
+        As `contact_reach`, for a point of a foot that bears load on another point [m]: the plan includes a point
+        about to touch down, since otherwise the ankle would hold it up. Half or twice the value changes the residual of
+        walk, run and jump by at most 0.1 % of weight.
     stance_height : float
-        Height of a contact point of the reference from which it is no longer in stance [m]. With half of it the
-        residual of walk, run and jump is 0.6, 1.8 and 2.9 % of weight, with twice 0.8, 2.2 and 6.3 (here 0.6, 1.7 and
-        2.8).
+        Height of a contact point of the reference from which it is no longer in stance [m]. The residual of walk,
+        run and jump is 0.6, 1.7 and 2.8 % of weight; with half the value 0.6, 1.8 and 2.9, with twice 0.8, 2.2 and
+        6.3.
     swing_speed : float
         Horizontal speed of a low contact point of the reference from which it is in swing, not in stance [m/s]. Half
-        or twice changes the residual of walk, run and jump by 0.1 % of weight at most.
+        or twice the value changes the residual of walk, run and jump by at most 0.1 % of weight.
     flight_height : float
         The reference flies, and no residual is applied, while all its contact points are higher than this [m]. With
-        half or twice of it the residual of the jump is 3.2 or 2.4 % of weight instead of 2.8.
+        half or twice the value the residual of the jump is 3.2 or 2.4 % of weight instead of 2.8.
     lift_time, unload_time : float
         Prediction times for contact points of the reference that are about to leave the floor: into a flight, and while
-        others bear the load (`sim.body.support`) [s]. Half or twice of the first changes the residual of walk, run and
-        jump by 0.2 % of weight at most; with half of the second they are 0.9, 2.9 and 5.3 %, with twice 0.8, 1.8 and
-        3.1. Of twelve captures 0.04 to 0.07 s hardly differ.
+        others bear the load (`sim.body.support`) [s]. Half or twice the first changes the residual of walk, run and
+        jump by at most 0.2 % of weight; with half the second the residuals are 0.9, 2.9 and 5.3 %, with twice 0.8, 1.8
+        and 3.1. On twelve captures, values from 0.04 to 0.07 s hardly differ.
     placement_reach : float
         Largest horizontal displacement of a foot in flight from its place relative to the root towards its place in the
         world (`sim.body.foot_placement`) [m]. Without it the residual of animated_drawings/jumping is 12.6 % of
-        weight, with 8 cm 7.0; half or twice changes that of the jump by 0.5 % at most.
+        weight, with 8 cm 7.0; half or twice the value changes that of the jump by at most 0.5 %.
     """
 
     joint_rate: float = 40.0
@@ -88,7 +88,7 @@ class FigureGains(NamedTuple):
 
 
 CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)
-"""Gains for a clip at its own pace: the least bounds with which the embedded clips stand
+"""Gains for a clip at its own pace: the smallest bounds with which the embedded clips stand
 (docs/validation/residual-bounds.md)."""
 
 
@@ -115,7 +115,7 @@ class FigureState(NamedTuple):
     torque_limit : Array
         Torque limits of the motors [N m], shape (51,).
     weight, stature, radius, friction : float
-        Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction that is planned with.
+        Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction in the plan.
     acceleration, wanted_root : Array
         Planned acceleration (57), and the wanted acceleration of the root before contacts are planned (6).
     loaded : Array
@@ -130,7 +130,7 @@ class FigureState(NamedTuple):
     lost, yielding : Array
         Torque beyond each motor's limit [N m], and 1 where the joint's acceleration is reduced, shape (51,).
     report : Array
-        See `REPORT_SUPPORT` and what follows it, shape (10,).
+        See `REPORT_SUPPORT` and the indices beside it, shape (10,).
     fall : FallState
         State of fall detection and recovery.
     """

@@ -9,7 +9,7 @@ in flight the joints of each leg are displaced by
 where p_r are the contact points of the foot in the reference, T is the displacement from the reference's root to the
 figure's, and H takes the horizontal part (corrections of height would bend or stretch the leg far). σ ≤ 1 bounds the
 displacement by `placement_reach`, since legs that swing far turn the root the other way. σ also fades to zero as the
-line from root to foot goes from 26 to 60° off the plumb line: in a somersault no foot is about to land. ω² δ + 2ω δ' is
+line from root to foot goes from 26 to 60° off the vertical: in a somersault no foot is about to land. ω² δ + 2ω δ' is
 added to the wanted acceleration of the leg, δ' being the solution for the rate of the root's error.
 """
 
@@ -23,16 +23,16 @@ from sim.body.cholesky import factor, substitute
 from sim.body.figure_state import N_FOOT, FigureState
 from sim.body.stance import N_LEG, cross_add
 
-_CLOSENESS = 300.0  # κ [1/m²]: within 1 % of the displacement, and δ stays bounded where a leg is straight
-_ASIDE, _UNDER = 0.5, 0.9
-"""Cosines of the angle between the line from root to foot and the plumb line at which placement begins and is full.
-As captures were read then, the residual of snu/backflip is 8.7 % of weight without this fading, with it 8.1 (no
-placement: 8.2), that of jumping 5.4 and 7.0 (12.6)."""
+_PLACEMENT_WEIGHT = 300.0  # κ [1/m²]: displacements are met within 1 %, and δ stays bounded where a leg is straight
+_START_COSINE, _FULL_COSINE = 0.5, 0.9
+"""Cosines of the angle between the line from root to foot and the vertical at which placement begins and is full.
+Without this fading, with it and without placement, the residual of snu/backflip is 8.7, 8.1 and 8.2 % of weight, that
+of jumping 5.4, 7.0 and 12.6 (measured on an earlier import of the captures)."""
 
 
 @njit
 def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
-    """Amend the wanted accelerations of both legs of a figure in flight.
+    """Correct the wanted accelerations of both legs of a figure in flight.
 
     Parameters
     ----------
@@ -41,45 +41,52 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
     q_r, v_r : Array
         Reference pose (75) and velocity (57), in the conventions of qpos and qvel.
     """
-    away, drift, offset, rate = work_array((N_FOOT, 3)), work_array((N_FOOT, 3)), work_array(N_LEG), work_array(N_LEG)
+    shift, drift, offset, rate = (
+        work_array((N_FOOT, 3)),
+        work_array((N_FOOT, 3)),
+        work_array(N_LEG),
+        work_array(N_LEG),
+    )
     omega = s.gains.joint_rate
     for leg in range(2):
-        _displacements(s, q_r, v_r, leg, away, drift)
-        _leg_for(s.legs[leg], s.points[N_FOOT * leg : N_FOOT * leg + N_FOOT], s.xpos, s.xmat, away, drift, offset, rate)
+        _contact_displacements(s, q_r, v_r, leg, shift, drift)
+        _leg_displacement(
+            s.legs[leg], s.points[N_FOOT * leg : N_FOOT * leg + N_FOOT], s.xpos, s.xmat, shift, drift, offset, rate
+        )
         for k in range(N_LEG):
             s.acceleration[3 + 3 * s.legs[leg, k // 3] + k % 3] += omega * (omega * offset[k] + 2.0 * rate[k])
 
 
 @njit
-def _displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, away: Array, drift: Array) -> None:
+def _contact_displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, shift: Array, drift: Array) -> None:
     """Write the wanted displacements of a foot's contact points, σ (p_r − T p_r) (4, 3) [m], and their rates [m/s]."""
-    R, turn, arm = s.xmat[0], work_array(3), work_array(3)
-    turning = rotate(q_r[3], q_r[4], q_r[5], q_r[6], v_r[3], v_r[4], v_r[5])
+    R, spin, arm = s.xmat[0], work_array(3), work_array(3)
+    reference_rate = rotate(q_r[3], q_r[4], q_r[5], q_r[6], v_r[3], v_r[4], v_r[5])
     for i in range(3):
-        turn[i] = turning[i] - (R[3 * i] * s.qvel[3] + R[3 * i + 1] * s.qvel[4] + R[3 * i + 2] * s.qvel[5])
+        spin[i] = reference_rate[i] - (R[3 * i] * s.qvel[3] + R[3 * i + 1] * s.qvel[4] + R[3 * i + 2] * s.qvel[5])
     for p in range(N_FOOT):
-        there = s.twin_contact_pos[s.twin_contact[N_FOOT * leg + p]]
-        own = rotate(  # the point in the root's frame
-            q_r[3], -q_r[4], -q_r[5], -q_r[6], there[0] - q_r[0], there[1] - q_r[1], there[2] - q_r[2]
+        target = s.twin_contact_pos[s.twin_contact[N_FOOT * leg + p]]
+        local = rotate(  # the point in the root's frame
+            q_r[3], -q_r[4], -q_r[5], -q_r[6], target[0] - q_r[0], target[1] - q_r[1], target[2] - q_r[2]
         )
-        size = 0.0
+        squared_length = 0.0
         for i in range(3):
-            arm[i] = R[3 * i] * own[0] + R[3 * i + 1] * own[1] + R[3 * i + 2] * own[2]
-            away[p, i] = there[i] - s.qpos[i] - arm[i]
+            arm[i] = R[3 * i] * local[0] + R[3 * i + 1] * local[1] + R[3 * i + 2] * local[2]
+            shift[p, i] = target[i] - s.qpos[i] - arm[i]
             drift[p, i] = v_r[i] - s.qvel[i]
-            size += away[p, i] ** 2 if i < 2 else 0.0
-        cross_add(turn, arm, drift[p])
+            squared_length += shift[p, i] ** 2 if i < 2 else 0.0
+        cross_add(spin, arm, drift[p])
         below = -arm[2] / max(np.sqrt(arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2), 1e-12)
-        under = min(1.0, max(0.0, (below - _ASIDE) / (_UNDER - _ASIDE)))
-        share = under * min(1.0, s.gains.placement_reach / max(np.sqrt(size), 1e-12))
+        fade = min(1.0, max(0.0, (below - _START_COSINE) / (_FULL_COSINE - _START_COSINE)))
+        share = fade * min(1.0, s.gains.placement_reach / max(np.sqrt(squared_length), 1e-12))
         for i in range(3):
-            away[p, i] *= share
+            shift[p, i] *= share
             drift[p, i] *= share
 
 
 @njit
-def _leg_for(
-    bodies: IntArray, points: Array, xpos: Array, xmat: Array, away: Array, drift: Array, offset: Array, rate: Array
+def _leg_displacement(
+    bodies: IntArray, points: Array, xpos: Array, xmat: Array, shift: Array, drift: Array, offset: Array, rate: Array
 ) -> None:
     """Write the displacement δ of a leg's joints (9,) [rad] for displacements of its contact points, and its rate."""
     normal, J = work_array((N_LEG, N_LEG)), work_array((3, N_LEG))
@@ -97,10 +104,10 @@ def _leg_for(
             cross_add(axis, arm, J[:, k])
         for k in range(N_LEG):
             for i in range(2):  # the horizontal components only
-                offset[k] += _CLOSENESS * J[i, k] * away[p, i]
-                rate[k] += _CLOSENESS * J[i, k] * drift[p, i]
+                offset[k] += _PLACEMENT_WEIGHT * J[i, k] * shift[p, i]
+                rate[k] += _PLACEMENT_WEIGHT * J[i, k] * drift[p, i]
                 for m in range(k + 1):
-                    normal[k, m] += _CLOSENESS * J[i, k] * J[i, m]
+                    normal[k, m] += _PLACEMENT_WEIGHT * J[i, k] * J[i, m]
     factor(normal)
     substitute(normal, offset)
     substitute(normal, rate)

@@ -13,7 +13,7 @@ from controllers.state import Array, IntArray
 
 
 class MassMatrix(NamedTuple):
-    """M of a set of degrees of freedom of a world that are coupled to no others.
+    """M of those degrees of freedom of a world that are not coupled to any others.
 
     Attributes
     ----------

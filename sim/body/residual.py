@@ -15,7 +15,7 @@ from controllers.state import Array
 from models.mocap.preparation.bounds import beyond
 
 FORCE, MOMENT = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h
-SUPPORTS = 1.0  # [N] vertical ground reaction force from which the ground supports the figure
+SUPPORTS = 1.0  # [N] vertical ground reaction force above which the ground supports the figure
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Residual:
 
     def missed(self) -> tuple[str, ...]:
         """Names of the bounds of Hicks et al. that are exceeded."""
-        kept = {
+        met = {
             "RMS force": self.force_rms <= FORCE,
             "peak force": self.force_max <= FORCE,
             "RMS moment": self.moment_rms <= MOMENT,
             "peak moment": self.moment_max <= MOMENT,
         }
-        return tuple(name for name, is_kept in kept.items() if not is_kept)
+        return tuple(name for name, is_met in met.items() if not is_met)
 
     def verdict(self) -> str:
         """Which of the bounds are met, in words."""
@@ -63,7 +63,7 @@ class Residual:
 
 
 def _percent(share: float, bound: float) -> str:
-    """A share in percent, with the decimals that tell it from a bound that it exceeds."""
+    """A share in percent, with enough decimals to distinguish it from a bound that it exceeds."""
     return beyond(100.0 * share, 100.0 * bound) if share > bound else f"{100.0 * share:.1f}"
 
 
@@ -88,7 +88,7 @@ class ResidualMeasure:
     def summary(self) -> Residual:
         """The residual of all wrenches added so far; zero if there were none."""
         (force, moment), n = self._squares, max(self._count, 1)
-        most = self._largest.tolist()
+        largest = self._largest.tolist()
         return Residual(
-            self._count * self._period, math.sqrt(force / n), most[0], math.sqrt(moment / n), most[1]
+            self._count * self._period, math.sqrt(force / n), largest[0], math.sqrt(moment / n), largest[1]
         )  # fmt: skip

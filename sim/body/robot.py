@@ -116,10 +116,10 @@ def tool_positions(arm: mujoco.MjModel, data: mujoco.MjData, angles: Array) -> A
 
     `arm` is the model of the arm alone, `data` scratch memory of it.
     """
-    places = np.empty((len(angles), 3))
+    positions = np.empty((len(angles), 3))
     for i, q in enumerate(angles):
         data.qpos[:] = q
         mujoco.mj_kinematics(arm, data)
-        places[i] = data.site(TOOL).xpos
-    places[:, 2] += PEDESTAL
-    return places
+        positions[i] = data.site(TOOL).xpos
+    positions[:, 2] += PEDESTAL
+    return positions

@@ -1,7 +1,7 @@
 r"""Legs in stance: a loaded foot rests where it landed, not where the reference has it.
 
-The feedback would drag a foot that landed a centimetre off its reference along the floor, against friction that was not
-planned for. So the wanted accelerations of a leg's nine degrees of freedom are changed by the least δ that brings its
+The feedback would drag a foot that landed a centimetre off its reference along the floor, against friction that the
+plan lacks. So the wanted accelerations of a leg's nine degrees of freedom are changed by the smallest δ that brings its
 contact points to rest on the floor:
 
 .. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p
@@ -18,12 +18,12 @@ from controllers.state import Array, IntArray
 from controllers.work_array import work_array
 from sim.body.cholesky import factor, substitute
 
-# κ, weight of contact points at rest against small δ. Half or twice changes the residual of walk, run and
-# jump by 0.1 % of weight at most; soles slide alike.
-_ADHERENCE = 300.0
-# η [1/s], rate at which a foot is to come to rest on the floor. Half or twice changes the residual of walk, run and
-# jump by 0.1 % of weight at most.
-_SETTLING = 40.0
+# κ, weight of contact points at rest against small δ. Half or twice the value changes the residual of walk, run and
+# jump by at most 0.1 % of weight; foot skate is about the same.
+_CONTACT_WEIGHT = 300.0
+# η [1/s], rate at which a foot comes to rest on the floor. Half or twice the value changes the residual of walk, run
+# and jump by at most 0.1 % of weight.
+_SETTLING_RATE = 40.0
 N_LEG = 9  # degrees of freedom of a leg: three each of hip, knee and ankle
 
 
@@ -36,15 +36,15 @@ def cross_add(a: Array, b: Array, out: Array) -> None:
 
 
 @njit
-def _difference(a: Array, b: Array, out: Array) -> None:
+def _subtract(a: Array, b: Array, out: Array) -> None:
     """Out = a − b."""
     for i in range(3):
         out[i] = a[i] - b[i]
 
 
 @njit
-def _move_chain(
-    bodies: IntArray, xpos: Array, xmat: Array, v: Array, omega: Array, drift: Array, turning: Array
+def _propagate_velocities(
+    bodies: IntArray, xpos: Array, xmat: Array, v: Array, omega: Array, linear_drift: Array, angular_drift: Array
 ) -> None:
     """Angular velocities of root, thigh, shank and foot, and their accelerations due to velocities alone.
 
@@ -52,7 +52,7 @@ def _move_chain(
     `stance_response`.
     """
     relative, arm, spin = work_array(3), work_array(3), work_array(3)
-    omega[:], drift[:], turning[:] = 0.0, 0.0, 0.0
+    omega[:], linear_drift[:], angular_drift[:] = 0.0, 0.0, 0.0
     for level in range(4):
         body = 0 if level == 0 else bodies[level - 1]
         for i in range(3):
@@ -60,27 +60,27 @@ def _move_chain(
             for k in range(3):
                 relative[i] += xmat[body, 3 * i + k] * v[3 + 3 * body + k]
         if level > 0:
-            above = 0 if level == 1 else bodies[level - 2]
+            parent = 0 if level == 1 else bodies[level - 2]
             omega[level] = omega[level - 1]
-            turning[level] = turning[level - 1]
-            cross_add(omega[level - 1], relative, turning[level])
-            _difference(xpos[body], xpos[above], arm)
-            drift[level] = drift[level - 1]
-            cross_add(turning[level - 1], arm, drift[level])
+            angular_drift[level] = angular_drift[level - 1]
+            cross_add(omega[level - 1], relative, angular_drift[level])
+            _subtract(xpos[body], xpos[parent], arm)
+            linear_drift[level] = linear_drift[level - 1]
+            cross_add(angular_drift[level - 1], arm, linear_drift[level])
             spin[:] = 0.0
             cross_add(omega[level - 1], arm, spin)
-            cross_add(omega[level - 1], spin, drift[level])
+            cross_add(omega[level - 1], spin, linear_drift[level])
         for i in range(3):
             omega[level, i] += relative[i]
 
 
 @njit
-def _differentiate_point(bodies: IntArray, point: Array, xpos: Array, xmat: Array, J: Array, J_root: Array) -> None:
+def _point_jacobians(bodies: IntArray, point: Array, xpos: Array, xmat: Array, J: Array, J_root: Array) -> None:
     """Jacobians of a point of the foot, written: by the leg's degrees of freedom (3, 9) and by the root's (3, 6)."""
     axis, arm, spin = work_array(3), work_array(3), work_array(3)
     for level in range(4):
         body = 0 if level == 0 else bodies[level - 1]
-        _difference(point, xpos[body], arm)
+        _subtract(point, xpos[body], arm)
         for k in range(3):
             for i in range(3):
                 axis[i] = xmat[body, 3 * i + k]
@@ -96,28 +96,28 @@ def _differentiate_point(bodies: IntArray, point: Array, xpos: Array, xmat: Arra
 
 
 @njit
-def _resist_drift(arm: Array, omega: Array, drift: Array, turning: Array, result: Array) -> None:
+def _negative_drift(arm: Array, omega: Array, linear_drift: Array, angular_drift: Array, result: Array) -> None:
     """Minus the acceleration due to velocities alone of a point at `arm` from the foot's origin, written to `result`.
 
-    The other arguments are those of the foot in `_move_chain`.
+    The other arguments are those of the foot in `_propagate_velocities`.
     """
     spin, relative = work_array(3), work_array(3)
     spin[:], relative[:] = 0.0, 0.0
     cross_add(omega, arm, spin)
-    cross_add(turning, arm, relative)
+    cross_add(angular_drift, arm, relative)
     cross_add(omega, spin, relative)
     for i in range(3):
-        result[i] = -drift[i] - relative[i]
+        result[i] = -linear_drift[i] - relative[i]
 
 
 @njit
 def _add_point(
-    J: Array, J_root: Array, wanted: Array, level: float, upright: float, offset: Array, response: Array, normal: Array
+    J: Array, J_root: Array, wanted: Array, along: float, upward: float, offset: Array, response: Array, normal: Array
 ) -> None:
-    """Add a point, with its weights along the floor and upwards, to the normal equations and their right sides."""
+    """Add a point, with its weights along the floor and upwards, to the normal equations and their right-hand sides."""
     for k in range(N_LEG):
         for i in range(3):
-            weight = level if i < 2 else upright
+            weight = along if i < 2 else upward
             offset[k] += weight * J[i, k] * wanted[i]
             for m in range(6):
                 response[k, m] -= weight * J[i, k] * J_root[i, m]
@@ -157,23 +157,23 @@ def stance_response(  # noqa: PLR0913 - a kernel takes the arrays of a leg one b
         normal[k] = 0.0
         normal[k, k] = 1.0
     J, J_root, wanted, arm = work_array((3, N_LEG)), work_array((3, 6)), work_array(3), work_array(3)
-    omega, drift, turning = work_array((4, 3)), work_array((4, 3)), work_array((4, 3))
-    _move_chain(bodies, xpos, xmat, v, omega, drift, turning)
+    omega, linear_drift, angular_drift = work_array((4, 3)), work_array((4, 3)), work_array((4, 3))
+    _propagate_velocities(bodies, xpos, xmat, v, omega, linear_drift, angular_drift)
     for p in range(share.shape[0]):
         if near[p] <= 0.0:
             continue
-        _difference(points[p], xpos[bodies[2]], arm)
-        _resist_drift(arm, omega[3], drift[3], turning[3], wanted)
-        _differentiate_point(bodies, points[p], xpos, xmat, J, J_root)
+        _subtract(points[p], xpos[bodies[2]], arm)
+        _negative_drift(arm, omega[3], linear_drift[3], angular_drift[3], wanted)
+        _point_jacobians(bodies, points[p], xpos, xmat, J, J_root)
         for i in range(3):
             for k in range(6):
-                wanted[i] -= J_root[i, k] * (_SETTLING * v[k] + a[k])
+                wanted[i] -= J_root[i, k] * (_SETTLING_RATE * v[k] + a[k])
             for k in range(N_LEG):
                 t = 3 + 3 * bodies[k // 3] + k % 3
-                wanted[i] -= J[i, k] * (_SETTLING * v[t] + a[t])
-        wanted[2] -= (0.5 * _SETTLING) ** 2 * max(0.0, points[p, 2])
-        adherence = _ADHERENCE * near[p]
-        _add_point(J, J_root, wanted, adherence * min(1.0, share[p]), adherence * loaded, offset, response, normal)
+                wanted[i] -= J[i, k] * (_SETTLING_RATE * v[t] + a[t])
+        wanted[2] -= (0.5 * _SETTLING_RATE) ** 2 * max(0.0, points[p, 2])
+        weight = _CONTACT_WEIGHT * near[p]
+        _add_point(J, J_root, wanted, weight * min(1.0, share[p]), weight * loaded, offset, response, normal)
     factor(normal)
     substitute(normal, offset)
     for m in range(6):

@@ -1,15 +1,16 @@
-r"""Support of the physical figure: which contact points bear load, by the reference now and ahead of now.
+r"""Support of the physical figure: which contact points bear load, from the reference now and shortly ahead.
 
 A contact point of the figure bears load if it touches the floor and the reference has it near the floor and at rest,
 now and at a time T ahead, predicted with constant acceleration,
 
 .. math:: q_r(t + T) \approx q_r \oplus \left(v_r T + \tfrac12 a_r T^2\right) .
 
-There are two such times. A point that leaves the floor within `unload_time` is released, and unloaded in favour of
-the others before, so that its leg need not catch up; where no other bears the load, before a flight, it bears load
-until `lift_time` before it leaves. With the longer time alone the legs would stop pushing too soon: with 0.05 s a
-run has 12.0 % of weight instead of 6, and jumping falls. With the shorter time alone a foot that leaves while the other
-stands is held too long: a dance has 4.1 % instead of 1.9, a spin falls (docs/validation/preparation-choices.md).
+There are two such times. A point that will leave the floor within `unload_time` is released, and its load is moved to
+the others before that, so that its leg need not catch up. Where no other point can take the load, before a flight, it
+bears load until `lift_time` before it leaves. With the longer time alone the legs would stop pushing too soon: with
+0.05 s the residual of a run is 12.0 % of weight instead of 6, and jumping falls. With the shorter time alone a foot
+that leaves while the other stands is held too long: a dance has 4.1 % instead of 1.9, and a spin falls
+(docs/validation/preparation-choices.md).
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ from models.humanoid.skeleton import FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT
 from sim.body.figure_state import N_FOOT, REPORT_FLIES, FigureState
 from sim.compilation.native import mj_integrate_pos, mj_kinematics
 
-_N = len(FOOT_CONTACTS + HAND_CONTACTS)
+_N_CONTACTS = len(FOOT_CONTACTS + HAND_CONTACTS)
 
 
 @njit
@@ -39,12 +40,12 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
         Reference pose (75), velocity (57) and acceleration (57).
     """
     gains = s.gains
-    later, soon, brief = work_array((_N, 3)), work_array((_N, 3)), work_array(_N)
-    _predict(s, q_r, v_r, a_r, gains.unload_time, later)
-    _predict(s, q_r, v_r, a_r, gains.lift_time, soon)
+    at_unload, at_lift, lift_share = work_array((_N_CONTACTS, 3)), work_array((_N_CONTACTS, 3)), work_array(_N_CONTACTS)
+    _predict_contacts(s, q_r, v_r, a_r, gains.unload_time, at_unload)
+    _predict_contacts(s, q_r, v_r, a_r, gains.lift_time, at_lift)
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
-    for c in range(_N):
+    for c in range(_N_CONTACTS):
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
     for leg in range(2):
@@ -52,29 +53,29 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
         for c in range(N_FOOT * leg, N_FOOT * leg + N_FOOT):
             s.loaded[leg] = max(s.loaded[leg], _nearness(s.points[c, 2], gains.contact_reach))
     support, lowest = 0.0, np.inf
-    for c in range(_N):
+    for c in range(_N_CONTACTS):
         now = s.twin_contact_pos[s.twin_contact[c]]
         touch = _nearness(s.points[c, 2], gains.contact_reach)
         if c < 2 * N_FOOT:
             touch = max(touch, s.loaded[c // N_FOOT] * _nearness(s.points[c, 2], gains.settling_reach))
-        rests = _rest(now, later[c], gains.unload_time * gains.swing_speed)
-        height = max(now[2], later[c, 2]) - s.radius
-        s.near[c] = rests * _nearness(height, gains.stance_height)
-        s.share[c] = touch * rests * _nearness(height, gains.reference_reach)
-        rests = _rest(now, soon[c], gains.lift_time * gains.swing_speed)
-        height = max(now[2], soon[c, 2]) - s.radius
-        brief[c] = touch * rests * _nearness(height, gains.reference_reach)
+        stillness = _stillness(now, at_unload[c], gains.unload_time * gains.swing_speed)
+        height = max(now[2], at_unload[c, 2]) - s.radius
+        s.near[c] = stillness * _nearness(height, gains.stance_height)
+        s.share[c] = touch * stillness * _nearness(height, gains.reference_reach)
+        stillness = _stillness(now, at_lift[c], gains.lift_time * gains.swing_speed)
+        height = max(now[2], at_lift[c, 2]) - s.radius
+        lift_share[c] = touch * stillness * _nearness(height, gains.reference_reach)
         support = max(support, touch * _nearness(height, gains.flight_height))
         lowest = min(lowest, now[2] - s.radius)
-    lacking = 1.0 - s.share.max()
-    for c in range(_N):
-        s.share[c] += lacking * max(brief[c] - s.share[c], 0.0)
+    missing_share = 1.0 - s.share.max()
+    for c in range(_N_CONTACTS):
+        s.share[c] += missing_share * max(lift_share[c] - s.share[c], 0.0)
     s.report[REPORT_FLIES] = 1.0 if lowest > gains.flight_height else 0.0
     return support
 
 
 @njit
-def _predict(s: FigureState, q_r: Array, v_r: Array, a_r: Array, ahead: float, places: Array) -> None:
+def _predict_contacts(s: FigureState, q_r: Array, v_r: Array, a_r: Array, ahead: float, positions: Array) -> None:
     """Write the contact points of the reference at a time ahead, with constant acceleration, shape (10, 3) [m]."""
     mean = work_array(N_TANGENT)
     for i in range(N_TANGENT):
@@ -82,12 +83,12 @@ def _predict(s: FigureState, q_r: Array, v_r: Array, a_r: Array, ahead: float, p
     s.twin_qpos[:] = q_r
     mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, mean.ctypes, ahead)
     mj_kinematics(s.twin_model, s.twin_data)
-    for c in range(_N):
-        places[c] = s.twin_contact_pos[s.twin_contact[c]]
+    for c in range(_N_CONTACTS):
+        positions[c] = s.twin_contact_pos[s.twin_contact[c]]
 
 
 @njit
-def _rest(now: Array, then: Array, reach: float) -> float:
+def _stillness(now: Array, then: Array, reach: float) -> float:
     """1 for a point that does not move over the floor, 0 for one that moves by `reach` or more."""
     return _nearness(np.sqrt((then[0] - now[0]) ** 2 + (then[1] - now[1]) ** 2), reach)
 

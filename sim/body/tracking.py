@@ -74,7 +74,7 @@ class TrackedMotion(NamedTuple):
     poses : Array
         Poses of the figure, shape (n, 75).
     reports : Array
-        See `sim.body.figure_state.REPORT_SUPPORT` and what follows it, shape (n, 10).
+        See `sim.body.figure_state.REPORT_SUPPORT` and the indices beside it, shape (n, 10).
     contacts : Array
         Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
     ground : Array
@@ -100,7 +100,7 @@ class TrackedMotion(NamedTuple):
 
 @dataclass(frozen=True)
 class TrackingReport:
-    """How the physical figure tracked a clip.
+    """Measures of how the physical figure tracked a clip.
 
     Attributes
     ----------
@@ -109,8 +109,8 @@ class TrackingReport:
     falls : tuple of float
         Times at which the figure fell [s].
     up_seconds : float
-        Time that the figure neither lay nor was set back [s]. All that follows is measured over that time; residuals of
-        a clip that is not repeated only until its end, for the time that it holds its last pose would dilute them.
+        Time that the figure neither lay nor was set back [s]. All that follows is measured over that time; the residual
+        of a clip that is not repeated is measured only until its end, as holding the last pose would dilute it.
     joint_error : float
         RMS over joints and time of the angle between a joint and its reference [deg].
     root_error, root_error_max : float
@@ -156,7 +156,7 @@ class TrackingReport:
 
 
 class _Log(NamedTuple):
-    """What `_simulate` writes: the fields of the same names of `TrackedMotion`."""
+    """Output of `_simulate`: the fields of the same names in `TrackedMotion`."""
 
     poses: Array
     reports: Array
@@ -214,10 +214,10 @@ def tracked_motion(
     log = _Log(np.empty((n, model.nq)), np.empty((n, REPORT_SIZE)), np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3)))
     # The kernel is compiled for contiguous rows, and a call by address does not check the types of its arguments.
     motion = ClipMotion(*map(np.ascontiguousarray, reference))
-    numbers: tuple[Any, ...] = (figure.state, config.control_steps, motion, data.qfrc_constraint[:3], log)
+    arguments: tuple[Any, ...] = (figure.state, config.control_steps, motion, data.qfrc_constraint[:3], log)
     drive = drive_unit(figure.state)
-    ready((drive, Unit.of(_simulate, types.int64, *(typeof(number) for number in numbers))))
-    _simulate(drive.address(), *numbers)
+    ready((drive, Unit.of(_simulate, types.int64, *(typeof(argument) for argument in arguments))))
+    _simulate(drive.address(), *arguments)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
         reference,
@@ -245,7 +245,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
     period = float(times[1] - times[0]) if len(times) > 1 else 0.0
     up = motion.reports[:, REPORT_DOWN] == UP
     falls = times[~up & np.concatenate(([True], up[:-1]))]
-    flies, bears = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > SUPPORTS
+    in_flight, is_supported = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > SUPPORTS
     wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
     difference = pose_difference(motion.poses[up], motion.reference.poses[up])
     angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)
@@ -257,20 +257,20 @@ def report(motion: TrackedMotion) -> TrackingReport:
         measure.add(wrench[up & rows & (times <= motion.ends)])
         return measure.summary()
 
-    stands = up & ~flies
+    on_ground = up & ~in_flight
     return TrackingReport(
         seconds=period * len(times),
-        flight_seconds=period * float(np.sum(flies)),
+        flight_seconds=period * float(np.sum(in_flight)),
         falls=tuple(falls.tolist()),
         up_seconds=period * float(np.sum(up)),
         joint_error=float(np.rad2deg(_rms(angles))),
         root_error=_rms(root),
         root_error_max=float(root.max(initial=0.0)),
-        residual_in_flight=float(np.abs(wrench[up & flies]).max(initial=0.0)),
-        stance=residual(~flies),
-        without_ground_force=residual(~bears),
-        grounded=float(np.mean(bears[stands])) if stands.any() else 1.0,
-        slide=_slide(motion.contacts, touches),
+        residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),
+        stance=residual(~in_flight),
+        without_ground_force=residual(~is_supported),
+        grounded=float(np.mean(is_supported[on_ground])) if on_ground.any() else 1.0,
+        slide=_largest_slide(motion.contacts, touches),
         warnings=motion.warnings,
     )
 
@@ -279,11 +279,11 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def _slide(contacts: Array, touches: Mask) -> float:
+def _largest_slide(contacts: Array, touches: Mask) -> float:
     """Largest horizontal distance of a point in contact from where the contact began [m]."""
     largest = 0.0
     for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):
         for start, end in spans(touch):
-            stand = point[start:end, :2]
-            largest = max(largest, float(np.linalg.norm(stand - stand[0], axis=1).max()))
+            path = point[start:end, :2]
+            largest = max(largest, float(np.linalg.norm(path - path[0], axis=1).max()))
     return largest

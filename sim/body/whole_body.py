@@ -22,17 +22,17 @@ from sim.body.mass_matrix import inertia, inertial_force
 from sim.body.stance import N_LEG, stance_response
 from sim.body.support import find_support
 
-# [m] lever arm that converts moment to force in the cost of the residual, which trades one for the other: the RMS
-# force of walk, run and jump is 0.6, 1.7 and 2.8 % of weight; with twice as much 0.4, 1.3 and 1.7, with half 0.8, 2.3
-# and 3.7.
-_LEVER = 0.5
-# Share of a point on the floor; 1/share is the relative error that spreading the load may cost. A tenth or ten times
-# of it moves the residual of five clips by less than 0.1 % of weight.
-_FULL_SHARE = 3e3
-_PLANS = 4  # most plans per tick; in each, joints that saturated in the previous one are given less acceleration
-# Largest speed of the target of a figure that is set back [m/s], [rad/s]: a way of a metre and half a turn take
-# 1.9 m/s and 5.9 rad/s, as the greatest slope of `smooth_step` is 15/8 and the way lasts `RISES`.
-_SET_BACK_SPEED = 20.0
+# [m] lever arm that converts moment to force in the cost of the residual: it trades one for the other. The RMS residual
+# force of walk, run and jump is 0.6, 1.7 and 2.8 % of weight; with twice the value 0.4, 1.3 and 1.7, with half 0.8,
+# 2.3 and 3.7.
+_LEVER_ARM = 0.5
+# Share of a point on the floor; 1/share is the relative error due to spreading the load. A tenth of it or ten times as
+# much changes the residual of five clips by less than 0.1 % of weight.
+_MAX_SHARE = 3e3
+_MAX_PLANS = 4  # per control tick; each plan reduces the acceleration of joints that saturated in the previous one
+# Largest speed of the target of a figure that is set back [m/s], [rad/s]. A metre and half a turn need 1.9 m/s and
+# 5.9 rad/s, as the greatest slope of `smooth_step` is 15/8 and the return takes `RISES`.
+_MAX_RECOVERY_SPEED = 20.0
 
 
 @njit
@@ -42,7 +42,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     Parameters
     ----------
     s : FigureState
-        Its state and dynamics of the last physics step are read, its `ctrl`, `applied` and `report` written.
+        State and dynamics of the last physics step are read; `ctrl`, `applied` and `report` are written.
     q_r, v_r, a_r : Array
         Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
     """
@@ -54,20 +54,20 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
     s.report[REPORT_DOWN] = mode
     if mode == UP:
-        _stand(s, support)
+        _control_upright(s, support)
     elif mode == DOWN:
         s.ctrl[:] = 0.0
         s.wrench[:] = 0.0
     elif mode == SET_BACK:
-        _set_back(s, q_r)
+        _control_recovery(s, q_r)
     s.applied[:] = s.wrench
     s.report[REPORT_SUPPORT] = support
-    s.report[REPORT_SATURATED] = _saturated(s.ctrl, s.torque_limit)
+    s.report[REPORT_SATURATED] = _saturated_count(s.ctrl, s.torque_limit)
     s.report[REPORT_RESIDUAL : REPORT_RESIDUAL + 6] = s.wrench
 
 
 @njit
-def _saturated(torques: Array, limits: Array) -> int:
+def _saturated_count(torques: Array, limits: Array) -> int:
     """Number of motors at their limits."""
     count = 0
     for k in range(torques.shape[0]):
@@ -77,25 +77,25 @@ def _saturated(torques: Array, limits: Array) -> int:
 
 
 @njit
-def _set_back(s: FigureState, q_r: Array) -> None:
+def _control_recovery(s: FigureState, q_r: Array) -> None:
     """Torques, and an unbounded wrench at the root, that carry a fallen figure back to the reference."""
     follow_back(s.twin_model, s.fall, q_r)
     for k in range(0, s.fall.velocity.shape[0], 3):
-        shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # the reference may jump
+        shorten(s.fall.velocity[k : k + 3], _MAX_RECOVERY_SPEED)  # the reference may jump
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
     rate = s.gains.root_rate
     for i in range(3):  # without the bound `root_pull`: the animation may have moved far away
         s.acceleration[i] = 2.0 * rate * (s.fall.velocity[i] - s.qvel[i]) + rate**2 * (s.fall.target[i] - s.qpos[i])
     s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
-    for plan in range(_PLANS):
-        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
+    for plan in range(_MAX_PLANS):
+        if not _plan_torques(s) or plan == _MAX_PLANS - 1 or not _reduce_saturated_joints(s):
             break
     for i in range(6):
         s.wrench[i] = inertial_force(s.mass, i, s.acceleration, s.bias[i] - s.passive[i])
 
 
 @njit
-def _stand(s: FigureState, support: float) -> None:
+def _control_upright(s: FigureState, support: float) -> None:
     """Torques and residual wrench of a figure that is up (see `sim.body.figure`)."""
     for leg in range(2):
         foot = slice(N_FOOT * leg, N_FOOT * leg + N_FOOT)
@@ -106,20 +106,20 @@ def _stand(s: FigureState, support: float) -> None:
         for k in range(N_LEG):
             s.acceleration[3 + 3 * s.legs[leg, k // 3] + k % 3] += s.offset[k]
     s.yielding[:] = 0
-    for plan in range(_PLANS):
+    for plan in range(_MAX_PLANS):
         s.acceleration[:6] = s.wanted_root
         met = _plan_contacts(s, support)
-        _let_root_fall(s, support if met else 0.0)
-        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
+        _blend_free_root_motion(s, support if met else 0.0)
+        if not _plan_torques(s) or plan == _MAX_PLANS - 1 or not _reduce_saturated_joints(s):
             break
-    _make_up_for_legs(s, support)
+    _compensate_leg_torques(s, support)
 
 
 @njit
 def _plan_contacts(s: FigureState, support: float) -> bool:
     """Plan contact forces and residual for the root's demand (M a* + c)_r, and their generalised forces.
 
-    Returns whether the demand is met: it is not if no point bears load or the residual exceeded its bounds.
+    Returns whether the demand is met: not if no point bears load or the residual exceeded its bounds.
     """
     R, w, y, arm = s.xmat[0], s.wrench, s.residual, work_array(3)
     w[:] = 0.0
@@ -133,14 +133,14 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
     for i in range(3):  # moments in world axes, so that the friction cones need not be rotated
         s.scaled[i] = s.demand[i] / s.weight
         moment = R[3 * i] * s.demand[3] + R[3 * i + 1] * s.demand[4] + R[3 * i + 2] * s.demand[5]
-        s.scaled[3 + i] = moment / (s.weight * _LEVER)
+        s.scaled[3 + i] = moment / (s.weight * _LEVER_ARM)
     for c in range(s.share.shape[0]):
         edges = s.edges[N_EDGES * c : N_EDGES * c + N_EDGES]
         for i in range(3):
             arm[i] = s.points[c, i] - s.xpos[0, i]
         cone_edges(arm, s.friction, edges)
-        edges[:, 3:] /= _LEVER
-        s.edge_share[N_EDGES * c : N_EDGES * c + N_EDGES] = _FULL_SHARE * s.share[c]
+        edges[:, 3:] /= _LEVER_ARM
+        s.edge_share[N_EDGES * c : N_EDGES * c + N_EDGES] = _MAX_SHARE * s.share[c]
     shared_forces(s.edges, s.edge_share, s.scaled, y, s.edge_force)
     for c in range(s.share.shape[0]):
         for e in range(N_EDGES * c, N_EDGES * c + N_EDGES):
@@ -150,7 +150,7 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
             _add_contact(s, c)
     for i in range(3):
         w[i] = y[i] * s.weight
-        w[3 + i] = (R[i] * y[3] + R[3 + i] * y[4] + R[6 + i] * y[5]) * s.weight * _LEVER
+        w[3 + i] = (R[i] * y[3] + R[3 + i] * y[4] + R[6 + i] * y[5]) * s.weight * _LEVER_ARM
     return not _bound_residual(s, support)
 
 
@@ -178,11 +178,11 @@ def _add_contact(s: FigureState, c: int) -> None:
 
 
 @njit
-def _let_root_fall(s: FigureState, support: float) -> None:
+def _blend_free_root_motion(s: FigureState, support: float) -> None:
     """Blend the root's planned acceleration with that of its free motion, M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
 
-    The wanted acceleration counts by the support, the free one by the rest. The caller sets the support to zero where
-    the residual is at its bounds too: torques planned for an acceleration that does not occur throw the limbs about.
+    The wanted acceleration is weighted by the support, the free one by the rest. The caller sets the support to zero
+    also where the residual is at its bounds: torques planned for an acceleration that does not occur fling the limbs.
     """
     if support >= 1.0:
         return
@@ -215,10 +215,10 @@ def _plan_torques(s: FigureState) -> bool:
 
 
 @njit
-def _give_way(s: FigureState) -> bool:  # noqa: C901 - loops over motors, which a call would allocate
+def _reduce_saturated_joints(s: FigureState) -> bool:  # noqa: C901 - loops over motors, which a call would allocate
     """Reduce the accelerations of saturated joints to what their limits allow: M_ss Δa = −lost.
 
-    Joints of standing legs are left out (see `_make_up_for_legs`). Returns whether any acceleration was changed.
+    Joints of standing legs are left out (see `_compensate_leg_torques`). Returns whether any acceleration was changed.
     """
     for motor in range(s.lost.shape[0]):
         if s.lost[motor] != 0.0:
@@ -251,8 +251,8 @@ def _give_way(s: FigureState) -> bool:  # noqa: C901 - loops over motors, which 
 
 
 @njit
-def _make_up_for_legs(s: FigureState, support: float) -> None:
-    """Add to the residual what standing legs cannot give within their torque limits, by virtual work: Kᵀ lost."""
+def _compensate_leg_torques(s: FigureState, support: float) -> None:
+    """Add to the residual what standing legs cannot provide within their torque limits, by virtual work: Kᵀ lost."""
     for leg in range(2):
         for k in range(N_LEG):
             lost = s.lost[3 * s.legs[leg, k // 3] + k % 3 - 3]

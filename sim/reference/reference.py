@@ -24,7 +24,7 @@ from sim.reference.transition import Transition, make_transition
 from sim.reference.update import update_reference, update_river_reference
 
 _MATRIX = types.Array(types.float64, 2, "C")
-_ROUNDS = 8  # fixed-point iterations of `begin_in_motion`; each gains at least three digits
+_ITERATION_COUNT = 8  # fixed-point iterations of `begin_in_motion`; each gains at least three digits
 
 
 @entry_point
@@ -49,7 +49,7 @@ def poses_along(stages: IntArray, params: Array, memory: Array, points: Array, p
 
 
 def map_poses(haptic_map: HapticMap, points: Array, memory: Array | None = None) -> Array:
-    """Poses (n, nq) of a map along a path of the stylus (n, 7); a memory is updated, by default that of a new run."""
+    """Poses (n, nq) of a map along a path of the stylus (n, 7). `memory` is updated; default: that of a new run."""
     stages, params, fresh, _ = haptic_map.compiled()
     poses = np.empty((len(points), haptic_map.nq))
     poses_along(stages, params, fresh if memory is None else memory, points, poses)
@@ -63,8 +63,8 @@ def poses_unit() -> Unit:
 
 def update_unit(reference: CompiledReference) -> Unit:
     """The compilation unit that advances a reference by one period (`sim.reference.update`), called by its address."""
-    plays = river_clips_map in kernels_of(reference.stages)
-    return Unit.of(update_river_reference if plays else update_reference, Lent(typeof(reference)), VECTOR, VECTOR)
+    by_river = river_clips_map in kernels_of(reference.stages)
+    return Unit.of(update_river_reference if by_river else update_reference, Lent(typeof(reference)), VECTOR, VECTOR)
 
 
 @entry_point
@@ -108,7 +108,7 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
     reference.started[0] = 1.0
     reference.trail[0] = p - 2.0 * period * v + 2.0 * period**2 * a
     reference.hand[:] = motion
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATION_COUNT):
         before = reference.hand
         jerk = -(turn_rate.py_func(before[1], before[2]) ** 2) * before[1]
         acceleration = a - period * jerk
@@ -118,7 +118,7 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
 
 
 def check_reference(period: float, bandwidth: float, blend: float) -> None:
-    """Refuse numbers that are invalid for `make_reference`.
+    """Check the arguments of `make_reference`.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def make_reference(
 ) -> CompiledReference:
     """The reference of a run, before its first update, without the addresses of the map's kernels.
 
-    So nothing need be compiled yet: `reference_along` and `sim.loop.servo.Servo.linked` fill them in.
+    So nothing need be compiled yet; `reference_along` and `sim.loop.servo.Servo.linked` fill the addresses in.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def make_reference(
     bandwidth : float
         Bandwidth ω/2π of the tracking filter [Hz].
     blend : float
-        Least blend time of a transition from one clip to another [s]; 0: the figure jumps.
+        Shortest blend time of a transition from one clip to another [s]; 0: the figure jumps.
     limbs : Array, optional
         Legs that step during a transition (`packed_steppers`); without them the feet slide.
     clip_seconds : float
@@ -173,7 +173,7 @@ def make_reference(
     check_reference(period, bandwidth, blend)
     nq, nv = figure_model.nq, figure_model.nv
     transition = make_transition(nq, nv, blend, np.zeros((0, LIMB)) if limbs is None else limbs)
-    return _at_rest(compiled, (nq, nv), transition)._replace(
+    return _initial_reference(compiled, (nq, nv), transition)._replace(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
         clip_seconds=clip_seconds,
     )  # fmt: skip
@@ -181,11 +181,11 @@ def make_reference(
 
 def no_reference() -> CompiledReference:
     """The empty reference of a servo without a figure."""
-    nothing = CompiledMap(np.zeros((0, 3), dtype=np.int64), np.zeros(0), np.zeros(0))
-    return _at_rest(nothing, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
+    empty_map = CompiledMap(np.zeros((0, 3), dtype=np.int64), np.zeros(0), np.zeros(0))
+    return _initial_reference(empty_map, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
 
 
-def _at_rest(compiled: CompiledMap, sizes: tuple[int, int], transition: Transition) -> CompiledReference:
+def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition: Transition) -> CompiledReference:
     """State of a reference before its first update, of a body with poses of nq and tangents of nv numbers."""
     (stages, params, memory, size), (nq, nv) = compiled, sizes
     return CompiledReference(

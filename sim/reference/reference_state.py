@@ -79,24 +79,24 @@ class CompiledReference(NamedTuple):
 @njit
 def look_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, one period before and after; `memory` is that of now."""
-    _look_now(reference, hand)
+    _evaluate_now(reference, hand)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
-        _go(reference, hand, sign)
+        _extrapolate_stylus(reference, hand, sign)
         evaluate_map(reference.stages, reference.params, reference.scratch_x, reference.scratch_memory, pose)
 
 
 @njit
 def look_around_in_river(reference: CompiledReference, params: Array, hand: Array) -> None:
-    """As `look_around`, of a map whose rivers play a clip each, at an even pace (`even_pace`)."""
-    _look_now(reference, hand)
+    """As `look_around`, for a map whose rivers play one clip each, at an even pace (`even_pace`)."""
+    _evaluate_now(reference, hand)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
-        _go(reference, hand, sign)
+        _extrapolate_stylus(reference, hand, sign)
         even_pace(params, reference.memory, reference.scratch_x, sign * reference.period, reference.scratch_memory)
         evaluate_map(reference.stages, reference.params, reference.scratch_x, reference.scratch_memory, pose)
 
 
 @njit
-def _look_now(reference: CompiledReference, hand: Array) -> None:
+def _evaluate_now(reference: CompiledReference, hand: Array) -> None:
     """Pose of the map at the hand's position."""
     x = reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
@@ -104,8 +104,8 @@ def _look_now(reference: CompiledReference, hand: Array) -> None:
 
 
 @njit
-def _go(reference: CompiledReference, hand: Array, sign: float) -> None:
-    """Stylus pose one period before or after now, with a copy of the memory, into the scratch."""
+def _extrapolate_stylus(reference: CompiledReference, hand: Array, sign: float) -> None:
+    """Write the stylus pose one period before or after now, and a copy of the memory, to the scratch arrays."""
     period, x = reference.period, reference.scratch_x
     for i in range(3):
         x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
@@ -117,7 +117,7 @@ def _go(reference: CompiledReference, hand: Array, sign: float) -> None:
 def follow_trail(reference: CompiledReference) -> None:
     """Backward differences of the smoothed hand's last positions, into `going`.
 
-    The filter's own velocity and acceleration lag behind these where a hand is thrown.
+    The filter's own velocity and acceleration lag behind these when the hand is thrown.
     """
     now, trail, going, period = reference.hand[0], reference.trail, reference.going, reference.period
     for i in range(3):

@@ -1,6 +1,6 @@
 """Changes of the active river: the transition of the figure's motion to another river's clip, or to rest.
 
-A change goes by inertialisation (`sim.reference.transition`), or through a precomputed change that begins at a gate, a
+A change is made by inertialisation (`sim.reference.transition`), or by a precomputed change that begins at a gate: a
 phase of the lap (`controllers.haptic_map.clip_change`).
 """
 
@@ -35,7 +35,7 @@ from sim.reference.waiting import leaps, stands, waits_no_longer
 
 
 @njit
-def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pose: Array) -> None:
+def _evaluate_ahead(reference: CompiledReference, params: Array, seconds: float, pose: Array) -> None:
     """Pose of the playing clip `seconds` from now, if it goes on at its river's own pace."""
     memory = reference.scratch_memory
     memory[:] = reference.memory
@@ -44,14 +44,14 @@ def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pos
 
 
 @njit
-def _place(reference: CompiledReference, pose: Array, x: float, y: float, turn: float) -> None:
-    """As `place_clip`, in lengths of the figure that is shown; the lap's frame is in those of the clips."""
+def _place_clip(reference: CompiledReference, pose: Array, x: float, y: float, turn: float) -> None:
+    """As `place_clip`, with lengths of the shown figure; the frame of the lap is in lengths of the clips' figure."""
     size = reference.size
     place_clip(reference.memory, pose[:2] / size, x / size, y / size, turn)
 
 
 @njit
-def _show_on(reference: CompiledReference, params: Array) -> None:
+def _store_shown_poses(reference: CompiledReference, params: Array) -> None:
     """Store the poses that are shown now, one period before and one period after."""
     look_around_in_river(reference, params, reference.going)
     carry(reference)
@@ -60,55 +60,55 @@ def _show_on(reference: CompiledReference, params: Array) -> None:
 
 
 @njit
-def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, float]:
+def _place_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, float]:
     """Place the new motion such that the pivot foot, in stance before and after the change, stays where it is.
 
     If the figure stands on that foot alone, the motion is turned to match its heading as well. Returns the foot, −1 if
     there is none, and the horizontal distance by which the motion was moved [m].
     """
     transition, old, new = reference.transition, np.empty(7), np.empty(7)
-    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
-    _look_ahead(reference, params, transition.lasts[0], transition.ahead[1])
+    _evaluate_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    _evaluate_ahead(reference, params, transition.lasts[0], transition.ahead[1])
     foot, row = pivot_of(transition)
     moved = 0.0
     if foot >= 0:
         limb_end(transition.limbs[foot], transition.shown[0], old)
         limb_end(transition.limbs[foot], transition.ahead[row], new)
         turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
-        _place(reference, new, old[0], old[1], turn)
+        _place_clip(reference, new, old[0], old[1], turn)
         moved = math.hypot(new[0] - old[0], new[1] - old[1])
     return foot, moved
 
 
 @njit
-def _go_over(reference: CompiledReference, params: Array) -> None:
+def _begin_transition(reference: CompiledReference, params: Array) -> None:
     """Begin the transition from the shown motion to that of the memory, with an offset that decays.
 
     The new motion is placed ahead of the figure by the stopping distance of the difference of their horizontal and yaw
-    velocities, so that the figure is neither turned back nor pulled; or, if there is a pivot foot, where that stands.
+    velocities, so that the figure is neither turned back nor pulled; or, if there is a pivot foot, where it stands.
     """
     transition, period = reference.transition, reference.period
     shown, change = transition.shown, transition.change
     look_around_in_river(reference, params, reference.going)
     pose = reference.pose
-    _place(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
+    _place_clip(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
     look_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
     set_duration(transition, 0.0, period)
-    way, seconds = np.zeros(3), transition.lasts[0]
+    stopping, seconds = np.zeros(3), transition.lasts[0]
     for i in range(2):
-        way[i] = stopping_way(change[1, i], change[2, i], seconds)
+        stopping[i] = stopping_way(change[1, i], change[2, i], seconds)
     _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
     _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
-    way[2] = stopping_way(spin, twist, seconds)
-    _place(reference, pose, pose[0] + way[0], pose[1] + way[1], way[2])
-    _, moved = _stand_on_pivot(reference, params)
+    stopping[2] = stopping_way(spin, twist, seconds)
+    _place_clip(reference, pose, pose[0] + stopping[0], pose[1] + stopping[1], stopping[2])
+    _, moved = _place_on_pivot(reference, params)
     set_duration(transition, moved, period)
-    # A longer change ends at another pose: place the motion again by where it stands then.
-    foot, _ = _stand_on_pivot(reference, params)
+    # A longer change ends at another pose: place the motion again by where the foot stands then.
+    foot, _ = _place_on_pivot(reference, params)
     look_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
-    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    _evaluate_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
     plan_depth(transition)
     transition.since[0] = 0.0
 
@@ -141,14 +141,14 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
 @njit
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Change to another river's clip, at a phase [s], by a transition from what is shown."""
-    _show_on(reference, params)
+    _store_shown_poses(reference, params)
     change_clip(params, reference.memory, river, phase)
-    _go_over(reference, params)
+    _begin_transition(reference, params)
 
 
 @njit
 def go_along(reference: CompiledReference, params: Array, river: float) -> None:
-    """Time the hand by another river's curve, while the playing clip goes on to a gate of a precomputed change."""
+    """Take the hand's phase from another river's curve, while the clip goes on to the gate of a precomputed change."""
     scratch, x = reference.scratch_memory, reference.scratch_x
     x[:3], x[3:] = reference.hand[0], reference.orientation
     scratch[:] = reference.memory
@@ -167,7 +167,7 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
     begin_change(memory, river, change, gate)
     hold_at_gate(params, memory, gate)
     evaluate_map(reference.stages, reference.params, x, memory, new)
-    _place(reference, new, old[0], old[1], heading_between(new, old))
+    _place_clip(reference, new, old[0], old[1], heading_between(new, old))
     go_on(memory, phase, ahead)
 
 
@@ -175,8 +175,8 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
 def stop(reference: CompiledReference, params: Array) -> None:
     """Bring the playing clip to rest, at the rest phase nearest to where it would come to a stop."""
     memory, period = reference.memory, reference.period
-    _show_on(reference, params)
-    # Clamped to the clip's own pace: a hand that is thrown along the curve, or against it, would overshoot.
+    _store_shown_poses(reference, params)
+    # Clamped to the clip's own pace: a hand thrown along the curve, or against it, would overshoot.
     pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
     stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))
-    _go_over(reference, params)
+    _begin_transition(reference, params)

@@ -1,15 +1,16 @@
 r"""Lowering of the reference to the floor when the hand is slow, so that no figure hovers in the middle of a flight.
 
 Gravity sets the duration of a flight phase. Played at σ times its pace it would need a gravity of σ² g, and a hand that
-stops during a flight would ask for a figure that hangs in the air. So the reference is lowered by a share s of its
+stops during a flight would demand a figure that hangs in the air. So the reference is lowered by a share s of its
 feet's clearance c; s is 1 for a slow hand and 0 at the clips' own pace:
 
 .. math:: z \leftarrow z - s\,u\,S(c), \qquad s \to S_{01}\Bigl(\frac{\sigma_1 - \sigma}{\sigma_1 - \sigma_0}\Bigr),
           \qquad \sigma = |\dot\theta|\,T_c / 2\pi,
 
 with θ the stylus's angle about the vertical axis of H, which is the phase of these maps, T_c the duration of the clips,
-S_01 the smooth step, S(x) = x³/(x² + r²) for x > 0, and u from 0 to 1 as the figure is upright: one that is upside down
-cannot be put on its feet. s follows its goal with critical damping, so pose, velocity and acceleration are continuous.
+S_01 the smooth step, S(x) = x³/(x² + r²) for x > 0, and u from 0 to 1 the uprightness of the figure: one that is upside
+down cannot be put on its feet. s follows its goal with critical damping, so that pose, velocity and acceleration are
+continuous.
 """
 
 import math
@@ -26,9 +27,9 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 
-_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: a flight is lowered fully below (it would need 0.49 g), not at all above (0.81 g)
-_RATE = 10.0  # natural frequency of the approach to the goal [1/s]; a free fall from a jump's height takes 0.3 s
-_ROUND = 4e-3  # r [m], rounds the onset of S
+_NO_FLIGHT_PACE, _FULL_FLIGHT_PACE = 0.7, 0.9  # σ₀, σ₁: lowered fully below (0.49 g), not at all above (0.81 g)
+_APPROACH_RATE = 10.0  # [1/s] natural frequency of the approach to the goal; a free fall from a jump takes 0.3 s
+_ONSET_LENGTH = 4e-3  # r [m], smooths the onset of S
 
 
 @njit
@@ -38,7 +39,7 @@ def lowering_goal(p: Array, v: Array, seconds: float) -> float:
     if square == 0.0:
         return 1.0
     pace = abs(p[0] * v[1] - p[1] * v[0]) / square * seconds / (2.0 * math.pi)
-    return cubic_step((_FLOWN - pace) / (_FLOWN - _HELD))
+    return cubic_step((_FULL_FLIGHT_PACE - pace) / (_FULL_FLIGHT_PACE - _NO_FLIGHT_PACE))
 
 
 @njit
@@ -46,7 +47,7 @@ def approach(state: Array, goal: float, period: float) -> None:
     """Advance the share with its two derivatives, `state` (3,), by one period towards its goal."""
     state[0] += period * state[1] + 0.5 * period**2 * state[2]
     state[1] += period * state[2]
-    state[2] = _RATE**2 * (goal - state[0]) - 2.0 * _RATE * state[1]
+    state[2] = _APPROACH_RATE**2 * (goal - state[0]) - 2.0 * _APPROACH_RATE * state[1]
 
 
 @njit
@@ -59,18 +60,18 @@ def _height(limb: Array, end: Array, k: int, size: float) -> float:
 def clearance(limbs: Array, ends: Array, pose: Array, size: float) -> float:
     """Height over the floor of the lowest point of all soles [m], by a soft minimum; `ends` (n, 7) is scratch.
 
-    Eight level points count 4 mm (ln 8 of `SOFTNESS`) lower. `size`: lengths of the figure over the default's [1].
+    With eight points at one height it is 4 mm lower (ln 8 of `SOFTNESS`). `size`: lengths over the default figure's.
     """
-    least = math.inf
+    lowest = math.inf
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
         for k in range(LIMB, limbs.shape[1], 3):
-            least = min(least, _height(limbs[n], ends[n], k, size))
+            lowest = min(lowest, _height(limbs[n], ends[n], k, size))
     total = 0.0
     for n in range(limbs.shape[0]):
         for k in range(LIMB, limbs.shape[1], 3):
-            total += math.exp((least - _height(limbs[n], ends[n], k, size)) / SOFTNESS)
-    return least - SOFTNESS * math.log(total)
+            total += math.exp((lowest - _height(limbs[n], ends[n], k, size)) / SOFTNESS)
+    return lowest - SOFTNESS * math.log(total)
 
 
 @njit
@@ -81,10 +82,10 @@ def lower_to_floor(limbs: Array, ends: Array, share: float, pose: Array, size: f
     """
     if share <= 0.0 or limbs.shape[0] == 0:
         return
-    above = clearance(limbs, ends, pose, size)
+    height = clearance(limbs, ends, pose, size)
     upright = 1.0 - 2.0 * (pose[4] ** 2 + pose[5] ** 2)
-    if above > 0.0:
-        pose[2] -= min(share, 1.0) * cubic_step(2.0 * upright) * above**3 / (above**2 + _ROUND**2)
+    if height > 0.0:
+        pose[2] -= min(share, 1.0) * cubic_step(2.0 * upright) * height**3 / (height**2 + _ONSET_LENGTH**2)
 
 
 @entry_point

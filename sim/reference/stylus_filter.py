@@ -6,12 +6,12 @@ acceleration over the period T, then correct by the residual r with the gains 1 
 
 On a lap the hand's acceleration is not constant but turns with the hand: along a circle at the rate Ω the jerk is
 −Ω² ṗ. A filter that neglects this jerk gives a velocity 1.6 % too small on the default circle at 2.2 s a lap, so that
-the reference moves faster than its velocity says. So the prediction is that of a coordinated turn (Bar-Shalom, Li and
+the reference moves faster than its stated velocity. So the prediction is that of a coordinated turn (Bar-Shalom, Li and
 Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order in T:
 
 .. math:: j = -\Omega^2 \dot p, \qquad \Omega = \min(|\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2),\ 2\pi)
 
-Without the bound 2π the noise of a slow hand turns the prediction: the run in LEADING then falls at 7.9 s.
+Without the bound 2π the noise of a slow hand rotates the prediction: the run in LEADING then falls at 7.9 s.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ from numba import njit
 from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array
 
-_SLOW = 0.02  # v₀ [m/s]: below this speed the direction of motion is encoder noise
-_FASTEST = 2.0 * np.pi  # [rad/s]: no lap takes less than a second; a slow hand that seems to turn faster is noise
+_NOISE_SPEED = 0.02  # v₀ [m/s]: below this speed the direction of motion is encoder noise
+_MAX_TURN_RATE = 2.0 * np.pi  # [rad/s]: no lap takes less than a second; faster turning of a slow hand is noise
 
 
 @njit
@@ -50,8 +50,8 @@ def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -
 def turn_rate(v: Array, a: Array) -> float:
     """Rate Ω [rad/s] at which the velocity of a hand turns, from its velocity and acceleration, shape (3,) each."""
     x, y, z = v[1] * a[2] - v[2] * a[1], v[2] * a[0] - v[0] * a[2], v[0] * a[1] - v[1] * a[0]
-    rate = np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _SLOW**2)
-    return min(rate, _FASTEST)
+    rate = np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _NOISE_SPEED**2)
+    return min(rate, _MAX_TURN_RATE)
 
 
 @njit

@@ -17,28 +17,29 @@ from controllers.motion.inertialization import add_offset, offset_left
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 
-DWELL = 0.04  # [s] dwell time of a river before its clip plays: without a filter, noise changes it every 23 ms
-_ROOT = 6  # components of a tangent that belong to the root
-# [m/s²] largest vertical acceleration of the root by the offset: a leg in single support bears little more. With half
-# of it the worst of 40 changes of walk, run and squat dance slides 3.6 cm instead of 2.9; with twice joints leap by
-# up to 13 rad/s in 8 ms instead of 25.
-_PULL = 6.0
-# [m/s²] the same horizontally, where the root moves on besides: twice lifts the feet of the worst change by 4 mm
-# more.
-_ASIDE = 5.0
-_BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest: 10/√3
-# Largest factor on the least blend time by which a horizontal offset prolongs a change. With 1 the worst of 40
-# changes has its feet 7 mm higher and slides 4 mm less; with twice as much the median has its feet 2 mm lower.
-_LONGER = 1.9
-# [s] within which the legs' giving way is faded in, and out again. In 40 changes joints leap by 3.4 rad/s in 8 ms in
-# the median and 25 at most; with half of it by 9.0 and 25, with twice by 2.7 and 64.
-_GIVING = 0.1
-# [m/s²] largest depth over T². The arc 64 x³ (1 − x)³ accelerates downwards by up to 19.2 depth/T²: here by 1.14 g.
-_FALLS = 0.58
-# [m] two steps: a change is prolonged to the time of so much travel at most, or both feet are left behind.
-_STRIDES = 1.2
-# [rad] largest overshoot of a joint's offset: half or twice leaves feet and leaps of 40 changes as they are.
-_SWING = 0.3
+DWELL = 0.04  # [s] dwell time of a river before its clip plays: unfiltered noise changes the river every 23 ms
+_N_ROOT = 6  # components of a tangent for the root
+# [m/s²] largest vertical acceleration of the root due to the offset: a leg in single support bears little more. With
+# half the value the worst of 40 changes of walk, run and squat dance slides 3.6 cm instead of 2.9; with twice, joint
+# speeds jump by up to 13 rad/s in 8 ms instead of 25.
+_MAX_VERTICAL_ACCELERATION = 6.0
+# [m/s²] the same horizontally, where the root also travels. With twice the value the feet of the worst change rise
+# 4 mm higher.
+_MAX_HORIZONTAL_ACCELERATION = 5.0
+_ACCELERATION_FACTOR = 5.77  # largest |ö| T² of a unit offset that decays from rest: 10/√3
+# Largest factor on the shortest blend time by which a horizontal offset prolongs a change. With 1 the feet of the worst
+# of 40 changes are 7 mm higher and slide 4 mm less; with twice the value those of the median are 2 mm lower.
+_MAX_PROLONGATION = 1.9
+# [s] in which the correction of the legs is faded in, and out again. In 40 changes joint speeds jump by 3.4 rad/s in
+# 8 ms in the median and 25 at most; with half the value by 9.0 and 25, with twice by 2.7 and 64.
+_LEG_FADE_TIME = 0.1
+# [m/s²] largest depth/T². The arc 64 x³ (1 − x)³ accelerates downwards by up to 19.2 depth/T²: here 1.14 g.
+_MAX_DEPTH_ACCELERATION = 0.58
+# [m] two steps: a change is prolonged at most to the time of this travel, or both feet would be left behind.
+_MAX_TRAVEL = 1.2
+# [rad] largest overshoot of a joint's offset: half or twice the value leaves feet and joint speeds of 40 changes as
+# they are.
+_MAX_JOINT_OVERSHOOT = 0.3
 
 
 class Transition(NamedTuple):
@@ -47,7 +48,7 @@ class Transition(NamedTuple):
     Attributes
     ----------
     seconds : float
-        Least blend time [s]; 0: the figure jumps.
+        Shortest blend time [s]; 0: the figure jumps.
     lasts : Array
         Duration T of the last change [s], longer where the root has far to go, shape (1,).
     since : Array
@@ -120,23 +121,27 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
     """Set the duration of a change from the root's offset: vertical, as `note_change` found it, and `aside` [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
-        up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
-        # Bounded, since a figure in flight would fly on, and a running one would leave both feet behind.
-        then, next_ = transition.shown[1], transition.shown[2]
-        pace = 0.5 * np.hypot(next_[0] - then[0], next_[1] - then[1]) / period
-        over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds, _STRIDES / max(pace, 1e-9))
-        transition.lasts[0] = max(transition.seconds, up, over)
+        vertical_time = np.sqrt(_ACCELERATION_FACTOR * abs(transition.change[0, 2]) / _MAX_VERTICAL_ACCELERATION)
+        # Bounded, since a figure in flight would keep flying, and a running one would leave both feet behind.
+        previous, next_ = transition.shown[1], transition.shown[2]
+        pace = 0.5 * np.hypot(next_[0] - previous[0], next_[1] - previous[1]) / period
+        horizontal_time = min(
+            np.sqrt(_ACCELERATION_FACTOR * aside / _MAX_HORIZONTAL_ACCELERATION),
+            _MAX_PROLONGATION * transition.seconds,
+            _MAX_TRAVEL / max(pace, 1e-9),
+        )
+        transition.lasts[0] = max(transition.seconds, vertical_time, horizontal_time)
 
 
 @njit
-def _carry(transition: Transition, at: float, pose: Array) -> None:
-    """Write the limbs' ends `at` seconds into the change to `ends`, and add the offset that is left to the pose."""
+def _apply_offset(transition: Transition, at: float, pose: Array) -> None:
+    """Write the limbs' ends `at` seconds into the change to `ends`, and add the remaining offset to the pose."""
     lasts, ends = transition.lasts[0], transition.ends
     for n in range(transition.limbs.shape[0]):
         limb_end(transition.limbs[n], pose, ends[n])
         step_end(transition.limbs[n], transition.steps[n], at, lasts, ends[n])
-    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
-    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
+    offset_left(transition.change[:, :_N_ROOT], lasts, at, transition.offset[:_N_ROOT])
+    offset_left(transition.change[:, _N_ROOT:], lasts, at, transition.offset[_N_ROOT:], _MAX_JOINT_OVERSHOOT)
     add_offset(pose, transition.offset)
 
 
@@ -147,17 +152,17 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     if since >= lasts:
         return
     at = min(since + s, lasts)
-    _carry(transition, at, pose)
+    _apply_offset(transition, at, pose)
     x = min(max(at / lasts, 0.0), 1.0)
     pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
-    share = smooth_step(min(at, lasts - at) / _GIVING) ** 2
+    share = smooth_step(min(at, lasts - at) / _LEG_FADE_TIME) ** 2
     for n in range(limbs.shape[0]):
         put_limb(limbs[n], pose, ends[n], share)
 
 
 @njit
 def plan_depth(transition: Transition) -> None:
-    """Set the root's depth to what the legs are too short by at mid-change, between the two steps.
+    """Set the root's depth to the length that the legs lack at mid-change, between the two steps.
 
     `ahead[0]` holds the new motion's pose at that time. The root goes no deeper than it would fall by its own weight.
     """
@@ -166,10 +171,10 @@ def plan_depth(transition: Transition) -> None:
     if transition.seconds == 0.0:
         return
     depth = 0.0
-    _carry(transition, 0.5 * lasts, pose)
+    _apply_offset(transition, 0.5 * lasts, pose)
     for n in range(limbs.shape[0]):
         depth = max(depth, shortfall(limbs[n], transition.steps[n], pose, ends[n]))
-    transition.depth[0] = min(depth, _FALLS * lasts**2)
+    transition.depth[0] = min(depth, _MAX_DEPTH_ACCELERATION * lasts**2)
 
 
 @njit
@@ -182,14 +187,14 @@ def note_change(
     `transition.shown` holds those of the shown motion in the same order. `transition.change` is set to o, ȯ, ö by
     central differences. `second` is the leg that must step second (−1: any).
     """
-    now, then, next_ = transition.offset, transition.before, transition.after
-    mj_differentiate_pos(figure_model, now.ctypes, 1.0, pose.ctypes, transition.shown[0].ctypes)
-    mj_differentiate_pos(figure_model, then.ctypes, 1.0, before.ctypes, transition.shown[1].ctypes)
+    current, previous, next_ = transition.offset, transition.before, transition.after
+    mj_differentiate_pos(figure_model, current.ctypes, 1.0, pose.ctypes, transition.shown[0].ctypes)
+    mj_differentiate_pos(figure_model, previous.ctypes, 1.0, before.ctypes, transition.shown[1].ctypes)
     mj_differentiate_pos(figure_model, next_.ctypes, 1.0, after.ctypes, transition.shown[2].ctypes)
-    for i in range(now.shape[0]):
-        transition.change[0, i] = now[i]
-        transition.change[1, i] = 0.5 * (next_[i] - then[i]) / period
-        transition.change[2, i] = (next_[i] - 2.0 * now[i] + then[i]) / period**2
+    for i in range(current.shape[0]):
+        transition.change[0, i] = current[i]
+        transition.change[1, i] = 0.5 * (next_[i] - previous[i]) / period
+        transition.change[2, i] = (next_[i] - 2.0 * current[i] + previous[i]) / period**2
     for i in range(3):
         transition.change[2, i] = min(max(transition.change[2, i], -THROW), THROW)
     if transition.seconds > 0.0:

@@ -1,7 +1,7 @@
-"""The update of the reference by one period: of a map whose rivers play one clip each, and of any other.
+"""The update of the reference by one period, for a map whose rivers play one clip each and for any other map.
 
-Where each river plays its own clip, a change of river is a change of motion: it begins at the pose and place that the
-figure is shown in (`sim.reference.river_changes`). Only such a map needs that code, so the two updates are two units.
+Where each river plays its own clip, a change of river is a change of motion: it begins at the pose and place in which
+the figure is shown (`sim.reference.river_changes`). Only such a map needs that code, so each update has its own unit.
 """
 
 from numba import njit
@@ -45,27 +45,27 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         Trace of the field, with the active river and the hand's phase on it (see
         `controllers.fields.algebra.instructions`). Not read; see `update_river_reference`.
     """
-    _smooth(reference, stylus)
+    _filter_stylus(reference, stylus)
     look_around(reference, reference.hand)
     _differentiate(reference)
 
 
 @njit
 def update_river_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
-    """As `update_reference`, of a map whose rivers play one clip each: its motion changes with the active river."""
-    _smooth(reference, stylus)
+    """As `update_reference`, for a map whose rivers play one clip each: its motion changes with the active river."""
+    _filter_stylus(reference, stylus)
     reference.transition.since[0] += reference.period
     follow_trail(reference)
     params = first_params(reference.stages, reference.params)
     even_pace(params, reference.memory, reference.hand[0], reference.period, reference.memory)
-    _play(reference, params, trace)
+    _change_clip_if_due(reference, params, trace)
     look_around_in_river(reference, params, reference.hand)
     carry(reference)
     _differentiate(reference)
 
 
 @njit
-def _smooth(reference: CompiledReference, stylus: Array) -> None:
+def _filter_stylus(reference: CompiledReference, stylus: Array) -> None:
     """Advance the tracking filter of the stylus, which starts at its first reading."""
     hand, period = reference.hand, reference.period
     if reference.started[0] == 0.0:
@@ -82,19 +82,19 @@ def _smooth(reference: CompiledReference, stylus: Array) -> None:
 
 
 @njit
-def _play(reference: CompiledReference, params: Array, trace: Array) -> None:
+def _change_clip_if_due(reference: CompiledReference, params: Array, trace: Array) -> None:
     """Begin a change to the clip of the active river, or to rest, where one is due."""
     period, river = reference.period, trace[TRACE_RIVER]
-    # Rivers that share a hand by weights may become active in turn many times a second: a change must first end.
-    settled = reference.transition.since[0] >= reference.transition.lasts[0]
-    over = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
+    # Rivers with blended weights may become active in turn many times a second: a change must end before the next.
+    is_complete = reference.transition.since[0] >= reference.transition.lasts[0]
+    has_dwelt = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
     change, gate = gate_passed(params, reference.memory, river)
-    if over and settled and knows_change(params, reference.memory, river):
+    if has_dwelt and is_complete and knows_change(params, reference.memory, river):
         if river != reference.memory[COURSE]:
             go_along(reference, params, river)
         elif change >= 0 and not changing(reference.memory):
             go_through(reference, params, change, river, gate)
-    elif over and settled and may_change(reference, params, river, trace[TRACE_PHASE]):
+    elif has_dwelt and is_complete and may_change(reference, params, river, trace[TRACE_PHASE]):
         change_river(reference, params, river, trace[TRACE_PHASE])
     else:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
@@ -107,7 +107,7 @@ def _differentiate(reference: CompiledReference) -> None:
     """Velocity and acceleration from the poses now, one period before and one period after."""
     period = reference.period
     if reference.clip_seconds > 0.0:
-        _settle(reference)
+        _lower_poses(reference)
     for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):
         mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
     for i in range(reference.velocity.shape[0]):
@@ -116,9 +116,9 @@ def _differentiate(reference: CompiledReference) -> None:
 
 
 @njit
-def _settle(reference: CompiledReference) -> None:
-    """Lower the poses now, one period before and one period after to the floor, by the share s of `settling`."""
+def _lower_poses(reference: CompiledReference) -> None:
+    """Lower the poses now, one period before and one period after to the floor by the share s, see `settling`."""
     s, period, transition = reference.settled, reference.period, reference.transition
-    for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
-        share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
+    for sign, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
+        share = s[0] + sign * period * s[1] + 0.5 * (sign * period) ** 2 * s[2]
         lower_to_floor(transition.limbs, transition.ends, share, pose, reference.size)

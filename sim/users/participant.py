@@ -16,7 +16,7 @@ from sim.users.person.random_numbers import fresh_chance
 from sim.users.person.wishes import Wishes
 
 LONGEST_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
-_QUALITY = 4.0  # quality factor of the tremor's resonance: a peak some 2 Hz wide
+_TREMOR_QUALITY = 4.0  # quality factor of the tremor's resonance: a peak about 2 Hz wide
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Participant:
     own: Own | None = None
 
     turns: tuple[()] = ()
-    """None: a person lets the gimbal swing."""
+    """Empty: a person lets the gimbal swing freely."""
 
     def holding(self, period: float, physics_step: float) -> PersonState:
         """The person's state for the servo loop, without the address of her compiled time step.
@@ -94,8 +94,8 @@ def tremor_filter(person: Person, period: float) -> tuple[float, float, float]:
 
     The person's `tremor` is the RMS of the vector of three axes, hence the factor 3 of the variance.
     """
-    radius = math.exp(-math.pi * person.tremor_frequency / _QUALITY * period)
-    turn = 2.0 * math.pi * person.tremor_frequency * period
-    a, b = 2.0 * radius * math.cos(turn), -radius * radius
+    radius = math.exp(-math.pi * person.tremor_frequency / _TREMOR_QUALITY * period)
+    angle = 2.0 * math.pi * person.tremor_frequency * period
+    a, b = 2.0 * radius * math.cos(angle), -radius * radius
     variance = (1.0 - b) / ((1.0 + b) * ((1.0 - b) ** 2 - a * a))
     return a, b, person.tremor / math.sqrt(3.0 * variance)

@@ -7,7 +7,7 @@ from controllers.state import Array
 from sim.viewer.palette import TUBE, rgb
 from sim.viewer.shapes import Shape
 
-GHOST_OPACITY = 0.35  # 1 hides what is behind
+GHOST_OPACITY = 0.35  # 1: opaque
 
 
 class Actor:

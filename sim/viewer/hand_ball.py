@@ -1,4 +1,4 @@
-"""The ball by which a person drags the stylus with the mouse, in the plane of the screen."""
+"""The ball with which a person drags the stylus by mouse, in the plane of the screen."""
 
 from collections.abc import Callable
 from typing import Any
@@ -44,15 +44,15 @@ class HandBall:
         """Put the ball at a point of the hand frame [m], shape (3,)."""
         self._ball.position = drawn_at(p_H)
 
-    def _listener(self, told: Dragged, shift: bool) -> Any:
+    def _listener(self, callback: Dragged, shift: bool) -> Any:
         # Asynchronous, so that the phases of a drag are handled in order.
         async def listen(event: Any) -> None:
             if event.phase == "start":
                 self._offset = np.asarray(self._ball.position) - np.asarray(event.start_position)
-            place = np.asarray(event.end_position) + self._offset
+            position = np.asarray(event.end_position) + self._offset
             self.dragged = event.phase != "end"
             if self.dragged:
-                self._ball.position = place
-            told(event, taken_at(place), shift)
+                self._ball.position = position
+            callback(event, taken_at(position), shift)
 
         return listen

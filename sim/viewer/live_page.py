@@ -1,4 +1,4 @@
-"""A browser page that shows a run while it goes on: the live stage, a clock, and a choice of views."""
+"""A browser page that shows a running simulation: the live stage, a clock, and a choice of views."""
 
 import html
 import time
@@ -13,7 +13,7 @@ from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
 from sim.viewer.views import VIEWS, add_view_buttons, open_with
 
-_FPS = 30.0  # pictures sent a second, at most
+_MAX_FPS = 30.0  # frames sent per second
 
 
 class LivePage:
@@ -22,7 +22,7 @@ class LivePage:
     Parameters
     ----------
     model : mujoco.MjModel
-        The world with what follows the hand; not stepped here.
+        The world, with the body that follows the hand; not stepped here.
     drawn : sequence of Course
         The curves.
     radius : float
@@ -47,17 +47,17 @@ class LivePage:
         self._stage.draw_slice(np.zeros((0, 3)), np.zeros((0, 3)))
         light(self._server.scene)
         open_with(self._server, lambda client: VIEWS["both"])
-        self._shown = 0.0
+        self._last_shown_time = 0.0
 
     def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
-        """Show a moment with notes below its time, at most 30 times a second; calls in between are ignored."""
+        """Show a moment with notes below its time, at most 30 times a second; other calls are ignored."""
         now = time.monotonic()
-        if now - self._shown < 1 / _FPS:
+        if now - self._last_shown_time < 1 / _MAX_FPS:
             return
-        self._shown = now
+        self._last_shown_time = now
         with self._server.atomic():
-            said = "".join(f"<br>{html.escape(note)}" for note in notes)
-            self._clock.content = f'<p style="margin:.3rem .75rem"><b>{shown.t:.2f} s</b>{said}</p>'
+            note_lines = "".join(f"<br>{html.escape(note)}" for note in notes)
+            self._clock.content = f'<p style="margin:.3rem .75rem"><b>{shown.t:.2f} s</b>{note_lines}</p>'
             self._stage.show(shown)
 
     def close(self) -> None:

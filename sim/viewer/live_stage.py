@@ -49,13 +49,13 @@ class LiveStage:
     scene : viser.SceneApi
         Scene of the page.
     model : mujoco.MjModel
-        The world with what follows the hand: bodies named ``phantom/…``, and ``figure/…`` or ``robot/…``.
+        The world: bodies named ``phantom/…``, and ``figure/…`` or ``robot/…`` for the body that follows the hand.
     drawn : sequence of Course
         The curves.
     radius : float
         Radius of the tube around each curve [m], 0 for none.
     figure, ghost : str
-        Labels of the two; empty if there is no ghost.
+        Labels of figure and ghost; empty if there is no ghost.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class LiveStage:
         self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
         self._figure = Actor(scene, "figure", coarser(shapes, FIGURE_CELL), 1.0)
         self._ghost = Actor(scene, "ghost", coarser(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
-        self._followed, self._origin, self._t = np.zeros(2), np.full(2, np.nan), 0.0
+        self._view_offset, self._start, self._t = np.zeros(2), np.full(2, np.nan), 0.0
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
@@ -77,7 +77,7 @@ class LiveStage:
         self._slice = scene.add_arrows(
             "/slice", np.zeros((1, 2, 3)), (120, 135, 160), shaft_radius=0.004, head_radius=0.010, head_length=0.022
         )
-        self._lag = scene.add_line_segments(
+        self._lag_line = scene.add_line_segments(
             "/lag", np.zeros((1, 2, 3)), rgb(USER), thickness=3.0, thickness_units="screen", visible=False
         )
         self._tubes: dict[str, viser.MeshHandle] = {}
@@ -102,21 +102,21 @@ class LiveStage:
             self._ghost_label.visible = shows and self._has_ghost
 
     def draw_course(self, k: int, points: Array) -> None:
-        """Draw curve number k at its present points in the hand frame [m], shape (m, 3)."""
+        """Draw curve k at its current points in the hand frame [m], shape (m, 3)."""
         course, radius = self._courses[k]
         line = drawn_at(points)
         self._draw_tube(f"/curve/{k}/line", line, 0.006, 8, {"color": rgb(course.line), "cast_shadow": False})
         if radius > 0.0:
-            looks = {"color": rgb(course.tube), "opacity": 0.14, "side": "double", "receive_shadow": False}
-            self._draw_tube(f"/curve/{k}/tube", line, MAGNIFICATION * radius, 20, looks | {"cast_shadow": False})
+            style = {"color": rgb(course.tube), "opacity": 0.14, "side": "double", "receive_shadow": False}
+            self._draw_tube(f"/curve/{k}/tube", line, MAGNIFICATION * radius, 20, style | {"cast_shadow": False})
 
-    def _draw_tube(self, node: str, line: Array, radius: float, sides: int, looks: dict[str, Any]) -> None:
+    def _draw_tube(self, node: str, line: Array, radius: float, sides: int, style: dict[str, Any]) -> None:
         vertices, faces = tube(line, radius, sides)
-        drawn = self._tubes.get(node)
-        if drawn is not None and len(drawn.vertices) == len(vertices):
-            drawn.vertices = vertices.astype(np.float32)
+        mesh = self._tubes.get(node)
+        if mesh is not None and len(mesh.vertices) == len(vertices):
+            mesh.vertices = vertices.astype(np.float32)
         else:
-            self._tubes[node] = self._scene.add_mesh_simple(node, vertices, faces, **looks)
+            self._tubes[node] = self._scene.add_mesh_simple(node, vertices, faces, **style)
 
     def draw_slice(self, points: Array, forces: Array) -> None:
         """Draw the field's forces [N] at points of the hand frame [m], shapes (n, 3); with no points, hide them."""
@@ -129,7 +129,7 @@ class LiveStage:
 
     def show(self, shown: Shown) -> None:
         """Draw one moment."""
-        data, shift = self._data, self._follow(shown.t, shown.qpos)
+        data, shift = self._data, self._update_view_offset(shown.t, shown.qpos)
         data.qpos[:] = shown.qpos
         mujoco.mj_kinematics(self._model, data)
         self._phantom.pose(data, P_WH, MAGNIFICATION, PHANTOM_AT)
@@ -144,26 +144,26 @@ class LiveStage:
             handle = self._arrows[name]
             handle.points = np.array([[tip, tip + METRES_PER_NEWTON * force]], dtype=np.float32)
             handle.visible = bool(np.linalg.norm(force) * METRES_PER_NEWTON > LEAST_ARROW)
-        held = bool(np.isfinite(shown.target[0]))
-        self._lag.visible = held
-        if held:
-            self._lag.points = np.array([[tip, drawn_at(shown.target)]], dtype=np.float32)
+        has_target = bool(np.isfinite(shown.target[0]))
+        self._lag_line.visible = has_target
+        if has_target:
+            self._lag_line.points = np.array([[tip, drawn_at(shown.target)]], dtype=np.float32)
 
-    def _follow(self, t: float, qpos: Array) -> Array:
+    def _update_view_offset(self, t: float, qpos: Array) -> Array:
         """Offset of the view (3,) [m]: the smoothed displacement of a travelling figure; else zero."""
         if self._root < 0:
             return np.zeros(3)
-        place = qpos[self._root : self._root + 2]
-        if np.isnan(self._origin[0]):
-            self._origin = place.copy()
-        way = place - self._origin
-        if np.linalg.norm(way - self._followed) > LEAPS:
-            self._followed = way if np.linalg.norm(way) > TRAVEL else np.zeros(2)
-        elif np.linalg.norm(way) > TRAVEL or np.any(self._followed != 0.0):
+        position = qpos[self._root : self._root + 2]
+        if np.isnan(self._start[0]):
+            self._start = position.copy()
+        displacement = position - self._start
+        if np.linalg.norm(displacement - self._view_offset) > LEAPS:
+            self._view_offset = displacement if np.linalg.norm(displacement) > TRAVEL else np.zeros(2)
+        elif np.linalg.norm(displacement) > TRAVEL or np.any(self._view_offset != 0.0):
             share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)
-            self._followed = self._followed + share * (way - self._followed)
+            self._view_offset = self._view_offset + share * (displacement - self._view_offset)
         self._t = t
-        return np.array([*self._followed, 0.0])
+        return np.array([*self._view_offset, 0.0])
 
     def _arrow(self, name: str, color: str) -> viser.ArrowsHandle:
         return self._scene.add_arrows(
@@ -184,8 +184,8 @@ class LiveStage:
 def light(scene: viser.SceneApi, shadows: bool = True) -> None:
     """Light a page: a soft sky, a light from the front, and viser's default lights, with or without shadows.
 
-    viser's environment map, hardly visible on matt bodies, is switched off. Without it and without shadows, a page is
-    drawn tens of times as fast on a machine without a graphics card.
+    viser's environment map, hardly visible on matt bodies, is switched off. Without it and without shadows, a page
+    renders tens of times faster on a machine without a graphics card.
     """
     scene.configure_environment_map(None)
     scene.configure_default_lights(shadows, cast_shadow=shadows)

@@ -6,7 +6,7 @@ from sim.viewer.shown import Shown
 
 
 class Page(Protocol):
-    """A page that shows a run while it goes on."""
+    """A page that shows a run in progress."""
 
     def show(self, shown: Shown) -> None:
         """Show a moment of the run."""

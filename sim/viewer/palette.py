@@ -9,7 +9,7 @@ import numpy as np
 from controllers.state import Array
 
 FIELD = "#22a046"  # the field and what it leads
-USER = "#eb7814"  # the hand's own force, and where it pushes
+USER = "#eb7814"  # the hand's own force, and the path where it pushes
 CURVE = "#3c465a"
 TUBE = "#4682c8"
 RIVERS = (TUBE, "#b5417a", "#8a6d1d", "#7a5fc0", "#1f8f98", "#a8453a", "#6b7280")  # of the first seven rivers
@@ -24,27 +24,27 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def river_colors(n: int) -> tuple[str, ...]:
-    """Colours of n rivers: `RIVERS`, then colours perceptually furthest from the previous and the other ones here."""
+    """Colours of n rivers: `RIVERS`, then colours perceptually farthest from these and from the other colours here."""
     colors: list[str] = list(RIVERS)
-    candidates, places = _candidates()
+    candidates, coordinates = _candidates()
     nearest = np.min(
-        [np.linalg.norm(places - other, axis=1) for other in _oklab([*RIVERS, FIELD, USER, CURVE])], axis=0
+        [np.linalg.norm(coordinates - other, axis=1) for other in _oklab([*RIVERS, FIELD, USER, CURVE])], axis=0
     )
     while len(colors) < n:
         best = int(nearest.argmax())
         colors.append(candidates[best])
-        nearest = np.minimum(nearest, np.linalg.norm(places - places[best], axis=1))
+        nearest = np.minimum(nearest, np.linalg.norm(coordinates - coordinates[best], axis=1))
     return tuple(colors[:n])
 
 
 def _candidates() -> tuple[list[str], Array]:
     """Colours with good contrast on white that are not glaring, and their coordinates in OKLab."""
     grid = product(np.arange(36) / 36.0, (0.3, 0.4, 0.5, 0.6), (0.35, 0.5, 0.65))
-    shares = np.array([colorsys.hls_to_rgb(*place) for place in grid])
+    shares = np.array([colorsys.hls_to_rgb(*hls) for hls in grid])
     colors = ["#" + bytes(row).hex() for row in np.rint(255.0 * shares).astype(np.uint8)]
-    places = _oklab(colors)
-    seen = (places[:, 0] > 0.35) & (places[:, 0] < 0.7)
-    return [color for color, keep in zip(colors, seen, strict=True) if keep], places[seen]
+    coordinates = _oklab(colors)
+    is_usable = (coordinates[:, 0] > 0.35) & (coordinates[:, 0] < 0.7)
+    return [color for color, keep in zip(colors, is_usable, strict=True) if keep], coordinates[is_usable]
 
 
 def _oklab(colors: Sequence[str]) -> Array:

@@ -24,18 +24,18 @@ from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
 
 FPS = 30.0  # [1/s]
-SECONDS = 60.0  # [s] longest replay; of a longer run the beginning is shown
+SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown
 MAGNIFICATION = 4.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin is drawn, out of the figure's reach
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
 ARROW = 0.6  # [m] drawn length of a large force (`typical_peak`)
-TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the stylus's path appears
-# The only notification a replay can give is that the browser renders in software.
+TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the path of the stylus appears
+# The only notification that a replay can show is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
 
-class _Target(NamedTuple):
-    """How the body that follows the animation is drawn.
+class _BodyLabels(NamedTuple):
+    """Labels of the body that follows the animation.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class _Target(NamedTuple):
     height: float
 
 
-_TARGETS = {
-    FIGURE: _Target("physical figure", "animation h(p)", 2.0), ROBOT: _Target("robot arm", "h(p, R)", 1.6)
+_BODY_LABELS = {
+    FIGURE: _BodyLabels("physical figure", "animation h(p)", 2.0), ROBOT: _BodyLabels("robot arm", "h(p, R)", 1.6)
 }  # fmt: skip
 
 
@@ -78,7 +78,7 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     RecordingError
         If an array or channel is missing, or the run ended before anything was recorded.
     """
-    quiet = io.StringIO()  # viser prints its address and its end, which are irrelevant here
+    quiet = io.StringIO()  # viser prints its address and its shutdown, which are irrelevant here
     with contextlib.redirect_stdout(quiet):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
@@ -104,8 +104,8 @@ class _Stage:
         self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
         # A kinematic figure is drawn once, without a ghost; there may be no figure at all.
         kind = recording.texts.get("figure", "physical")
-        self._simulated, prefix = kind in ("physical", "robot"), body_prefix(model)
-        target = _TARGETS[prefix]
+        self._is_simulated, prefix = kind in ("physical", "robot"), body_prefix(model)
+        labels = _BODY_LABELS[prefix]
         names = ("t", "qpos") if kind == "none" else ("t", "qpos", "reference")
         self._frames = {name: recording.channel("frames", name) for name in names}
         self._data = mujoco.MjData(model)
@@ -113,12 +113,12 @@ class _Stage:
         joints = (joint for joint in range(model.njnt) if model.joint(joint).name.startswith(prefix))
         first = next(joints, None)
         self._root = 0 if first is None else int(model.jnt_qposadr[first])
-        self._travels = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
+        self._is_travelling = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
         self._p_WH = recording.array("p_WH")
         figure = body_shapes(model, prefix)
         self._phantom = Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION)
         self._figure = Actor(scene, "figure", figure, 1.0)
-        self._ghost = Actor(scene, "ghost", figure if self._simulated else [], 1.0, GHOST)
+        self._ghost = Actor(scene, "ghost", figure if self._is_simulated else [], 1.0, GHOST)
         peak = max(typical_peak(self._ticks["force"]), typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
             name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))
@@ -131,11 +131,11 @@ class _Stage:
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
-        above = np.array([0.0, 0.0, target.height])
+        label_offset = np.array([0.0, 0.0, labels.height])
         if kind != "none":
-            self._label("figure", target.name if self._simulated else target.animation, above)
-        if self._simulated:
-            self._label("ghost", target.animation, GHOST_AT + above)
+            self._label("figure", labels.name if self._is_simulated else labels.animation, label_offset)
+        if self._is_simulated:
+            self._label("ghost", labels.animation, GHOST_AT + label_offset)
 
     def _label(self, name: str, text: str, position: Array) -> None:
         self._scene.add_label(
@@ -172,11 +172,11 @@ class _Stage:
         serializer = server.get_scene_serializer()
         times, frame_times = self._ticks["t"][:], self._frames["t"][:]
         n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
-        shown = times[0] + np.arange(n) / FPS
-        ticks, frames = (np.minimum(np.searchsorted(t, shown), len(t) - 1) for t in (times, frame_times))
-        shows = "reference" in self._frames
-        roots = np.array([self._frames["reference"][int(k)][:2] for k in frames]) if shows else np.zeros((n, 2))
-        shifts = followed(roots, FPS) if self._travels else np.zeros_like(roots)
+        replay_times = times[0] + np.arange(n) / FPS
+        ticks, frames = (np.minimum(np.searchsorted(t, replay_times), len(t) - 1) for t in (times, frame_times))
+        has_reference = "reference" in self._frames
+        roots = np.array([self._frames["reference"][int(k)][:2] for k in frames]) if has_reference else np.zeros((n, 2))
+        shifts = followed(roots, FPS) if self._is_travelling else np.zeros_like(roots)
         piece = int(TRAIL_SECONDS * FPS)
         for i in range(n):
             self._show(int(ticks[i]), int(frames[i]), shifts[i])
@@ -185,13 +185,13 @@ class _Stage:
             serializer.insert_sleep(1 / FPS)
         return serializer.as_html()
 
-    def _show(self, tick: int, frame: int, shifted: Array) -> None:
-        shift = np.array([*shifted, 0.0])
+    def _show(self, tick: int, frame: int, offset: Array) -> None:
+        shift = np.array([*offset, 0.0])
         self._data.qpos[:] = self._frames["qpos"][frame]
         mujoco.mj_kinematics(self._model, self._data)
         self._phantom.pose(self._data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
         self._figure.pose(self._data, shift, 1.0, np.zeros(3))
-        if self._simulated:
+        if self._is_simulated:
             reference = self._frames["reference"][frame]
             self._data.qpos[self._root : self._root + len(reference)] = reference
             mujoco.mj_kinematics(self._model, self._data)
@@ -206,10 +206,10 @@ class _Stage:
     def _extend_trail(self, index: int, start: int, stop: int) -> None:
         step = max(1, (stop - start) // 12)
         points = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step]
-        moved = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
-        if np.count_nonzero(moved) < 2:
+        is_distinct = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
+        if np.count_nonzero(is_distinct) < 2:
             return
-        pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > PUSH
-        vertices, faces = tube(points[moved], 0.007, sides=8)
-        color = rgb(USER if pushed else FIELD)
+        is_pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > PUSH
+        vertices, faces = tube(points[is_distinct], 0.007, sides=8)
+        color = rgb(USER if is_pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)

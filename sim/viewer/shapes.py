@@ -12,8 +12,8 @@ from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
 
 TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
 
-_LEAST_STEP = 1e-12  # [m] shortest step between two points that has a direction
-_LEAST_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
+_MIN_STEP = 1e-12  # [m] shortest step between two points that has a direction
+_MIN_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
 
 
 class Shape(NamedTuple):
@@ -38,7 +38,7 @@ class Shape(NamedTuple):
 
 
 def body_prefix(model: mujoco.MjModel) -> str:
-    """Prefix of the bodies of what follows the hand: those of a robot arm if the world has one, else of a figure."""
+    """Name prefix of the body that follows the hand: a robot arm if the world has one, else the figure."""
     return ROBOT if any(model.body(body).name.startswith(ROBOT) for body in range(model.nbody)) else FIGURE
 
 
@@ -86,16 +86,18 @@ def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
     cell : float
         Width of a cell [m].
     """
-    made: list[Shape] = []
+    simplified: list[Shape] = []
     for shape in shapes:
         cells, cluster = np.unique(np.floor(shape.vertices / cell).astype(np.int64), axis=0, return_inverse=True)
         cluster = cluster.ravel()
         counts = np.bincount(cluster, minlength=len(cells))
         sums = [np.bincount(cluster, shape.vertices[:, k], minlength=len(cells)) for k in range(3)]
         faces = np.sort(cluster[shape.faces], axis=1), cluster[shape.faces]
-        whole = (faces[0][:, 0] != faces[0][:, 1]) & (faces[0][:, 1] != faces[0][:, 2])
-        made.append(shape._replace(vertices=np.stack(sums, axis=1) / counts[:, None], faces=faces[1][whole]))
-    return made
+        is_triangle = (faces[0][:, 0] != faces[0][:, 1]) & (faces[0][:, 1] != faces[0][:, 2])
+        simplified.append(
+            shape._replace(vertices=np.stack(sums, axis=1) / counts[:, None], faces=faces[1][is_triangle])
+        )
+    return simplified
 
 
 def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray]:
@@ -129,7 +131,7 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray
     rings = np.empty((len(points), sides, 3))
     for ring, point, tangent in zip(rings, points, tangents, strict=True):
         normal = normal - (normal @ tangent) * tangent
-        if np.linalg.norm(normal) < _LEAST_NORMAL:
+        if np.linalg.norm(normal) < _MIN_NORMAL:
             # At the first ring, or where the path turns into the direction of the normal, choose a new normal.
             normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
         normal /= np.linalg.norm(normal)
@@ -146,8 +148,8 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray
 def _directions(tangents: Array) -> Array:
     """Unit tangents (n, 3); where a path rests or reverses, the previous tangent, or at the start the first one."""
     lengths = np.linalg.norm(tangents, axis=1)
-    moves = np.flatnonzero(lengths > _LEAST_STEP)
-    if len(moves) == 0:
+    moving = np.flatnonzero(lengths > _MIN_STEP)
+    if len(moving) == 0:
         return np.tile([1.0, 0.0, 0.0], (len(tangents), 1))
-    last = np.maximum(np.searchsorted(moves, np.arange(len(tangents)), "right") - 1, 0)
-    return tangents[moves[last]] / lengths[moves[last], None]
+    last = np.maximum(np.searchsorted(moving, np.arange(len(tangents)), "right") - 1, 0)
+    return tangents[moving[last]] / lengths[moving[last], None]

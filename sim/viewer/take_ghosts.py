@@ -13,7 +13,7 @@ from sim.viewer.palette import RIVERS, rgb
 from sim.viewer.shapes import body_shapes, coarser, tube
 
 COLORS = RIVERS[1:]
-_LEAST = 1e-4  # [m] least distance between drawn points of a path
+_MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path
 
 
 class TakeGhosts:
@@ -37,13 +37,13 @@ class TakeGhosts:
         self._paths: list[viser.MeshHandle] = []
         for k, (path, color) in enumerate(zip(paths.values(), COLORS, strict=False)):
             self._ghosts.append(Actor(scene, f"take/{k}", shapes, 1.0, color))
-            apart = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _LEAST
-            if np.count_nonzero(apart) > 1:
-                vertices, faces = tube(drawn_at(path[apart]), 0.008, sides=8)
+            is_distinct = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _MIN_POINT_DISTANCE
+            if np.count_nonzero(is_distinct) > 1:
+                vertices, faces = tube(drawn_at(path[is_distinct]), 0.008, sides=8)
                 self._paths.append(scene.add_mesh_simple(f"/take/path/{k}", vertices, faces, color=rgb(color)))
 
     def show(self, poses: Sequence[Array]) -> None:
-        """Show a pose (75,) of each take; the takes are drawn at one place, that of the ghost."""
+        """Show a pose (75,) of each take; all takes are drawn at the place of the ghost."""
         for ghost, pose in zip(self._ghosts, poses, strict=False):
             self._data.qpos[self._root : self._root + len(pose)] = pose
             mujoco.mj_kinematics(self._model, self._data)

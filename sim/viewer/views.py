@@ -1,4 +1,4 @@
-"""Camera views of a live page, placed such that a view fills the part of the window that the panel leaves free."""
+"""Camera views of a live page; a view fills the part of the window that the panel leaves free."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -11,10 +11,10 @@ from controllers.state import Array
 
 FIELD_OF_VIEW = np.deg2rad(34.0)  # vertical [rad]: a ball at the upper edge is drawn 1/cos 17°, 5 % longer than wide
 PANEL = 335.0  # [px] width of viser's panel
-PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel covers the lower part
-DESKTOP = 576.0, 720.0  # [px] a tall window between these widths is no phone's: up to the first viser covers the lower
+PHONE = 0.75  # width/height below which a window counts as a phone's, where the panel covers the lower part
+DESKTOP = 576.0, 720.0  # [px] a tall window between these widths is no phone's: below the first viser covers the lower
 # part, and phones, whose pixels are finer, report more than the second
-LEAST_FREE = 0.3  # least share of the width beside the panel: reached by windows below 479 px that are no phone's
+LEAST_FREE = 0.3  # smallest share of the width beside the panel: reached by windows below 479 px other than a phone's
 SHEET = 0.6  # share of the height that the panel covers on a phone
 DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not reported its own
 
@@ -55,7 +55,7 @@ def camera_of(view: View, width: float, height: float) -> Camera:
     r"""The camera that shows a view in a window of a given size [px].
 
     With m metres per pixel in the plane of the view's centre, window height h and field of view α, its distance is
-    m h/(2 tan(α/2)). It is shifted by half of what the panel covers, so that the view is centred in the rest.
+    m h/(2 tan(α/2)). It is shifted by half the part that the panel covers, so that the view is centred in the rest.
     """
     free = (
         (width, (1.0 - SHEET) * height) if is_phone(width, height) else (max(width - PANEL, LEAST_FREE * width), height)
@@ -86,8 +86,8 @@ def add_view_buttons(gui: viser.GuiApi) -> None:
 
 def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, size: tuple[float, float]) -> None:
     """Place a camera such that it shows a view in a window of a given size (width, height) [px]."""
-    place = camera_of(view, *size)
-    camera.position, camera.look_at, camera.fov = place.position, place.look_at, FIELD_OF_VIEW
+    placement = camera_of(view, *size)
+    camera.position, camera.look_at, camera.fov = placement.position, placement.look_at, FIELD_OF_VIEW
 
 
 def look_from(client: viser.ClientHandle, view: View) -> None:
@@ -105,18 +105,18 @@ def window_of(camera: viser.CameraHandle) -> tuple[float, float]:
 
 
 def open_with(server: viser.ViserServer, view_of: Callable[[viser.ClientHandle], View]) -> None:
-    """Show a view of its own to each new browser, and again where its view is reset or its window changes its shape.
+    """Show a view to each new browser, and again when its view is reset or its window changes shape.
 
-    A view that somebody has turned or moved stays when the window changes.
+    A view that a user has turned or moved is kept when the window changes.
 
-    A browser may apply the server's initial camera after the one it is sent when it connects (viser 1.1 does the one
-    in an effect of its page, the other as a message comes), so the view is sent again to one that reports the initial
-    camera.
+    A browser may apply the server's initial camera after the one that it is sent on connecting (viser 1.1 applies the
+    former in an effect of its page, the latter when its message arrives), so the view is sent again to a browser that
+    reports the initial camera.
     """
     look(server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
     initial = server.initial_camera.position
 
-    def connected(client: viser.ClientHandle) -> None:
+    def place_camera(client: viser.ClientHandle) -> None:
         look_from(client, view_of(client))
         sizes = deque([window_of(client.camera)], maxlen=32)
 
@@ -127,22 +127,22 @@ def open_with(server: viser.ViserServer, view_of: Callable[[viser.ClientHandle],
                 sizes.append(size)
             if np.allclose(camera.position, initial, atol=1e-4):
                 look_from(client, view_of(client))
-            elif _resized(before, size):
-                view = next((view for view in VIEWS.values() if _shows(camera, view, sizes)), None)
+            elif _is_resized(before, size):
+                view = next((view for view in VIEWS.values() if _is_placed_for(camera, view, sizes)), None)
                 if view is not None:
                     look(camera, view, size)
 
-    server.on_client_connect(connected)
+    server.on_client_connect(place_camera)
 
 
-def _resized(before: tuple[float, float], size: tuple[float, float]) -> bool:
-    """Whether a window was resized, and not drawn with other pixels: viser takes down to 3/4 of them if it is slow."""
+def _is_resized(before: tuple[float, float], size: tuple[float, float]) -> bool:
+    """Whether a window was resized, not just drawn at another resolution: viser goes down to 3/4 if it is slow."""
     share = size[0] / before[0]
     return abs(share - size[1] / before[1]) > 0.01 * share or not 0.74 < share < 1.36
 
 
-def _shows(camera: viser.CameraHandle, view: View, sizes: Iterable[tuple[float, float]]) -> bool:
-    """Whether a camera is where it was placed for a view, in a window of one of the given sizes."""
+def _is_placed_for(camera: viser.CameraHandle, view: View, sizes: Iterable[tuple[float, float]]) -> bool:
+    """Whether a camera is where a view places it in a window of one of the given sizes."""
     return any(np.allclose(camera.position, camera_of(view, *size).position, atol=1e-3) for size in sizes)
 
 

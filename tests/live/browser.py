@@ -137,7 +137,7 @@ class Served:
         end = time.monotonic() + patience
         while not condition():
             assert self.thread.is_alive(), f"the page has ended before: {what}"
-            assert time.monotonic() < end, f"not so after {patience:g} s: {what}; said: {self.page._said}"
+            assert time.monotonic() < end, f"not so after {patience:g} s: {what}; said: {self.page._messages}"
             time.sleep(step)
 
     def settled(self) -> dict[str, np.ndarray]:

@@ -173,7 +173,7 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     tab.get_by_text("take 1:").first.wait_for()
     tab.wait_for_timeout(500.0)
     kept(tab, "compared")
-    served.page._takes._span.value = (0.2, 1.2)
+    served.page._takes._region_slider.value = (0.2, 1.2)
     tab.get_by_role("button", name="Take over").click()
     tab.get_by_text("0.2 to 1.2 s from take 1").wait_for()
     mix = load(downloaded(tab, "Download the mix as BVH", tmp_path / "mix.bvh")).clip

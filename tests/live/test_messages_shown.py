@@ -16,7 +16,7 @@ from sim.errors import SimError
 def page() -> Any:
     """A page without server and processes."""
     it: Any = Page.__new__(Page)
-    it.driver, it._said, it._turn, it._lines = Driver(), [], threading.RLock(), SimpleNamespace(content="")
+    it.driver, it._messages, it._lock, it._lines = Driver(), [], threading.RLock(), SimpleNamespace(content="")
     return it
 
 
@@ -24,7 +24,7 @@ def test_a_message_is_shown_once_and_comes_last() -> None:
     it = page()
     for line in ("Nothing is left to undo.", "another", "Nothing is left to undo."):
         it.say(line)
-    assert it._said == ["another", "Nothing is left to undo."]
+    assert it._messages == ["another", "Nothing is left to undo."]
     assert it._lines.content.count("Nothing") == 1
 
 
@@ -39,10 +39,10 @@ def test_a_message_goes_when_its_field_is_set_again_and_no_other_one() -> None:
     it.say("before")
     field(event)
     it.say("after")
-    assert it._said == ["before", "stiffness is -5", "after"]
+    assert it._messages == ["before", "stiffness is -5", "after"]
     wrong[0] = False
     field(event)
-    assert it._said == ["before", "after"]
+    assert it._messages == ["before", "after"]
 
 
 @pytest.mark.parametrize(("paused", "holds"), [(True, True), (True, False), (False, True)])

@@ -12,7 +12,7 @@ from experiments.live.session.desk import UNWATCHED, Desk
 def test_a_take_that_no_browser_has_watched_for_a_while_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     it: Any = Desk.__new__(Desk)
     said, stops, now = list[str](), list[float](), [100.0]
-    it._say, it.stop, it._watched, it.now = said.append, lambda: stops.append(now[0]), 0.0, {"recording": np.ones(1)}
+    it._say, it.stop, it._watch_time, it.now = said.append, lambda: stops.append(now[0]), 0.0, {"recording": np.ones(1)}
     monkeypatch.setattr(desk.time, "monotonic", lambda: now[0])
     for browsers, seconds in ((1, 1.0), (0, UNWATCHED - 1.0), (1, 1.0), (0, UNWATCHED - 1.0)):
         now[0] += seconds

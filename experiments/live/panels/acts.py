@@ -1,4 +1,4 @@
-"""The wrapper of event handlers that every panel is given (`experiments.live.page.Page.acts`)."""
+"""The wrapper of event handlers that every panel receives (`experiments.live.page.Page.acts`)."""
 
 from collections.abc import Callable
 from typing import Any

@@ -27,16 +27,16 @@ class ClockPanel:
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
         self._desk = desk
-        self._press = gui.add_checkbox(
+        self._grab = gui.add_checkbox(
             "Grab and bend", False, visible=False,
             hint="The stylus' switch: with it a drag takes hold of the curve and bends it; so does shift.",
         )  # fmt: skip
-        self._keep = gui.add_checkbox("Hold on", False, hint="Keep the stylus when the mouse lets go of the ball.")
+        self._hold_on = gui.add_checkbox("Hold on", False, hint="Keep the stylus when the mouse lets go of the ball.")
         self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
         self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
         self._pace = gui.add_dropdown("Pace", tuple(PACES))
-        self._back = gui.add_slider(
+        self._look_back = gui.add_slider(
             "Look back [s]",
             -REMEMBERED,
             0.0,
@@ -44,16 +44,16 @@ class ClockPanel:
             0.0,
             hint="Now is at the right; time stands still while you look.",
         )
-        self._from = gui.add_button("Go on from there", visible=False)
+        self._resume = gui.add_button("Go on from there", visible=False)
         self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
-        self._press.on_update(acts(lambda event: desk.press(self._press.value)))
-        self._keep.on_update(acts(lambda event: None if self._keep.value else desk.let_go()))
-        self._perform.on_click(acts(lambda event: desk.perform(not self._performs)))
+        self._grab.on_update(acts(lambda event: desk.press(self._grab.value)))
+        self._hold_on.on_update(acts(lambda event: None if self._hold_on.value else desk.let_go()))
+        self._perform.on_click(acts(lambda event: desk.perform(not self._is_performing)))
         self._time.on_click(acts(lambda event: self._on_time()))
         self._edit.on_click(acts(lambda event: desk.undo() if self._edit.value == "Undo" else desk.redo()))
         self._pace.on_update(acts(lambda event: desk.pace(PACES[self._pace.value])))
-        self._back.on_update(acts(lambda event: desk.pause(True)))
-        self._from.on_click(acts(lambda event: self._go_on()))
+        self._look_back.on_update(acts(lambda event: desk.pause(True)))
+        self._resume.on_click(acts(lambda event: self._go_on_from_past()))
         self._rearm.on_click(acts(lambda event: desk.rearm()))
         keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
             "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
@@ -61,46 +61,46 @@ class ClockPanel:
             "Reset": ("R", lambda event: desk.reset()),
             "Undo": ("Z", lambda event: desk.undo()),
             "Redo": ("Y", lambda event: desk.redo()),
-            "Grab or let go": ("G", lambda event: self._toggle()),
+            "Grab or let go": ("G", lambda event: self._toggle_grab()),
         }
-        for label, (key, does) in keys.items():
-            gui.add_command(label, hotkey=key).on_trigger(acts(does))
+        for label, (key, action) in keys.items():
+            gui.add_command(label, hotkey=key).on_trigger(acts(action))
 
     @property
     def pressed(self) -> bool:
         """Whether the switch is pressed while the hand holds the stylus."""
-        return self._press.value
+        return self._grab.value
 
     @property
     def keeps(self) -> bool:
         """Whether the hand keeps holding the stylus when the mouse lets go."""
-        return self._keep.value
+        return self._hold_on.value
 
     @property
     def seconds_ago(self) -> float:
-        """How far the view looks back in time [s]."""
-        return -self._back.value
+        """Time by which the view looks back [s]."""
+        return -self._look_back.value
 
     def write(self) -> None:
         """Update the buttons from the state of the run."""
         desk = self._desk
-        self._from.visible = self.seconds_ago > 0.0
+        self._resume.visible = self.seconds_ago > 0.0
         self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
         built = desk.built
-        self._press.visible = built is not None and built.bends
+        self._grab.visible = built is not None and built.bends
         self._perform.visible = built is not None and isinstance(built.config.mode, StretchThenFollow)
-        self._perform.label = "Bend it again" if self._performs else "Perform the bent curve"
+        self._perform.label = "Bend it again" if self._is_performing else "Perform the bent curve"
 
     @property
-    def _performs(self) -> bool:
+    def _is_performing(self) -> bool:
         return bool(self._desk.now["performs"][0] > 0.0)
 
-    def _toggle(self) -> None:
-        self._press.value = not self._press.value
-        self._desk.press(self._press.value)
+    def _toggle_grab(self) -> None:
+        self._grab.value = not self._grab.value
+        self._desk.press(self._grab.value)
 
     def _on_time(self) -> None:
-        self._back.value = 0.0
+        self._look_back.value = 0.0
         if self._time.value == "Pause":
             self._desk.pause(not self._desk.paused)
         elif self._time.value == "Step":
@@ -108,7 +108,7 @@ class ClockPanel:
         else:
             self._desk.reset()
 
-    def _go_on(self) -> None:
+    def _go_on_from_past(self) -> None:
         self._desk.go_back(self.seconds_ago)
-        self._back.value = 0.0
+        self._look_back.value = 0.0
         self._desk.pause(False)

@@ -15,7 +15,7 @@ from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import Gain, gains_of
 
 COLORS = {"certified": "#1d8a3a", "refuted": "#c02020", "unknown": "#a8700a"}
-TYPING = 2.0  # [s] for which a number that is not the gain stays in its field
+TYPING = 2.0  # [s] for which a number that differs from the gain stays in its field
 _WORDS = {"certified": "stable", "refuted": "unstable", "unknown": "unknown"}
 
 
@@ -27,23 +27,23 @@ class GainsPanel:
         self._verdict = gui.add_html("")
         self._folder = gui.add_folder("Gains")
         self._sliders: dict[Gain, viser.GuiSliderHandle[float]] = {}
-        self._known: dict[Gain, float] = {}
-        self._apart: dict[Gain, tuple[float, float]] = {}
+        self._last_values: dict[Gain, float] = {}
+        self._differing: dict[Gain, tuple[float, float]] = {}
 
     def rebuild(self) -> None:
-        """Make the sliders of the current mode."""
+        """Create the sliders of the current mode."""
         for slider in self._sliders.values():
             slider.remove()
         self._sliders.clear()
-        self._apart.clear()
+        self._differing.clear()
         if self._desk.config is None:
             return
         with self._folder:
             for gain, value in gains_of(self._desk.config).items():
-                ends = min(gain.least, value), max(gain.most, value)  # also of a gain of the command line
+                ends = min(gain.least, value), max(gain.most, value)  # also includes a gain from the command line
                 slider = self._gui.add_slider(f"{gain.symbol} [{gain.unit}]", *ends, gain.step, value, hint=gain.name)
-                slider.on_update(self._acts(self._moves(gain, slider)))
-                self._sliders[gain], self._known[gain] = slider, value
+                slider.on_update(self._acts(self._slider_handler(gain, slider)))
+                self._sliders[gain], self._last_values[gain] = slider, value
 
     def write(self) -> None:
         """Show the verdict, and update sliders whose gains were undone, redone or refused."""
@@ -56,29 +56,29 @@ class GainsPanel:
             if slider is None:
                 continue
             if abs(slider.value - value) <= 0.5 * gain.step:
-                self._apart.pop(gain, None)
-            elif value != self._known[gain] or self._stands(gain, slider.value):
+                self._differing.pop(gain, None)
+            elif value != self._last_values[gain] or self._differs_for_long(gain, slider.value):
                 slider.value = value
-            self._known[gain] = value
+            self._last_values[gain] = value
 
-    def _stands(self, gain: Gain, shown: float) -> bool:
-        """Whether a slider has shown what is not the gain for `TYPING`; before, it may be typed, or not handled yet."""
+    def _differs_for_long(self, gain: Gain, shown: float) -> bool:
+        """Whether a slider has differed from its gain for `TYPING`; until then it may be typed, or not handled yet."""
         now = time.monotonic()
-        if self._apart.get(gain, (math.nan, 0.0))[0] != shown:
-            self._apart[gain] = shown, now
-        return now - self._apart[gain][1] > TYPING
+        if self._differing.get(gain, (math.nan, 0.0))[0] != shown:
+            self._differing[gain] = shown, now
+        return now - self._differing[gain][1] > TYPING
 
-    def _moves(self, gain: Gain, slider: Any) -> Callable[[Any], None]:
-        def moved(event: Any) -> None:
+    def _slider_handler(self, gain: Gain, slider: Any) -> Callable[[Any], None]:
+        def on_move(event: Any) -> None:
             value = slider.value
             if not slider.min <= value <= slider.max:
                 raise ParameterError(
                     f"{gain.symbol} is {value:g}; expected {slider.min:g} to {slider.max:g} {gain.unit}"
                 )
             self._desk.set_gain(gain.name, value)
-            self._known[gain] = value
+            self._last_values[gain] = value
 
-        return moved
+        return on_move
 
 
 def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
@@ -89,15 +89,17 @@ def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
     if not verdicts:
         return '<p style="margin:.5rem .75rem;color:#a8700a"><b>checking…</b></p>'
     blocks: list[str] = []
-    for found in verdicts:
-        color, reason = COLORS[found.verdict], html.escape(found.reason)
-        margin = "" if found.margin is None else f" up to {found.margin + 1.0:.3g} times k_r"
-        passive = f"Passivity {html.escape(found.passive)}." if found.passive else ""
-        said, more = ("", f"It {reason}. {passive}") if found.verdict == "certified" else (f"<br>{reason}.", passive)
-        why = f'<details><summary style="cursor:pointer">why</summary>{more}</details>' if more else ""
+    for verdict in verdicts:
+        color, reason = COLORS[verdict.verdict], html.escape(verdict.reason)
+        margin = "" if verdict.margin is None else f" up to {verdict.margin + 1.0:.3g} times k_r"
+        passive = f"Passivity {html.escape(verdict.passive)}." if verdict.passive else ""
+        shown, details = (
+            ("", f"It {reason}. {passive}") if verdict.verdict == "certified" else (f"<br>{reason}.", passive)
+        )
+        fold = f'<details><summary style="cursor:pointer">why</summary>{details}</details>' if details else ""
         blocks.append(
-            f'<div class="verdict-{found.verdict}" style="margin:.4rem .75rem;padding:.2rem .6rem;font-size:.8rem;'
-            f'border-left:6px solid {color}"><b style="color:{color}">{html.escape(found.law)}: '
-            f"{_WORDS[found.verdict]}</b>{margin}{' · checking…' if checking else ''}{said}{why}</div>"
+            f'<div class="verdict-{verdict.verdict}" style="margin:.4rem .75rem;padding:.2rem .6rem;font-size:.8rem;'
+            f'border-left:6px solid {color}"><b style="color:{color}">{html.escape(verdict.law)}: '
+            f"{_WORDS[verdict.verdict]}</b>{margin}{' · checking…' if checking else ''}{shown}{fold}</div>"
         )
     return "".join(blocks)

@@ -10,7 +10,7 @@ from controllers.state import Array
 from experiments.live.panels.acts import Acts
 from experiments.live.session.desk import Desk
 
-STEP = 0.003  # [m] per press; at some thirty key repeats a second this is 0.1 m/s
+STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
 LETS_GO = "H"
 WAYS: dict[str, tuple[str, Array]] = {
     "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
@@ -32,9 +32,9 @@ def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[
         Whether the switch is pressed.
     """
 
-    def moves(way: Array) -> Callable[[Any], None]:
-        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * way, pressed())
+    def handler(direction: Array) -> Callable[[Any], None]:
+        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * direction, pressed())
 
-    for key, (label, way) in WAYS.items():
-        gui.add_command(label, hotkey=key).on_trigger(acts(moves(way)))  # pyright: ignore[reportArgumentType]
+    for key, (label, direction) in WAYS.items():
+        gui.add_command(label, hotkey=key).on_trigger(acts(handler(direction)))  # pyright: ignore[reportArgumentType]
     gui.add_command("Let go of the stylus", hotkey=LETS_GO).on_trigger(acts(lambda event: desk.let_go()))

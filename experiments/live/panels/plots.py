@@ -26,15 +26,15 @@ class Plots:
         empty = np.zeros(2)
         self._force = gui.add_uplot(
             (empty, empty, empty), ({"label": "t [s]"}, _line("device [N]", FIELD), _line("hand [N]", USER)),
-            title="Force [N]", height=150, scales=_TIMES,
+            title="Force [N]", height=150, scales=_TIME_SCALE,
         )  # fmt: skip
         self._distance = gui.add_uplot(
             (empty, empty), ({"label": "t [s]"}, _line("from the curve [mm]", TUBE)),
-            title="Deviation [mm]", height=140, scales=_TIMES,
+            title="Deviation [mm]", height=140, scales=_TIME_SCALE,
         )  # fmt: skip
         self._residual = gui.add_uplot(
             (empty, empty), ({"label": "t [s]"}, _line("at the root [N]", "#7a5fc0")),
-            title="Residual force [N]", height=140, scales=_TIMES,
+            title="Residual force [N]", height=140, scales=_TIME_SCALE,
         )  # fmt: skip
 
     def write(self, history: deque[dict[str, Array]]) -> None:
@@ -48,7 +48,7 @@ class Plots:
         self._residual.data = (t, residual)
 
 
-_TIMES: dict[str, uplot.Scale] = {"x": {"time": False}}
+_TIME_SCALE: dict[str, uplot.Scale] = {"x": {"time": False}}
 
 
 def _line(label: str, color: str) -> uplot.Series:

@@ -51,11 +51,11 @@ class RunPanel:
             self._folder = gui.add_folder("Clips")
             self._build = gui.add_button("Run this", icon=viser.Icon.PLAYER_PLAY, color="blue")
         self._slots: list[viser.GuiDropdownHandle[Any]] = []
-        self._chosen = tuple(config.map.clips)
-        self._known = self._clips()
-        self._lay_slots()
-        self._mode.on_update(acts(lambda event: self._lay_slots()))
-        self._map.on_update(acts(lambda event: self._lay_slots()))
+        self._pending_names = tuple(config.map.clips)
+        self._offered_clips = self._clips()
+        self._rebuild_slots()
+        self._mode.on_update(acts(lambda event: self._rebuild_slots()))
+        self._map.on_update(acts(lambda event: self._rebuild_slots()))
         self._build.on_click(acts(lambda event: desk.build(self.config())))
 
     def config(self) -> RunConfig:
@@ -67,31 +67,35 @@ class RunPanel:
             If its parts do not fit.
         """
         mode = str(self._mode.value)
-        words: dict[str, Any] = {"figure": str(self._figure.value), "seconds": FOR_EVER, "clips": self._names()}
+        options: dict[str, Any] = {
+            "figure": str(self._figure.value),
+            "seconds": FOR_EVER,
+            "clips": self._clip_names(),
+        }
         if mode == "lead":
-            return run_config(mode=mode, **words)
-        chosen = str(self._map.value)
-        if chosen == "file":
-            del words["clips"]
-            return run_config(mode=mode, map=self._file, **words)
-        return run_config(mode=mode, map=chosen, **words)
+            return run_config(mode=mode, **options)
+        map_kind = str(self._map.value)
+        if map_kind == "file":
+            del options["clips"]
+            return run_config(mode=mode, map=self._file, **options)
+        return run_config(mode=mode, map=map_kind, **options)
 
     def show(self, built: Built) -> None:
         """Set the choice to the current run."""
         config = built.config
-        self._chosen = tuple(_name(clip) for clip in config.map.clips)
+        self._pending_names = tuple(_clip_label(clip) for clip in config.map.clips)
         self._mode.value, self._figure.value = config.mode.kind, config.figure.kind
         if not config.leads:
             self._map.value = _map_kind(config)
-        self._lay_slots()
+        self._rebuild_slots()
 
     def write(self) -> None:
         """Offer newly prepared clips."""
-        if self._clips() != self._known:
-            new = [name for name in self._clips() if name not in self._known]
-            self._known = self._clips()
-            self._chosen = (*new, *self._names_shown()[len(new) :])
-            self._lay_slots()
+        if self._clips() != self._offered_clips:
+            new_clips = [name for name in self._clips() if name not in self._offered_clips]
+            self._offered_clips = self._clips()
+            self._pending_names = (*new_clips, *self._shown_names()[len(new_clips) :])
+            self._rebuild_slots()
 
     def _clips(self) -> tuple[str, ...]:
         return (*self._desk.clips, *embedded_names())
@@ -99,27 +103,27 @@ class RunPanel:
     def _kind(self) -> str:
         return "led" if self._mode.value == "lead" else str(self._map.value)
 
-    def _lay_slots(self) -> None:
+    def _rebuild_slots(self) -> None:
         labels, known = SLOTS[self._kind()], self._clips()
         if len(self._slots) == len(labels):
-            chosen = self._names_shown() if not self._chosen else self._chosen
+            names = self._shown_names() if not self._pending_names else self._pending_names
         else:
-            chosen = self._chosen
+            names = self._pending_names
         defaults = _default_clips(self._kind())
         for slot in self._slots:
             slot.remove()
         self._slots = []
         with self._folder:
             for k, label in enumerate(labels):
-                name = chosen[k] if k < len(chosen) and chosen[k] in known else defaults[min(k, len(defaults) - 1)]
+                name = names[k] if k < len(names) and names[k] in known else defaults[min(k, len(defaults) - 1)]
                 self._slots.append(self._gui.add_dropdown(label, known, initial_value=name))
-        self._chosen = ()
+        self._pending_names = ()
 
-    def _names_shown(self) -> tuple[str, ...]:
+    def _shown_names(self) -> tuple[str, ...]:
         return tuple(str(slot.value) for slot in self._slots)
 
-    def _names(self) -> tuple[str, ...]:
-        return tuple(str(self._desk.clips.get(name, name)) for name in self._names_shown())
+    def _clip_names(self) -> tuple[str, ...]:
+        return tuple(str(self._desk.clips.get(name, name)) for name in self._shown_names())
 
 
 def _map_kind(config: RunConfig) -> str:
@@ -127,17 +131,17 @@ def _map_kind(config: RunConfig) -> str:
 
 
 def _default_clips(kind: str) -> tuple[str, ...]:
-    found = next((part for part in (*MAPS, Led) if part.__pydantic_fields__["kind"].default == kind), None)  # pyright: ignore
-    return () if found is None or kind == "file" else found().clips  # pyright: ignore
+    cls = next((part for part in (*MAPS, Led) if part.__pydantic_fields__["kind"].default == kind), None)  # pyright: ignore
+    return () if cls is None or kind == "file" else cls().clips  # pyright: ignore
 
 
-def _name(clip: str) -> str:
-    """Name of a clip in a list: of a file its stem."""
+def _clip_label(clip: str) -> str:
+    """Name of a clip in a list; for a file, its stem."""
     return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
 
 
 def configuration_text(config: RunConfig | None) -> str:
-    """A configuration as JSON, as ``hvf run --config`` reads it.
+    """A configuration as JSON, for ``hvf run --config``.
 
     Raises
     ------

@@ -20,20 +20,20 @@ FIRST_STEPS = """
 
 def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
     """HTML of the status lines, including a fault of the device."""
-    middle, most = 1e3 * now["cost"]
-    doing = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
-    said = [f"<b>{now['t'][0]:.2f} s</b> · {doing}"]
+    median, high = 1e3 * now["cost"]
+    pace = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
+    lines = [f"<b>{now['t'][0]:.2f} s</b> · {pace}"]
     if desk.paused and desk.holds:
-        said.append("<b>Press space</b>: you hold the stylus, but time stands still")
+        lines.append("<b>Press space</b>: you hold the stylus, but time stands still")
     if going:
-        said.append(html.escape(going))
+        lines.append(html.escape(going))
     elif driver is None:
-        said.append("<b>Drag the orange ball</b> (keys: I J K L U O)")
+        lines.append("<b>Drag the orange ball</b> (keys: I J K L U O)")
     else:
-        said.append(f"browser {driver} drives")
+        lines.append(f"browser {driver} drives")
     if desk.records:
-        said.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
+        lines.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
     if now["fault"][0] != 0.0:
-        said.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
-    said.append(f'<span style="color:#7a8494">a tick takes {middle:.2f} ms, 99 % under {most:.2f} ms</span>')
-    return "".join(f'<p style="margin:.25rem .75rem;font-size:.8rem">{line}</p>' for line in said)
+        lines.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
+    lines.append(f'<span style="color:#7a8494">a tick takes {median:.2f} ms, 99 % under {high:.2f} ms</span>')
+    return "".join(f'<p style="margin:.25rem .75rem;font-size:.8rem">{line}</p>' for line in lines)

@@ -42,7 +42,7 @@ class TakesPanel:
         self._name = gui.add_text("Name", "take 1")
         self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
         self._list: viser.GuiDropdownHandle[Any] = gui.add_dropdown("Take", (NONE,))
-        self._get = gui.add_button_group("Download", ("BVH", "Recording", "Configuration"))
+        self._download = gui.add_button_group("Download", ("BVH", "Recording", "Configuration"))
         with gui.add_folder("Compare and mix", expand_by_default=False):
             self._other: viser.GuiDropdownHandle[Any] = gui.add_dropdown("With", (NONE,))
             self._compare = gui.add_checkbox(
@@ -54,22 +54,22 @@ class TakesPanel:
                 ({"label": "t [s]"}, *({"label": str(k), "stroke": c, "width": 2} for k, c in enumerate(COLORS[:2]))),
                 title="Force [N]", height=140, scales={"x": {"time": False}}, visible=False,
             )  # fmt: skip
-            self._span = gui.add_multi_slider(
+            self._region_slider = gui.add_multi_slider(
                 "Region [s]", 0.0, 10.0, 0.1, (1.0, 3.0), hint="Of the take, that is taken from the other one."
             )
             self._mix = gui.add_button_group("Mix", ("Take over", "Undo"))
             self._export = gui.add_button("Download the mix as BVH", icon=viser.Icon.DOWNLOAD)
-            self._said = gui.add_html("")
+            self._regions_line = gui.add_html("")
         self._record.on_click(acts(lambda event: self._on_record()))
-        self._get.on_click(acts(self._on_get))
+        self._download.on_click(acts(self._on_download))
         self._compare.on_update(acts(lambda event: self._on_compare()))
-        self._list.on_update(acts(lambda event: self._chosen()))
+        self._list.on_update(acts(lambda event: self._on_choose()))
         self._other.on_update(acts(lambda event: self._on_compare()))
         self._mix.on_click(acts(lambda event: self._on_mix()))
         self._export.on_click(acts(self._on_export))
 
     def stage_set(self, model: mujoco.MjModel) -> None:
-        """Reset the comparison after the scene was built anew."""
+        """Reset the comparison after the scene was rebuilt."""
         self._model, self._ghosts = model, None
         self._compare.value = False
 
@@ -79,7 +79,7 @@ class TakesPanel:
         return self._ghosts is not None
 
     def draw(self) -> None:
-        """Draw the current poses of the compared takes, which are played in a loop."""
+        """Draw the current poses of the compared takes, which play in a loop."""
         ghosts = self._ghosts
         if ghosts is None:
             return
@@ -91,10 +91,10 @@ class TakesPanel:
         """Update the button and the lists of takes."""
         self._record.label = "Stop" if self._desk.records else "Record"
         names = self._desk.takes() or (NONE,)
-        for known in (self._list, self._other):
-            if tuple(known.options) != names:
-                known.options = names
-                known.value = names[-1] if known is self._list else names[0]
+        for dropdown in (self._list, self._other):
+            if tuple(dropdown.options) != names:
+                dropdown.options = names
+                dropdown.value = names[-1] if dropdown is self._list else names[0]
 
     def _on_record(self) -> None:
         if self._desk.records:
@@ -103,15 +103,15 @@ class TakesPanel:
             self._desk.record(self._name.value)
             self._name.value = next_name(self._name.value)
 
-    def _on_get(self, event: Any) -> None:
-        kind = self._get.value
+    def _on_download(self, event: Any) -> None:
+        kind = self._download.value
         if kind == "Configuration":
             _send(event, "config.json", configuration_text(self._desk.config).encode())
             return
-        file = self._folder(self._list) / (EDITED if kind == "BVH" else RECORDING)
+        file = self._take_folder(self._list) / (EDITED if kind == "BVH" else RECORDING)
         _send(event, f"{self._list.value}{file.suffix}", file.read_bytes())
 
-    def _chosen(self) -> None:
+    def _on_choose(self) -> None:
         self._regions = []
         if self._compare.value:
             self._on_compare()
@@ -139,26 +139,28 @@ class TakesPanel:
             self._regions.pop()
         else:
             first, second = self._pair()
-            start, end = self._span.value
+            start, end = self._region_slider.value
             regions = [*self._regions, Region(float(start), float(end), second)]
             mixed(first, regions)  # raises if the region is invalid, before it is stored
             self._regions = regions
         self._on_compare()
-        said = [f"{r.start:.1f} to {r.end:.1f} s from {r.take.name}" for r in self._regions]
-        self._said.content = f'<p style="margin:.3rem .75rem;font-size:.8rem">{"; ".join(said) or "no regions"}</p>'
+        parts = [f"{r.start:.1f} to {r.end:.1f} s from {r.take.name}" for r in self._regions]
+        self._regions_line.content = (
+            f'<p style="margin:.3rem .75rem;font-size:.8rem">{"; ".join(parts) or "no regions"}</p>'
+        )
 
     def _on_export(self, event: Any) -> None:
-        clip = Clip(mixed(TakeData.of(self._folder(self._list)), self._regions), FPS, "mix")
+        clip = Clip(mixed(TakeData.of(self._take_folder(self._list)), self._regions), FPS, "mix")
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "mix.bvh"
             write_bvh(clip, file)
             _send(event, "mix.bvh", file.read_bytes())
 
     def _pair(self) -> tuple[TakeData, TakeData]:
-        first, second = TakeData.of(self._folder(self._list)), TakeData.of(self._folder(self._other))
+        first, second = TakeData.of(self._take_folder(self._list)), TakeData.of(self._take_folder(self._other))
         return first, second
 
-    def _folder(self, chosen: Any) -> Path:
+    def _take_folder(self, chosen: Any) -> Path:
         if chosen.value == NONE:
             raise ParameterError("there is no take yet; expected one that was recorded")
         return self._desk.take(str(chosen.value))

@@ -21,21 +21,21 @@ class UploadsPanel:
         self._upload = gui.add_upload_button(
             f"Upload a motion (up to {MOST_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
         )
-        self._going = gui.add_markdown("", visible=False)
+        self._status = gui.add_markdown("", visible=False)
         self._bar = gui.add_progress_bar(100.0, visible=False, animated=True)
-        self._said = gui.add_markdown("")
-        self._upload.on_upload(acts(self._came))
+        self._ready_text = gui.add_markdown("")
+        self._upload.on_upload(acts(self._on_upload))
 
     def write(self) -> None:
         """Show the file being prepared and the clips that are ready."""
         preparing = self._desk.preparing
-        self._bar.visible = self._going.visible = preparing is not None
+        self._bar.visible = self._status.visible = preparing is not None
         if preparing is not None:
             name, since = preparing
-            self._going.content = f"Preparing **{name}**: {time.monotonic() - since:.0f} s so far, of ten to sixty."
+            self._status.content = f"Preparing **{name}**: {time.monotonic() - since:.0f} s so far, of ten to sixty."
         if self._desk.clips:
-            self._said.content = "Ready: " + ", ".join(f"**{name}**" for name in self._desk.clips)
+            self._ready_text.content = "Ready: " + ", ".join(f"**{name}**" for name in self._desk.clips)
 
-    def _came(self, event: Any) -> None:
+    def _on_upload(self, event: Any) -> None:
         file = self._upload.value
         self._desk.upload(file.name, file.content)

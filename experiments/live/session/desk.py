@@ -33,11 +33,11 @@ from experiments.live.session.messages import (
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from sim.errors import SimError
 
-REMEMBERED = 60.0  # [s] of history that can be looked at again
+REMEMBERED = 60.0  # [s] of history that can be viewed again
 PICTURES = 30.0  # states stored per second of history
-UNWATCHED = 60.0  # [s] without a browser after which a take is ended: longer than a page takes to be loaded again
+UNWATCHED = 60.0  # [s] without a browser after which a take is ended: longer than it takes to reload the page
 MOST_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
-_MOTIONS = (".bvh", ".amc", ".asf", ".txt", ".json")
+_MOTION_SUFFIXES = (".bvh", ".amc", ".asf", ".txt", ".json")
 
 
 class Doing(NamedTuple):
@@ -48,14 +48,14 @@ class Doing(NamedTuple):
 
 
 class Desk:
-    """State of a live page and what can be done there; `poll` brings it up to date.
+    """State of a live page and the actions on it; `poll` updates it.
 
     Parameters
     ----------
     folder : Path
         Folder of takes and clips.
     say : callable
-        Called with each line of text that the person should read.
+        Called with each line of text for the person.
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None]):
@@ -71,56 +71,56 @@ class Desk:
         self.clips: dict[str, Path] = {}
         self.history: deque[dict[str, Array]] = deque(maxlen=round(REMEMBERED * PICTURES))
         self.now: dict[str, Array] = self.engine.shown.read()
-        self._done: list[Doing] = []
-        self._undone: list[Doing] = []
-        self._bends, self._expected, self._watched = 0, 0, 0.0
+        self._undo_stack: list[Doing] = []
+        self._redo_stack: list[Doing] = []
+        self._bend_count, self._expected_bends, self._watch_time = 0, 0, 0.0
         self._verdicts = Worker(verdicts)
         self._preparation: Worker | None = None
 
-    # What it shows
+    # Displayed state
 
     def poll(self) -> None:
         """Process the messages of the engine and of the workers, and read the latest displayed values."""
         while (answer := self.engine.answer()) is not None:
-            self._hear(answer)
-        while (found := self._verdicts.answer()) is not None:
-            config, now, more = found
+            self._process_answer(answer)
+        while (verdict := self._verdicts.answer()) is not None:
+            config, now, is_pending = verdict
             if self.config is not None and config.mode == self.config.mode:
-                self.verdict, self.checking = now, more
-        if self._preparation is not None and (made := self._preparation.answer()) is not None:
-            self._take_clip(made)
+                self.verdict, self.checking = now, is_pending
+        if self._preparation is not None and (uploaded := self._preparation.answer()) is not None:
+            self._add_clip(uploaded)
         if not self.engine.alive:
             raise SimError("the servo's process has ended; start hvf live again")
         now = self.engine.shown.read()
         if self.built is not None and now["t"][0] != self.now["t"][0]:
-            self._remember(now)
+            self._store_in_history(now)
         self.now = now
 
-    def _hear(self, answer: object) -> None:
+    def _process_answer(self, answer: object) -> None:
         self.progress = answer if isinstance(answer, Progress) else None
         if isinstance(answer, Built):
             self.built, self.config = answer, answer.config
             self.builds += 1
             self.history.clear()
-            self._done, self._undone, self._bends, self._expected = [], [], 0, 0
-            self._judge()
+            self._undo_stack, self._redo_stack, self._bend_count, self._expected_bends = [], [], 0, 0
+            self._request_verdict()
             for remark in answer.remarks:
                 self._say(remark)
         elif isinstance(answer, Refused):
             self._say(answer.text)
             if self.built is not None and self.config is not None and self.config.map == self.built.config.map:
-                self._judge()
+                self._request_verdict()
         elif isinstance(answer, Saved):
             self._say(f"Take kept in {answer.folder}.")
 
-    def _remember(self, now: dict[str, Array]) -> None:
+    def _store_in_history(self, now: dict[str, Array]) -> None:
         if now["t"][0] < self.now["t"][0]:
             self.history = deque((h for h in self.history if h["t"][0] <= now["t"][0]), maxlen=self.history.maxlen)
         bends = int(now["bends"][0])
-        if bends > self._bends and bends > self._expected:
-            self._done.append(Doing())
-            self._undone.clear()
-        self._bends = self._expected = bends
+        if bends > self._bend_count and bends > self._expected_bends:
+            self._undo_stack.append(Doing())
+            self._redo_stack.clear()
+        self._bend_count = self._expected_bends = bends
         if not self.history or now["t"][0] - self.history[-1]["t"][0] >= 1.0 / PICTURES:
             if self.history and now["curve"][0] == self.history[-1]["curve"][0]:
                 now["course"] = self.history[-1]["course"]
@@ -133,10 +133,10 @@ class Desk:
         wanted = self.now["t"][0] - seconds_ago
         return min(self.history, key=lambda h: abs(float(h["t"][0]) - wanted))
 
-    # What can be done
+    # Actions
 
     def build(self, config: RunConfig) -> None:
-        """Put another run together; the current one continues until it is ready."""
+        """Build another run; the current one continues until it is ready."""
         self.let_go()
         self.engine.ask(Build(config))
 
@@ -184,7 +184,7 @@ class Desk:
         self.engine.held.write({"slice": float(at_field)})
 
     def reset(self) -> None:
-        """Go back to the beginning."""
+        """Return to the beginning."""
         self.let_go()
         self.engine.ask(Reset())
 
@@ -207,22 +207,22 @@ class Desk:
         Raises
         ------
         ParameterError
-            If the value is out of its interval.
+            If the value is outside its interval.
         """
         if self.config is None:
             return
         before, after = self.config, with_gain(self.config, name, value)
         if before == after:
             return
-        last = self._done[-1] if self._done else Doing()
-        if last.after is before and self._moved(last) == {name}:
-            self._done[-1] = Doing(last.before, after)  # successive moves of a slider are undone together
+        last = self._undo_stack[-1] if self._undo_stack else Doing()
+        if last.after is before and self._changed_gains(last) == {name}:
+            self._undo_stack[-1] = Doing(last.before, after)  # successive moves of a slider are undone together
         else:
-            self._done.append(Doing(before, after))
-        self._undone.clear()
-        self._take_over(after)
+            self._undo_stack.append(Doing(before, after))
+        self._redo_stack.clear()
+        self._apply_config(after)
 
-    def _moved(self, doing: Doing) -> set[str]:
+    def _changed_gains(self, doing: Doing) -> set[str]:
         if doing.before is None or doing.after is None:
             return set()
         before, after = vars(doing.before.mode), vars(doing.after.mode)
@@ -230,36 +230,36 @@ class Desk:
 
     def undo(self) -> None:
         """Undo the last action: a bend or a change of gains."""
-        if not self._done:
+        if not self._undo_stack:
             self._say("Nothing is left to undo.")
             return
-        doing = self._done.pop()
-        self._undone.append(doing)
+        doing = self._undo_stack.pop()
+        self._redo_stack.append(doing)
         if doing.before is None:
-            self._expected = self._bends - 1
+            self._expected_bends = self._bend_count - 1
             self.engine.ask(Undo())
         else:
-            self._take_over(doing.before)
+            self._apply_config(doing.before)
 
     def redo(self) -> None:
         """Redo the last undone action."""
-        if not self._undone:
+        if not self._redo_stack:
             self._say("Nothing is left to do again.")
             return
-        doing = self._undone.pop()
-        self._done.append(doing)
+        doing = self._redo_stack.pop()
+        self._undo_stack.append(doing)
         if doing.after is None:
-            self._expected = self._bends + 1
+            self._expected_bends = self._bend_count + 1
             self.engine.ask(Redo())
         else:
-            self._take_over(doing.after)
+            self._apply_config(doing.after)
 
-    def _take_over(self, config: RunConfig) -> None:
+    def _apply_config(self, config: RunConfig) -> None:
         self.config = config
         self.engine.ask(SetGains(config))
-        self._judge()
+        self._request_verdict()
 
-    def _judge(self) -> None:
+    def _request_verdict(self) -> None:
         self.checking = True
         self._verdicts.ask(self.config)
 
@@ -294,12 +294,12 @@ class Desk:
         self.engine.ask(Record(self.take(name)))
 
     def watched(self, browsers: int) -> None:
-        """Told again and again how many browsers there are; without one for `UNWATCHED`, a take is ended."""
+        """Called periodically with the number of browsers; after `UNWATCHED` without one, a take is ended."""
         now = time.monotonic()
         if browsers or not self.records:
-            self._watched = now
-        elif now - self._watched > UNWATCHED:
-            self._watched = now
+            self._watch_time = now
+        elif now - self._watch_time > UNWATCHED:
+            self._watch_time = now
             self._say(f"The take was ended: for {UNWATCHED:g} s no browser had the page.")
             self.stop()
 
@@ -316,7 +316,7 @@ class Desk:
             If it is too large or of an unsupported format, or another file is being prepared.
         """
         file = Path(name).name
-        if Path(file).suffix.lower() not in _MOTIONS:
+        if Path(file).suffix.lower() not in _MOTION_SUFFIXES:
             raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
         if len(content) > MOST_BYTES:
             raise SimError(
@@ -325,9 +325,9 @@ class Desk:
             )
         if self.preparing is not None:
             raise SimError(f"{self.preparing[0]} is being prepared; expected one file after the other")
-        came = self.folder / "uploads"
-        came.mkdir(parents=True, exist_ok=True)
-        (came / file).write_bytes(content)
+        uploads = self.folder / "uploads"
+        uploads.mkdir(parents=True, exist_ok=True)
+        (uploads / file).write_bytes(content)
         if file.lower().endswith(".asf"):
             self._say(f"{file}: the skeleton is kept; its AMC can come now.")
             return
@@ -335,13 +335,13 @@ class Desk:
         target.parent.mkdir(parents=True, exist_ok=True)
         self._preparation = self._preparation or Worker(preparation)
         self.preparing = file, time.monotonic()
-        self._preparation.ask((came / file, target))
+        self._preparation.ask((uploads / file, target))
 
-    def _take_clip(self, made: Uploaded) -> None:
+    def _add_clip(self, uploaded: Uploaded) -> None:
         self.preparing = None
-        if made.path is not None:
-            self.clips[made.path.stem] = made.path
-        self._say(made.text)
+        if uploaded.path is not None:
+            self.clips[uploaded.path.stem] = uploaded.path
+        self._say(uploaded.text)
 
     def close(self) -> None:
         """End all processes; a take in progress is saved."""

@@ -20,11 +20,11 @@ from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import KeptState, kept_state, put_back
 from sim.users.hand.dragged import dragged, relaxed, tremor
 
-BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short for a pause of the hand to be seen
+BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short to be visible as a pause
 STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force
 FASTEST = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
-HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three pictures of the page
-KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be returned to, and their largest number
+HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three frames of the page
+KEPT_EVERY, KEPT = 1.0, 120  # [s] between stored states, and their largest number
 
 
 class Drag(NamedTuple):
@@ -60,14 +60,14 @@ class Engine:
         self._device, self._arm = session.servo.device, session.servo.device.user.arm
         self._block = self._servo.figure_ticks * max(1, BLOCK // self._servo.figure_ticks)
         self.logs = make_logs(self._servo, self._block)
-        self._costs: deque[float] = deque(maxlen=1000)
-        self._intended = np.full(3, np.nan)
+        self._tick_times: deque[float] = deque(maxlen=1000)
+        self._intended_position = np.full(3, np.nan)
         self.drag: Drag | None = None
         self.tick = 0
-        self._until = self._end_of_stretching()
+        self._end_parameter = self._find_end_parameter()
         self.perform(False)
-        self._begin = kept_state(self._servo, self.world, 0)
-        self._kept: deque[KeptState] = deque([self._begin], maxlen=KEPT)
+        self._initial_state = kept_state(self._servo, self.world, 0)
+        self._states: deque[KeptState] = deque([self._initial_state], maxlen=KEPT)
 
     @property
     def period(self) -> float:
@@ -110,29 +110,29 @@ class Engine:
         t, seconds = self.time, self.seconds
         if self.drag is None or self.tick == 0:  # before the first tick the position of the stylus is not measured
             arm = relaxed(self._arm)
-            self._intended[:] = np.nan
+            self._intended_position[:] = np.nan
         else:
-            start = self.stylus.copy() if np.isnan(self._intended[0]) else self._intended
+            start = self.stylus.copy() if np.isnan(self._intended_position[0]) else self._intended_position
             share = 1.0 - np.exp(-seconds / HAND_TIME)
-            wanted = _within_reach(start + share * (self.drag.target - start), start, FASTEST * seconds)
-            end = _within_reach(wanted, self.stylus, STRONGEST / self._arm.stiffness)
+            wanted = _clamp_to_ball(start + share * (self.drag.target - start), start, FASTEST * seconds)
+            end = _clamp_to_ball(wanted, self.stylus, STRONGEST / self._arm.stiffness)
             arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
-            self._intended = end
+            self._intended_position = end
         device = self._device._replace(user=self._device.user._replace(arm=arm))
         begin = time.thread_time()  # processor time of this thread, without the time that other programs take
         run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
-        self._costs.append((time.thread_time() - begin) / self._block)
+        self._tick_times.append((time.thread_time() - begin) / self._block)
         self.tick += self._block
-        if self.time >= self._kept[-1].tick * self.period + KEPT_EVERY:
-            self._kept.append(kept_state(self._servo, self.world, self.tick))
+        if self.time >= self._states[-1].tick * self.period + KEPT_EVERY:
+            self._states.append(kept_state(self._servo, self.world, self.tick))
         return self.logs
 
     def cost(self) -> tuple[float, float]:
         """Median and 99th percentile of the processor time per tick over recent blocks [s]; zeros before the first."""
-        if not self._costs:
+        if not self._tick_times:
             return 0.0, 0.0
-        middle, most = np.percentile(self._costs, (50.0, 99.0))
-        return float(middle), float(most)
+        median, high = np.percentile(self._tick_times, (50.0, 99.0))
+        return float(median), float(high)
 
     def set_gains(self, config: RunConfig) -> None:
         """Apply the gains of a configuration's mode during the run.
@@ -142,50 +142,50 @@ class Engine:
         Raises
         ------
         ControllerError
-            If a number is out of its interval, or the structure of the field would change.
+            If a number is outside its interval, or the structure of the field would change.
         """
         parts = parts_of(config, self.session.parts.maps)
         new, old, field = parts.program, self.session.parts.program, self._servo.field
         if not np.array_equal(new.ops, old.ops) or len(new.params) != len(old.params):
             raise ParameterError("another field than the one that runs; expected other gains of the same mode and map")
         field.params[:] = new.params
-        state = slice(0, len(old.memory) if self.tubes is None else self._record)
-        before, after = self._initial[state], new.memory[state]
+        state = slice(0, len(old.memory) if self.tubes is None else self._bend_record)
+        before, after = self._initial_memory[state], new.memory[state]
         changed = (before != after) & ~(np.isnan(before) & np.isnan(after))
         field.memory[state][changed] = after[changed]
-        self._initial[state] = after
+        self._initial_memory[state] = after
         field.budget[:] = parts.tank.params()
         if self.tubes is not None:
-            field.params[self._until] = self._performs_from
+            field.params[self._end_parameter] = self._performance_start
         self.config = cast(RunConfig, parts.config)
 
     def perform(self, now: bool) -> None:
         """Perform the bent curve from now on, or make it bendable again, in a mode that has both."""
-        self._performs_from = self.time if now else np.inf
+        self._performance_start = self.time if now else np.inf
         if self.tubes is not None:
-            self._servo.field.params[self._until] = self._performs_from
+            self._servo.field.params[self._end_parameter] = self._performance_start
 
     @property
     def performs(self) -> bool:
         """Whether a bent curve is being performed."""
-        return bool(np.isfinite(self._performs_from))
+        return bool(np.isfinite(self._performance_start))
 
     @property
     def grabs_or_leads(self) -> bool:
-        """Whether the drag leads a figure or has hold of a curve that it can bend; any other drag is a push."""
+        """Whether the drag leads a figure or holds a curve that it can bend; any other drag is a push."""
         if self.drag is None:
             return False
         return self.config.leads or (self.tubes is not None and not self.performs and self.drag.pressed)
 
     def undo(self) -> bool:
         """Undo the last bend; False if there is none."""
-        return self._may_edit() and undo_bend(self.memory, self._record)
+        return self._can_edit() and undo_bend(self.memory, self._bend_record)
 
     def redo(self) -> bool:
         """Redo the last undone bend; False if there is none."""
-        return self._may_edit() and redo_bend(self.memory, self._record)
+        return self._can_edit() and redo_bend(self.memory, self._bend_record)
 
-    def _may_edit(self) -> bool:
+    def _can_edit(self) -> bool:
         """Whether the mode bends a curve and nobody holds it, neither by a drag nor by the switch as last sensed."""
         return self.tubes is not None and self.drag is None and self._device.hand[HAND_SWITCH] == 0.0
 
@@ -198,38 +198,38 @@ class Engine:
         rearm_servo(self._servo)
 
     def reset(self) -> None:
-        """Go back to the beginning; the gains are kept."""
-        self._go_to(self._begin)
+        """Return to the beginning; the gains are kept."""
+        self._restore(self._initial_state)
 
     def back_to(self, t: float) -> float:
         """Go back to the last stored state at or before the time t [s]; returns the time of that state [s]."""
-        state = next((kept for kept in reversed(self._kept) if kept.tick * self.period <= t), self._kept[0])
-        self._go_to(state)
+        state = next((old for old in reversed(self._states) if old.tick * self.period <= t), self._states[0])
+        self._restore(state)
         return self.time
 
-    def _go_to(self, state: KeptState) -> None:
+    def _restore(self, state: KeptState) -> None:
         put_back(self._servo, self.world, state)
         self.tick = state.tick
-        while len(self._kept) > 1 and self._kept[-1].tick > self.tick:
-            self._kept.pop()
-        if self._kept[0].tick > self.tick:
-            self._kept = deque([state], maxlen=KEPT)
+        while len(self._states) > 1 and self._states[-1].tick > self.tick:
+            self._states.pop()
+        if self._states[0].tick > self.tick:
+            self._states = deque([state], maxlen=KEPT)
         self.drag = None
-        self._intended[:] = np.nan
+        self._intended_position[:] = np.nan
 
-    def _end_of_stretching(self) -> int:
+    def _find_end_parameter(self) -> int:
         """Index of the parameter with the time at which stretching ends; also stores the field's initial memory."""
         program: Program = self.session.parts.program
-        self._initial = program.memory.copy()
+        self._initial_memory = program.memory.copy()
         for place in program.places():
             if self.tubes is not None and place.law is self.tubes:
-                self._record = self.tubes.record_at(place.memory)
+                self._bend_record = self.tubes.record_at(place.memory)
                 return place.params + StretchyGains._fields.index("until")
         return 0
 
 
-def _within_reach(point: Array, centre: Array, reach: float) -> Array:
-    """The point, or if it is outside a ball about `centre`, the nearest point of the ball."""
-    away = point - centre
-    distance = float(np.linalg.norm(away))
-    return point if distance <= reach else centre + away * (reach / distance)
+def _clamp_to_ball(point: Array, centre: Array, reach: float) -> Array:
+    """The point, or if it is outside a ball around `centre`, the nearest point of the ball."""
+    offset = point - centre
+    distance = float(np.linalg.norm(offset))
+    return point if distance <= reach else centre + offset * (reach / distance)

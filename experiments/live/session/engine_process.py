@@ -48,11 +48,11 @@ from sim.hardware.undisturbed import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 
-PICTURE = 0.012  # [s] least time between two pictures: every other block of 8 ms, so that each of the page's is new
-SLICE = 0.25  # [s] between two computations of the field's slice
+PICTURE = 0.012  # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
+SLICE = 0.25  # [s] between two computations of the field slice
 SLICE_WIDTH = 0.14  # [m] side of the slice
 IDLE = 0.01  # [s] between two polls of the page while nothing runs
-LATE = 0.1  # [s] of delay from which it is not made up for
+LATE = 0.1  # [s] of delay above which the loop does not catch up
 
 
 class EngineProcess(PageProcess):
@@ -76,86 +76,86 @@ class EngineProcess(PageProcess):
 
 
 def _main(shown: Any, held: Any, orders: Any, answers: Any) -> None:
-    _Runner(Board(shown, SHOWN), Board(held, HELD), orders, answers).run()
+    _EngineLoop(Board(shown, SHOWN), Board(held, HELD), orders, answers).run()
 
 
-class _Runner:
-    """The loop of the process: orders, a block, a picture, and the wall clock."""
+class _EngineLoop:
+    """The loop of the process: execute orders, run a block, send a picture, wait for the wall clock."""
 
     def __init__(self, shown: Board, held: Board, orders: Any, answers: Any):
         self._shown, self._held, self._orders, self._answers = shown, held, orders, answers
         self._engine: Engine | None = None
         self._take: Take | None = None
-        self._parent, self._going = parent_id(), True
-        self._pictured, self._sliced, self._steps = 0.0, 0.0, 0.0
-        self._paced = 0.0, 0.0
-        self._curve, self._changed = 0, True
+        self._parent, self._is_running = parent_id(), True
+        self._last_picture_time, self._last_slice_time, self._steps_done = 0.0, 0.0, 0.0
+        self._pace_sample = 0.0, 0.0
+        self._curve_count, self._curve_changed = 0, True
 
     def run(self) -> None:
-        """Run until told to quit, or until the page's process has ended."""
+        """Run until `Quit`, or until the page's process has ended."""
         origin, pace = time.perf_counter(), 1.0
-        before = 0.0
-        while self._going and os.getppid() == self._parent:
-            self._listen()
+        elapsed = 0.0
+        while self._is_running and os.getppid() == self._parent:
+            self._process_orders()
             held = self._held.rows
             engine = self._engine
             paused, steps = held["paused"][0] > 0.0, held["steps"][0]
-            if engine is None or (paused and steps <= self._steps):
-                self._steps = min(self._steps, steps)
+            if engine is None or (paused and steps <= self._steps_done):
+                self._steps_done = min(self._steps_done, steps)
                 time.sleep(IDLE)
-                self._picture()
-                origin, before = time.perf_counter(), 0.0
+                self._send_picture()
+                origin, elapsed = time.perf_counter(), 0.0
                 continue
             if paused:
-                self._steps += 1.0
+                self._steps_done += 1.0
             else:
-                self._steps = steps
-            self._block(engine)
+                self._steps_done = steps
+            self._run_block(engine)
             if held["pace"][0] != pace:
-                pace, origin, before = max(float(held["pace"][0]), 0.01), time.perf_counter(), 0.0
-            before += engine.seconds / pace
-            ahead = origin + before - time.perf_counter()
-            if ahead > 0.0:
-                time.sleep(ahead)
-            elif ahead < -LATE:
-                origin, before = time.perf_counter(), 0.0
+                pace, origin, elapsed = max(float(held["pace"][0]), 0.01), time.perf_counter(), 0.0
+            elapsed += engine.seconds / pace
+            remaining = origin + elapsed - time.perf_counter()
+            if remaining > 0.0:
+                time.sleep(remaining)
+            elif remaining < -LATE:
+                origin, elapsed = time.perf_counter(), 0.0
         if self._engine is not None:
             self._stop(self._engine)
 
-    def _hold(self, engine: Engine) -> None:
+    def _update_drag(self, engine: Engine) -> None:
         held = self._held.rows
         engine.drag = Drag(held["target"].copy(), held["pressed"][0] > 0.0) if held["grip"][0] > 0.0 else None
 
-    def _block(self, engine: Engine) -> None:
-        self._hold(engine)
+    def _run_block(self, engine: Engine) -> None:
+        self._update_drag(engine)
         logs = engine.advance()
         if self._take is not None:
             self._take.add(logs, engine)
-        self._picture()
+        self._send_picture()
 
-    def _listen(self) -> None:
-        while self._going:
+    def _process_orders(self) -> None:
+        while self._is_running:
             try:
                 order = self._orders.get_nowait()
             except queue.Empty:
                 return
             try:
-                self._obey(order)
+                self._execute(order)
             except (ModelError, ControllerError, SimError, OSError) as error:
                 self._answers.put(Refused(str(error)))
 
-    def _obey(self, order: object) -> None:
+    def _execute(self, order: object) -> None:
         if isinstance(order, Build):
             self._build(order)
         elif isinstance(order, Quit):
-            self._going = False
+            self._is_running = False
         elif self._engine is not None:
-            self._hold(self._engine)
-            self._do(order, self._engine)
-            self._changed = True
+            self._update_drag(self._engine)
+            self._execute_on_engine(order, self._engine)
+            self._curve_changed = True
 
-    def _do(self, order: object, engine: Engine) -> None:
-        done: dict[type, Callable[[Any], Any]] = {
+    def _execute_on_engine(self, order: object, engine: Engine) -> None:
+        actions: dict[type, Callable[[Any], Any]] = {
             SetGains: lambda order: engine.set_gains(order.config),
             Reset: lambda order: engine.reset(),
             GoBack: lambda order: engine.back_to(order.t),
@@ -168,7 +168,7 @@ class _Runner:
         }
         if isinstance(order, Reset | GoBack):
             self._stop(engine)  # a take must be continuous in time
-        done[type(order)](order)
+        actions[type(order)](order)
 
     def _record(self, order: Record, engine: Engine) -> None:
         self._stop(engine)
@@ -191,31 +191,31 @@ class _Runner:
         session = wire(order.config, ready=self._compile)
         self._engine = Engine(session)
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
-        self._changed = True
-        self._slice(self._engine)  # so that its code is compiled or loaded now, not during the run
-        self._answers.put(_built(session, self._engine))
-        self._picture()
+        self._curve_changed = True
+        self._compute_slice(self._engine)  # compiles or loads its code now, not during the run
+        self._answers.put(_built_message(session, self._engine))
+        self._send_picture()
 
     def _compile(self, units: Sequence[Unit]) -> None:
-        waiting = missing_units(units)
+        missing = missing_units(units)
         done = 0
-        for_ever = "compiling once what this run needs"
+        prefix = "compiling once what this run needs"
 
-        def tell(unit: Unit) -> None:
+        def report_progress(unit: Unit) -> None:
             nonlocal done
             done += 1
-            self._answers.put(Progress(f"{for_ever}: {done} of {len(waiting)}", done / len(waiting)))
+            self._answers.put(Progress(f"{prefix}: {done} of {len(missing)}", done / len(missing)))
 
-        if waiting:
-            self._answers.put(Progress(f"{for_ever}: 0 of {len(waiting)}; it takes a minute or two", 0.02))
-            compile_units(waiting, tell)
+        if missing:
+            self._answers.put(Progress(f"{prefix}: 0 of {len(missing)}; it takes a minute or two", 0.02))
+            compile_units(missing, report_progress)
 
-    def _picture(self) -> None:
+    def _send_picture(self) -> None:
         now, engine = time.perf_counter(), self._engine
-        if engine is None or now - self._pictured < PICTURE:
+        if engine is None or now - self._last_picture_time < PICTURE:
             return
         servo = engine.session.servo
-        self._pictured = now
+        self._last_picture_time = now
         trace, hand = engine.memory, servo.device.hand
         shown: dict[str, Any] = {
             "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
@@ -225,30 +225,30 @@ class _Runner:
             "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
             "residual": float(np.linalg.norm(servo.figure.applied[:3])),
             "target": np.full(3, np.nan) if engine.drag is None else engine.drag.target,
-            "ghost": self._ghost(trace, servo.reference.pose),
+            "ghost": self._ghost_pose(trace, servo.reference.pose),
         }  # fmt: skip
-        if now - self._sliced > SLICE:
-            then, at = self._paced
-            shown["pace"] = 0.0 if then == 0.0 else (engine.time - at) / (now - then)
-            self._sliced, self._paced = now, (now, engine.time)
+        if now - self._last_slice_time > SLICE:
+            previous_time, previous_simulated = self._pace_sample
+            shown["pace"] = 0.0 if previous_time == 0.0 else (engine.time - previous_simulated) / (now - previous_time)
+            self._last_slice_time, self._pace_sample = now, (now, engine.time)
             shown["cost"], shown["bends"] = engine.cost(), engine.bends()
             if self._held.rows["slice"][0] > 0.0:
-                shown["slice"] = self._slice(engine)
-        held = self._shown.rows["switch"][0] > 0.0 and engine.tubes is not None
-        if self._changed or held:
-            self._changed, self._curve = held, self._curve + 1
-            shown["curve"], shown["bends"] = self._curve, engine.bends()
-            shown["course"] = _course(engine)
+                shown["slice"] = self._compute_slice(engine)
+        is_bending = self._shown.rows["switch"][0] > 0.0 and engine.tubes is not None
+        if self._curve_changed or is_bending:
+            self._curve_changed, self._curve_count = is_bending, self._curve_count + 1
+            shown["curve"], shown["bends"] = self._curve_count, engine.bends()
+            shown["course"] = _curve_points(engine)
         self._shown.write(shown)
 
-    def _ghost(self, trace: Array, pose: Array) -> Array:
+    def _ghost_pose(self, trace: Array, pose: Array) -> Array:
         """Pose of the default animation; where rivers play their own clips, that of the animation itself."""
         if self._poses is None or not np.isfinite(trace[TRACE_DISTANCE]):
             return pose
         nearest, phase, river = trace[TRACE_POINT : TRACE_POINT + 3], trace[TRACE_PHASE], trace[TRACE_RIVER]
         return self._poses(nearest[None].copy(), np.array([phase]), np.array([river]))[0]
 
-    def _slice(self, engine: Engine) -> Array:
+    def _compute_slice(self, engine: Engine) -> Array:
         """Points and forces of the field on the horizontal plane through the stylus, shape (n, 6)."""
         hand = engine.session.servo.device.hand.copy()
         points = slice_points(float(hand[HAND_POSITION + 2]))
@@ -266,19 +266,19 @@ def slice_points(height: float) -> Array:
     return np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1)
 
 
-def _course(engine: Engine) -> Array:
-    """Points of the curve as it is bent now, in H [m], shape (241, 3)."""
+def _curve_points(engine: Engine) -> Array:
+    """Points of the curve as currently bent, in H [m], shape (241, 3)."""
     curve = engine.session.curve if engine.tubes is None else engine.tubes.edited(engine.memory)
     return curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
 
 
-def _built(session: Session, engine: Engine) -> Built:
+def _built_message(session: Session, engine: Engine) -> Built:
     static = session.static()
-    kept = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
+    names = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
     assert configuration_size(session.servo) <= SHOWN["qpos"]
     return Built(
         engine.config,
-        {name: static[name] for name in kept if name in static},
+        {name: static[name] for name in names if name in static},
         engine.tubes is not None,
         session.remarks,
     )

@@ -1,8 +1,8 @@
 """Stability verdicts on the gains of a run, fast enough to follow a slider.
 
 The verdict is that of `controllers.certificates.loop.stability.stability` at these gains, with the cheap steps first:
-the loops of all hands do not depend on the gains and are cached, so that a verdict takes only their eigenvalues at one
-pair of gains; the margin, which takes a search, is found afterwards.
+the loops of all hands do not depend on the gains and are cached, so that a verdict needs only their eigenvalues at one
+pair of gains; the margin, which needs a search, is found afterwards.
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,8 +48,8 @@ class GainVerdict(NamedTuple):
     passive: str
 
 
-_NAMES = {"": "field", "_held": "held tube", "_then": "performance"}
-_LEAST = 1e-3  # [N/m] least stiffness with which the margin is computed
+_LAW_NAMES = {"": "field", "_held": "held tube", "_then": "performance"}
+_MIN_STIFFNESS = 1e-3  # [N/m] smallest stiffness for which the margin is computed
 
 
 class GainVerdicts:
@@ -57,75 +57,77 @@ class GainVerdicts:
 
     def __init__(self) -> None:
         self._loops: dict[object, tuple[list[SampledLoop], list[SampledLoop]]] = {}
-        self._found: dict[object, GainVerdict] = {}
+        self._verdicts: dict[object, GainVerdict] = {}
         self._critical: dict[object, float] = {}
 
     def of(self, config: RunConfig) -> Iterator[tuple[GainVerdict, ...]]:
-        """Yield the verdicts on all laws of a run: first without margins, as soon as they are found, then with them."""
+        """Yield the verdicts on all laws of a run: first without margins, as soon as they are known, then with them."""
         try:
             if any(law.law == "leading" for law in certified_laws(config).values()):
-                said = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
-                yield (GainVerdict("field", "unknown", said, None, ""),)
+                reason = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
+                yield (GainVerdict("field", "unknown", reason, None, ""),)
                 return
             rivers, drag, missing = certified_rivers(config), governor_drag(config), left_out(config)
         except (ControllerError, SimError) as error:
             yield (GainVerdict("field", "unknown", str(error), None, ""),)
             return
-        for judge in (self._quick, self._whole):
-            found = ((river, judge(name, river)) for name, river in rivers.items())
-            governed = (verdict if drag == 0.0 else self._governed(river, drag, verdict) for river, verdict in found)
-            yield tuple(verdict if not missing else _leaving_out(verdict, missing) for verdict in governed)
+        for verdict_of in (self._cached_verdict, self._verdict_with_margin):
+            found = ((river, verdict_of(name, river)) for name, river in rivers.items())
+            verdicts = (
+                verdict if drag == 0.0 else self._governed_verdict(river, drag, verdict) for river, verdict in found
+            )
+            yield tuple(verdict if not missing else _without_laws(verdict, missing) for verdict in verdicts)
 
-    def _quick(self, name: str, river: River) -> GainVerdict:
+    def _cached_verdict(self, name: str, river: River) -> GainVerdict:
         key = (name, *_key(river), river.k_r, river.b_d)
-        if key not in self._found:
-            self._found[key] = self._judged(name, river)
-        return self._found[key]
+        if key not in self._verdicts:
+            self._verdicts[key] = self._compute_verdict(name, river)
+        return self._verdicts[key]
 
-    def _judged(self, name: str, river: River) -> GainVerdict:
-        law, (still, moving) = _NAMES.get(name, name.strip("_")), self._of_river(river)
-        said, passive = f"k = {river.k_r:g} N/m, b = {river.b_d:g} N s/m", passivity(river)
+    def _compute_verdict(self, name: str, river: River) -> GainVerdict:
+        law, (still, moving) = _LAW_NAMES.get(name, name.strip("_")), self._river_loops(river)
+        gains, passive = f"k = {river.k_r:g} N/m, b = {river.b_d:g} N s/m", passivity(river)
         remark = f"{passive.verdict}: {passive.reason}"
         radii = np.array([loop.radius(river.k_r, river.b_d) for loop in still])
         if radii.max() >= 1.0:
             hand, at = np.unravel_index(int(radii.argmax()), radii.shape)
-            grows = np.log(radii.max()) / river.sampling.period
+            rate = np.log(radii.max()) / river.sampling.period
             where = f"phase {river.phases()[at]:.2f} s with {HandRange().hands()[hand]}"
-            return GainVerdict(law, "refuted", f"grows by e in {1e3 / grows:.3g} ms at {where}; {said}", None, remark)
-        carried = max((float(np.abs(lap_multipliers(river, loop.linear)[0])) for loop in moving), default=0.0)
-        if carried >= 1.0:
-            reason = f"stable with the phase held, but a multiplier of the lap is {carried:.4g}; {said}"
+            return GainVerdict(law, "refuted", f"grows by e in {1e3 / rate:.3g} ms at {where}; {gains}", None, remark)
+        multiplier = max((float(np.abs(lap_multipliers(river, loop.linear)[0])) for loop in moving), default=0.0)
+        if multiplier >= 1.0:
+            reason = f"stable with the phase held, but a multiplier of the lap is {multiplier:.4g}; {gains}"
             return GainVerdict(law, "unknown", reason, None, remark)
         bound = (np.maximum(radii[:, 1:], radii[:, :-1]) + np.abs(np.diff(radii, axis=1))).max()
         if bound >= 1.0:
             return GainVerdict(
-                law, "unknown", f"near the boundary, between two phases of the grid; {said}", None, remark
+                law, "unknown", f"near the boundary, between two phases of the grid; {gains}", None, remark
             )
-        return GainVerdict(law, "certified", f"dies away at every phase, with every hand; {said}", None, remark)
+        return GainVerdict(law, "certified", f"dies away at every phase, with every hand; {gains}", None, remark)
 
-    def _whole(self, name: str, river: River) -> GainVerdict:
-        quick = self._quick(name, river)
-        if quick.verdict == "refuted":
-            return quick
+    def _verdict_with_margin(self, name: str, river: River) -> GainVerdict:
+        verdict = self._cached_verdict(name, river)
+        if verdict.verdict == "refuted":
+            return verdict
         key = (name, *_key(river), river.k_r, river.b_d)
         if key not in self._critical:
-            still, least = self._of_river(river)[0], max(river.k_r, _LEAST)
-            self._critical[key] = min(float(critical_stiffness(loop, river.b_d, least).min()) for loop in still)
-        return quick._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _LEAST) - 1.0)
+            still, min_stiffness = self._river_loops(river)[0], max(river.k_r, _MIN_STIFFNESS)
+            self._critical[key] = min(float(critical_stiffness(loop, river.b_d, min_stiffness).min()) for loop in still)
+        return verdict._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _MIN_STIFFNESS) - 1.0)
 
-    def _governed(self, river: River, drag: float, alone: GainVerdict) -> GainVerdict:
+    def _governed_verdict(self, river: River, drag: float, field_verdict: GainVerdict) -> GainVerdict:
         """The verdict on a river with a governor of a given drag [N s/m], by the circle criterion alone."""
-        if alone.verdict != "certified":
-            return alone
-        certain = min(most_drag(loop, river.k_r, river.b_d) for loop in self._of_river(river)[0])
-        said = f"governor of {drag:g} N s/m, certain up to {certain:.3g}"
-        margin = None if alone.margin is None else min(alone.margin, certain / drag - 1.0)
-        if certain > drag:
-            return alone._replace(reason=f"{alone.reason}; {said}", margin=margin)
-        reason = f"{said}; hvf certify says whether it shakes; {alone.reason}"
-        return alone._replace(verdict="unknown", reason=reason, margin=margin)
+        if field_verdict.verdict != "certified":
+            return field_verdict
+        certified_drag = min(most_drag(loop, river.k_r, river.b_d) for loop in self._river_loops(river)[0])
+        remark = f"governor of {drag:g} N s/m, certain up to {certified_drag:.3g}"
+        margin = None if field_verdict.margin is None else min(field_verdict.margin, certified_drag / drag - 1.0)
+        if certified_drag > drag:
+            return field_verdict._replace(reason=f"{field_verdict.reason}; {remark}", margin=margin)
+        reason = f"{remark}; hvf certify says whether it shakes; {field_verdict.reason}"
+        return field_verdict._replace(verdict="unknown", reason=reason, margin=margin)
 
-    def _of_river(self, river: River) -> tuple[list[SampledLoop], list[SampledLoop]]:
+    def _river_loops(self, river: River) -> tuple[list[SampledLoop], list[SampledLoop]]:
         key = _key(river)
         if key not in self._loops:
             hands = HandRange().hands()
@@ -135,9 +137,9 @@ class GainVerdicts:
         return self._loops[key]
 
 
-def _leaving_out(found: GainVerdict, laws: Sequence[str]) -> GainVerdict:
-    whole = leaving_out(Verdict(found.verdict, found.reason), laws)
-    return found._replace(verdict=whole.verdict, reason=whole.reason)
+def _without_laws(verdict: GainVerdict, laws: Sequence[str]) -> GainVerdict:
+    combined = leaving_out(Verdict(verdict.verdict, verdict.reason), laws)
+    return verdict._replace(verdict=combined.verdict, reason=combined.reason)
 
 
 def _key(river: River) -> tuple[object, ...]:

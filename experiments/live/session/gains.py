@@ -52,6 +52,6 @@ def with_gain(config: RunConfig, name: str, value: float) -> RunConfig:
     Raises
     ------
     ParameterError
-        If the value is out of its interval.
+        If the value is outside its interval.
     """
     return replace(config, mode=cast(Any, replace)(resolved(config).mode, **{name: value}))

@@ -16,7 +16,7 @@ SHOWN = {
     "slice": 6 * SLICE_SIDE**2,
 }  # fmt: skip
 """Rows of the engine's board, with their sizes: the displayed values; ``curve`` counts changes of ``course``;
-``recording`` is 0 without a take, and a tick longer than the take, so that one of a paused run is seen."""
+``recording`` is 0 without a take, else one tick longer than the take, so that a take of a paused run is visible."""
 
 HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1, "slice": 1}
 """Rows of the page's board, with their sizes: grip, target and clock; ``steps`` counts the requested single steps."""
@@ -24,7 +24,7 @@ HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1
 
 @dataclass(frozen=True)
 class Build:
-    """Put another run together."""
+    """Build another run."""
 
     config: RunConfig
 
@@ -38,7 +38,7 @@ class SetGains:
 
 @dataclass(frozen=True)
 class Reset:
-    """Go back to the beginning."""
+    """Return to the beginning."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Quit:
 
 @dataclass(frozen=True)
 class Built:
-    """A run has been put together.
+    """A run has been built.
 
     Attributes
     ----------

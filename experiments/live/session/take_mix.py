@@ -78,25 +78,25 @@ class TakeData:
         return TakeData(folder.name, poses, phase, lap, ticks["p"], force, ticks["distance"])
 
     def frames_at(self, phases: Array) -> Array:
-        """Fractional frame numbers at which the take is at given phases [s]; on a closed curve in the best lap.
+        """Fractional frame numbers at which the take is at given phases [s]; on a closed curve, in the nearest lap.
 
         Raises
         ------
         ParameterError
             If the take does not pass these phases.
         """
-        onward = np.maximum.accumulate(self.phase)
+        phase = np.maximum.accumulate(self.phase)
         wanted = phases
         if np.isfinite(self.lap):
-            laps = np.round((np.mean([onward[0], onward[-1]]) - np.mean(phases)) / self.lap)
+            laps = np.round((np.mean([phase[0], phase[-1]]) - np.mean(phases)) / self.lap)
             wanted = phases + self.lap * laps
-        slack = 0.05 * (self.lap if np.isfinite(self.lap) else onward[-1] - onward[0])
-        if wanted[0] < onward[0] - slack or wanted[-1] > onward[-1] + slack:
+        tolerance = 0.05 * (self.lap if np.isfinite(self.lap) else phase[-1] - phase[0])
+        if wanted[0] < phase[0] - tolerance or wanted[-1] > phase[-1] + tolerance:
             raise ParameterError(
-                f"{self.name} goes from phase {onward[0]:.1f} to {onward[-1]:.1f} s of the curve, the region from "
+                f"{self.name} goes from phase {phase[0]:.1f} to {phase[-1]:.1f} s of the curve, the region from "
                 f"{wanted[0]:.1f} to {wanted[-1]:.1f} s; expected a region that both takes go through"
             )
-        return np.interp(wanted, onward, np.arange(len(onward), dtype=np.float64))
+        return np.interp(wanted, phase, np.arange(len(phase), dtype=np.float64))
 
 
 class Region(NamedTuple):
@@ -113,7 +113,7 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
     .. math:: q = q_a \exp\bigl(s \log(q_a^{-1} q_b)\bigr), \qquad s = \sigma(x)
 
     with σ = x³ (10 − 15 x + 6 x²) over `ease` [s] within each end of a region, so that velocity and acceleration are
-    continuous. Later regions are laid over earlier ones.
+    continuous. Later regions overwrite earlier ones.
 
     Raises
     ------
@@ -129,21 +129,21 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
         if end - start < 2.0 * ease:
             raise ParameterError(f"the region lasts {end - start:.2f} s; expected {2.0 * ease:g} s or more")
         rows = np.flatnonzero((times >= start) & (times <= end))
-        theirs = _at(other.poses, other.frames_at(np.maximum.accumulate(take.phase)[rows]))
+        other_poses = _interpolate_frames(other.poses, other.frames_at(np.maximum.accumulate(take.phase)[rows]))
         edge = np.minimum(times[rows] - start, end - times[rows]) / ease
-        poses[rows] = between(poses[rows], theirs, smooth_steps(edge))
+        poses[rows] = between(poses[rows], other_poses, smooth_steps(edge))
     return poses
 
 
 def between(start: Array, end: Array, share: Array) -> Array:
     """Interpolate poses (n, 75) with shares (n,): linearly for the root position, by slerp for the rotations."""
     shape = (len(start), -1, 4)
-    turned = quaternions.slerped(start[:, 3:].reshape(shape), end[:, 3:].reshape(shape), share[:, None, None])
-    return np.hstack([start[:, :3] + share[:, None] * (end - start)[:, :3], turned.reshape(len(start), -1)])
+    rotations = quaternions.slerped(start[:, 3:].reshape(shape), end[:, 3:].reshape(shape), share[:, None, None])
+    return np.hstack([start[:, :3] + share[:, None] * (end - start)[:, :3], rotations.reshape(len(start), -1)])
 
 
-def _at(poses: Array, places: Array) -> Array:
+def _interpolate_frames(poses: Array, frames: Array) -> Array:
     """Poses at fractional frame numbers, shape (k,) → (k, 75)."""
-    low = np.clip(np.floor(places).astype(int), 0, len(poses) - 1)
+    low = np.clip(np.floor(frames).astype(int), 0, len(poses) - 1)
     high = np.minimum(low + 1, len(poses) - 1)
-    return between(poses[low], poses[high], places - low)
+    return between(poses[low], poses[high], frames - low)

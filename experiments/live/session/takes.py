@@ -25,7 +25,7 @@ from sim.recording.recording import Recording
 
 LIVE = "dragged by hand on the live page; no configuration says what the hand did"
 """Text ``live`` of a take's recording, which marks that it cannot be reproduced from its configuration."""
-LEAST = 0.5  # [s] shortest take that is measured; a shorter one is a slip of the mouse
+LEAST = 0.5  # [s] shortest take that is measured; a shorter one is a mouse slip
 
 
 class Take:
@@ -50,32 +50,32 @@ class Take:
     def __init__(self, folder: Path, engine: Engine):
         check_folder(folder, overwrite=False)
         clear_folder(folder)
-        self.folder, self._began = folder, engine.time
-        self._wall = time.perf_counter()
+        self.folder, self._start_time = folder, engine.time
+        self._wall_start = time.perf_counter()
         servo = engine.session.servo
         static = engine.session.static() | {"live": LIVE}
         config = to_dict(engine.config)
         self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo), static)
-        self._record = record_into(self._recorder, servo, engine.world)
-        self._handled: list[tuple[float, float]] = []
-        self._ticks = 0
+        self._record_logs = record_into(self._recorder, servo, engine.world)
+        self._handled_spans: list[tuple[float, float]] = []
+        self._tick_count = 0
 
     def seconds(self, engine: Engine) -> float:
         """Duration so far [s]."""
-        return engine.time - self._began
+        return engine.time - self._start_time
 
     def add(self, logs: tuple[TickLog, FrameLog], engine: Engine) -> None:
         """Record the last block."""
         ticks, frames = logs
-        ticks.hand[:, 0] -= self._began
-        frames.t[:] -= self._began
-        self._record(ticks, frames, len(ticks.hand))
-        self._ticks += len(ticks.hand)
+        ticks.hand[:, 0] -= self._start_time
+        frames.t[:] -= self._start_time
+        self._record_logs(ticks, frames, len(ticks.hand))
+        self._tick_count += len(ticks.hand)
         if engine.grabs_or_leads:
-            begin, end = float(ticks.hand[0, 0]), float(ticks.hand[-1, 0])  # as recorded, so that no tick is left out
-            if self._handled and begin - self._handled[-1][1] < 1.5 * engine.period:
-                begin = self._handled.pop()[0]
-            self._handled.append((begin, end))
+            begin, end = float(ticks.hand[0, 0]), float(ticks.hand[-1, 0])  # as recorded, so that no tick is omitted
+            if self._handled_spans and begin - self._handled_spans[-1][1] < 1.5 * engine.period:
+                begin = self._handled_spans.pop()[0]
+            self._handled_spans.append((begin, end))
 
     def end(self, engine: Engine) -> tuple[str, ...]:
         """Measure and close the recording, and write the files of ``hvf run`` beside it; returns the summary's lines.
@@ -83,23 +83,23 @@ class Take:
         Raises
         ------
         SimError
-            If it is too short to be measured; the recording is then kept as an interrupted one. Without a tick, nothing
-            is left of it.
+            If it is too short to be measured; the recording is then kept as an interrupted one. Without a tick, it is
+            deleted.
         """
         seconds = self.seconds(engine)
-        if not self._ticks:
+        if not self._tick_count:
             self._recorder.close()
             (self.folder / RECORDING).unlink()
-            with suppress(OSError):  # it may hold somebody's files
+            with suppress(OSError):  # it may hold a user's files
                 self.folder.rmdir()
             raise SimError(f"{self.folder}: time stood still, and nothing was recorded; expected {LEAST:g} s or more")
         self._recorder.flush()
         if seconds < LEAST:
             self._recorder.close()
             raise SimError(f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {LEAST:g} s or more")
-        parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled))
+        parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled_spans))
         session = replace(engine.session, parts=parts)
-        speed = SpeedSummary(seconds / (time.perf_counter() - self._wall), 0.0, peak_memory_mb())
+        speed = SpeedSummary(seconds / (time.perf_counter() - self._wall_start), 0.0, peak_memory_mb())
         with Recording(self.folder / RECORDING) as recording:
             summary = summarise(
                 recording, default_poses(session), speed, session.world.warnings(), session.parts.handled
@@ -109,9 +109,9 @@ class Take:
         if isinstance(tubes, StretchyTubes):
             lines = [stretch_summary(tubes, engine.memory).line(), *lines]
             save_curve(tubes.edited(engine.memory), self.folder / CURVE_FILE)
-        whole = asdict(summary) | {"lines": lines}
-        self._recorder.close(whole)
-        (self.folder / SUMMARY).write_text(json_text(whole) + "\n", encoding="utf-8")
+        results = asdict(summary) | {"lines": lines}
+        self._recorder.close(results)
+        (self.folder / SUMMARY).write_text(json_text(results) + "\n", encoding="utf-8")
         (self.folder / CONFIG).write_text(to_json(engine.config), encoding="utf-8")
         write_animations(self.folder, session)
         return tuple(lines)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from models.errors import ModelError
 from sim.hardware.undisturbed import parent_id, start_undisturbed
 
-_LISTENS = 0.5  # [s] between two checks whether the page's process still exists
+_CHECK_INTERVAL = 0.5  # [s] between two checks that the page's process still exists
 
 
 class PageProcess:
@@ -20,7 +20,7 @@ class PageProcess:
     Parameters
     ----------
     main : callable
-        What runs in the process, called with the arguments and the queues of requests and of answers.
+        Function that runs in the process, called with the arguments and the queues of requests and of answers.
     arguments : tuple
         Its first arguments.
     daemon : bool
@@ -33,15 +33,15 @@ class PageProcess:
         self, main: Callable[..., None], arguments: tuple[object, ...], daemon: bool = True, name: str | None = None
     ):
         context = get_context("spawn")
-        self._asked: Any = context.Queue()
+        self._requests: Any = context.Queue()
         self._answers: Any = context.Queue()
-        queues = self._asked, self._answers
+        queues = self._requests, self._answers
         self._process = context.Process(target=main, args=(*arguments, *queues), daemon=daemon, name=name)
         start_undisturbed(self._process)
 
     def ask(self, what: object) -> None:
         """Send a request."""
-        self._asked.put(what)
+        self._requests.put(what)
 
     def answer(self, seconds: float = 0.0) -> Any:
         """The next answer, waiting for at most `seconds` [s]; None if there is none."""
@@ -57,9 +57,9 @@ class PageProcess:
 
     def _close_queues(self) -> None:
         """Close both queues without waiting for what they still hold."""
-        for line in (self._asked, self._answers):
-            line.close()
-            line.cancel_join_thread()
+        for channel in (self._requests, self._answers):
+            channel.close()
+            channel.cancel_join_thread()
 
 
 class Worker(PageProcess):
@@ -81,9 +81,9 @@ class Worker(PageProcess):
         self._close_queues()
 
 
-def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
+def _main(work: Callable[[Any, Any], None], requests: Any, answers: Any) -> None:
     os.nice(2)  # the servo has priority
-    does(asked, told)
+    work(requests, answers)
 
 
 def newest(asked: Any) -> Any:
@@ -91,25 +91,25 @@ def newest(asked: Any) -> Any:
     parent = parent_id()
     while True:
         try:
-            what = asked.get(timeout=_LISTENS)
+            request = asked.get(timeout=_CHECK_INTERVAL)
             break
         except queue.Empty:
             if os.getppid() != parent:
                 return None
     while True:
         try:
-            what = asked.get_nowait()
+            request = asked.get_nowait()
         except queue.Empty:
-            return what
+            return request
 
 
 def verdicts(asked: Any, told: Any) -> None:
     """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
     from experiments.live.session.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
 
-    found = GainVerdicts()
+    gain_verdicts = GainVerdicts()
     while (config := newest(asked)) is not None:
-        for k, now in enumerate(found.of(config)):
+        for k, now in enumerate(gain_verdicts.of(config)):
             told.put((config, now, k == 0 and now[0].verdict == "certified"))
             if not asked.empty():
                 break  # the slider has moved on
@@ -145,12 +145,12 @@ def preparation(asked: Any, told: Any) -> None:
         begin = time.perf_counter()
         try:
             loaded = load(source)
-            if loaded.report is None:  # already on the figure's own skeleton, as this page writes it
+            if loaded.report is None:  # already on the figure's own skeleton, as written by this page
                 write_bvh(loaded.clip, target)
-                said = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
+                text = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
             else:
                 line = summary(prepare_file(source, target, overwrite=True))
-                said = f"{line}, {time.perf_counter() - begin:.0f} s in all"
-            told.put(Uploaded(source.name, target, said))
+                text = f"{line}, {time.perf_counter() - begin:.0f} s in all"
+            told.put(Uploaded(source.name, target, text))
         except (ModelError, ValueError, ArithmeticError) as error:
             told.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))

@@ -17,7 +17,7 @@ GRAB_COLUMNS = 11
 """Columns of a `grab_table`."""
 
 
-def _given(vector: Sequence[float] | None) -> Sequence[float]:
+def _values(vector: Sequence[float] | None) -> Sequence[float]:
     return () if vector is None else vector
 
 
@@ -41,12 +41,12 @@ class Push:
     place : tuple of float, optional
         Point in the hand frame [m]: the push begins when the hand first comes within `radius` of it after `at`.
     radius : float
-        Radius about `place` [m].
+        Radius around `place` [m].
 
     Raises
     ------
     SimError
-        If a number is out of its interval or the direction has no length.
+        If a number is outside its interval or the direction has no length.
     ParameterError
         If a value is of another kind.
     """
@@ -60,7 +60,7 @@ class Push:
 
     def __post_init__(self) -> None:
         check_kinds(self)
-        numbers = [self.at, self.seconds, self.force, self.radius, *_given(self.direction), *_given(self.place)]
+        numbers = [self.at, self.seconds, self.force, self.radius, *_values(self.direction), *_values(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a push has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.at < 0.0 or self.radius <= 0.0:
@@ -121,11 +121,11 @@ class Grab:
     hold : float
         Time that the hand stays at the end with the switch pressed [s].
     place : tuple of float, optional
-        Where the switch is pressed, in the hand frame [m]; by default where the hand is.
+        Point at which the switch is pressed, in the hand frame [m]; by default the hand's position.
     reach : float
         Time to get there [s]; ignored without a place.
     steady : bool
-        Carry at constant speed, σ(s) = s: the stylus is taken hold of and released in motion.
+        Carry at constant speed, σ(s) = s: the stylus is grabbed and released in motion.
 
     Raises
     ------
@@ -145,7 +145,7 @@ class Grab:
 
     def __post_init__(self) -> None:
         check_kinds(self)
-        numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *_given(self.place)]
+        numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *_values(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a grab has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.reach <= 0.0 or self.at < 0.0 or self.hold < 0.0:
@@ -153,7 +153,7 @@ class Grab:
 
     @property
     def end(self) -> float:
-        """When the switch is released [s]."""
+        """Time at which the switch is released [s]."""
         return self.at + (0.0 if self.place is None else self.reach) + self.seconds + self.hold
 
     def row(self) -> Array:
@@ -178,7 +178,7 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
 
 
 class GrabRow(NamedTuple):
-    """A `Grab` in compiled code: times [s], place, NaN for where the hand is, and carry [m]; steady is 0 or 1."""
+    """A `Grab` in compiled code: times [s], place (NaN: the hand's position) and carry [m]; steady is 0 or 1."""
 
     start: float
     reach: float

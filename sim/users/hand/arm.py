@@ -14,7 +14,7 @@ from models.phantom.parameters import LEAST_TIP, PREMIUM_1_5
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push, Turn, grab_at, grab_table, push_at, push_table, turn_table
 
-_INERTIA = min(PREMIUM_1_5.gimbal_inertia)  # [kg m²]
+_STYLUS_INERTIA = min(PREMIUM_1_5.gimbal_inertia)  # [kg m²]
 
 
 @njit
@@ -38,8 +38,8 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
         push = push_at(pushes, i)
         if math.isnan(begun[i]):
             x, y, z = p[0] - push.place[0], p[1] - push.place[1], p[2] - push.place[2]
-            away = math.sqrt(x**2 + y**2 + z**2)
-            if t < push.start or (push.radius > 0.0 and away > push.radius):
+            distance = math.sqrt(x**2 + y**2 + z**2)
+            if t < push.start or (push.radius > 0.0 and distance > push.radius):
                 continue
             begun[i] = t if push.radius > 0.0 else push.start
         phase = (t - begun[i]) / push.duration
@@ -50,10 +50,10 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
             for k in range(3):
                 force[k] += bump * push.direction[k]
         else:
-            reach = math.sqrt(p[0] ** 2 + p[1] ** 2)
-            if reach > 1e-9:
-                force[0] += bump * p[0] / reach
-                force[1] += bump * p[1] / reach
+            radius = math.sqrt(p[0] ** 2 + p[1] ** 2)
+            if radius > 1e-9:
+                force[0] += bump * p[0] / radius
+                force[1] += bump * p[1] / radius
 
 
 @njit
@@ -78,14 +78,14 @@ def arm_force(
     n = samples.shape[0]
     if n == 0:
         return
-    place = t / period
-    i = min(int(place), n - 1)
+    position = t / period
+    i = min(int(position), n - 1)
     j = min(i + 1, n - 1)
-    s = place - i if j > i else 0.0
+    s = position - i if j > i else 0.0
     for k in range(3):
-        wanted = samples[i, k] + s * (samples[j, k] - samples[i, k])
+        target = samples[i, k] + s * (samples[j, k] - samples[i, k])
         speed = (samples[j, k] - samples[i, k]) / period
-        force[k] = stiffness * (wanted - p[k]) + damping * (speed - v[k])
+        force[k] = stiffness * (target - p[k]) + damping * (speed - v[k])
 
 
 @njit
@@ -94,7 +94,7 @@ def grab_force(
 ) -> float:
     """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
 
-    The way to the place and the carrying have the minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵.
+    The motion to the place and the carrying have the minimum-jerk profile σ(s) = 10 s³ − 15 s⁴ + 6 s⁵.
 
     Parameters
     ----------
@@ -119,21 +119,21 @@ def grab_force(
             continue
         if math.isnan(held[i, 0]):
             held[i] = p
-        reached, reaching = 1.0, 0.0
+        approach, approach_slope = 1.0, 0.0
         if grab.reach > 0.0:
-            way_there = (t - grab.start) / grab.reach
-            reached, reaching = smooth_step(way_there), smooth_step_slope(way_there)
-        share = (t - pressed_at) / grab.duration
-        carried, carrying = smooth_step(share), smooth_step_slope(share)
+            approach_phase = (t - grab.start) / grab.reach
+            approach, approach_slope = smooth_step(approach_phase), smooth_step_slope(approach_phase)
+        carry_phase = (t - pressed_at) / grab.duration
+        carried, carried_slope = smooth_step(carry_phase), smooth_step_slope(carry_phase)
         if grab.steady != 0.0:
-            carried, carrying = min(max(share, 0.0), 1.0), 1.0 if 0.0 <= share < 1.0 else 0.0
+            carried, carried_slope = min(max(carry_phase, 0.0), 1.0), 1.0 if 0.0 <= carry_phase < 1.0 else 0.0
         for k in range(3):
-            way = 0.0 if math.isnan(grab.place[0]) else grab.place[k] - held[i, k]
-            wanted = held[i, k] + reached * way + carried * grab.carry[k]
-            speed = carrying * grab.carry[k] / grab.duration
-            if reaching > 0.0:
-                speed += reaching * way / grab.reach
-            force[k] += stiffness * (wanted - p[k]) + damping * (speed - v[k])
+            displacement = 0.0 if math.isnan(grab.place[0]) else grab.place[k] - held[i, k]
+            target = held[i, k] + approach * displacement + carried * grab.carry[k]
+            speed = carried_slope * grab.carry[k] / grab.duration
+            if approach_slope > 0.0:
+                speed += approach_slope * displacement / grab.reach
+            force[k] += stiffness * (target - p[k]) + damping * (speed - v[k])
         return 1.0 if t >= pressed_at else 0.0
     return 0.0
 
@@ -141,7 +141,7 @@ def grab_force(
 class CompiledArm(NamedTuple):
     """An `Arm` as plain numbers and arrays.
 
-    Its state is `begun`, when each push began; `held`, where the hand was when each grab began; and `switch` (1,).
+    Its state is `begun`, the start time of each push; `held`, the hand's position when each grab began; `switch` (1,).
     """
 
     stiffness: float
@@ -184,7 +184,7 @@ class Arm:
     pushes : sequence of Push
         Additional forces of the hand.
     grabs : sequence of Grab
-        When and where the hand takes hold, one after the other; only for an arm without a path.
+        When and where the hand grabs, one after the other; only for an arm without a path.
     turns : sequence of Turn
         Rotations of the stylus. If there are any, the hand holds the stylus upright in between; if there are none, the
         gimbal swings freely.
@@ -230,11 +230,11 @@ class Arm:
         return self
 
     def check_step(self, physics_step: float) -> None:
-        """Refuse a physics step for which an impedance of this arm, whose force is held for a step, is too stiff.
+        """Check that no impedance of this arm, whose force is held for a step, is too stiff for a physics step.
 
         A spring k and a damper b on a mass m, stepped by semi-implicit Euler with a step h, are stable for
-        k h² + 2 b h < 4 m: h < 2 (√(b² + 4 k m) − b)/k, with the least apparent mass of the tip, or inertia of the
-        stylus.
+        k h² + 2 b h < 4 m: h < 2 (√(b² + 4 k m) − b)/k, with the smallest apparent mass of the tip or the
+        smallest inertia of the stylus.
 
         Raises
         ------
@@ -243,14 +243,14 @@ class Arm:
         """
         springs: list[tuple[str, float, float, float]] = []
         if self.turns:
-            springs.append(("hand that turns the stylus", self.turn_stiffness, self.turn_damping, _INERTIA))
+            springs.append(("hand that turns the stylus", self.turn_stiffness, self.turn_damping, _STYLUS_INERTIA))
         if len(self.path) > 0 or self.grabs:
             springs.append(("arm", self.stiffness, self.damping, LEAST_TIP))
-        for what, k, b, m in springs:
-            most = 4.0 * m / (b + math.sqrt(b * b + 4.0 * k * m)) if k + b > 0.0 else math.inf
-            if physics_step > most:
+        for holder, k, b, m in springs:
+            max_step = 4.0 * m / (b + math.sqrt(b * b + 4.0 * k * m)) if k + b > 0.0 else math.inf
+            if physics_step > max_step:
                 raise SimError(
-                    f"the {what} needs a physics step of {math.floor(1e5 * most) / 1e5:g} s or less, got "
+                    f"the {holder} needs a physics step of {math.floor(1e5 * max_step) / 1e5:g} s or less, got "
                     f"{physics_step:g} s; choose a smaller --physics-step"
                 )
 

@@ -1,4 +1,4 @@
-r"""A hand dragged interactively: an arm whose intended point is set anew for every block of ticks.
+r"""A hand dragged interactively: an arm whose intended point is updated for every block of ticks.
 
 .. math:: F = k\,(p_d - p) + b\,(\dot p_d - v), \qquad p_d(t) = a + (b - a)\,(t - t_0)/T
 
@@ -13,16 +13,16 @@ from controllers.state import Array
 from sim.users.hand.actions import GRAB_COLUMNS
 from sim.users.hand.arm import CompiledArm
 
-_SPAN = 1e6  # [s] between the two samples of a path, longer than any run
-_FOR_EVER = 1e9  # [s] hold time of a grab
-_TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
+_SAMPLE_SPACING = 1e6  # [s] between the two samples of a path, longer than any run
+_ENDLESS_HOLD = 1e9  # [s] hold time of a grab
+_TREMOR_WAVES = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
 
 TREMBLES = 1e-4
 """Amplitude of the physiological tremor of a hand at rest [m]: a tenth of a millimetre at 8 to 12 Hz."""
 
 
 def relaxed(arm: CompiledArm) -> CompiledArm:
-    """The arm of a hand that has let go of the stylus, and of its switch."""
+    """The arm of a hand that has released the stylus and its switch."""
     arm.switch[0] = 0.0
     return arm._replace(path=np.zeros((0, 3)), grabs=np.zeros((0, GRAB_COLUMNS)), held=np.zeros((0, 3)))
 
@@ -33,7 +33,7 @@ def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array
     Parameters
     ----------
     arm : CompiledArm
-        Gives the impedance.
+        Provides the impedance.
     t, seconds : float
         Start and duration of the block [s].
     start, end : Array
@@ -44,17 +44,17 @@ def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array
     carry = np.asarray(end, dtype=np.float64) - start
     if pressed:
         # A grab at a place that is reached at once, [at, reach, place, carry, seconds, hold, steady].
-        row = np.array([[t, 0.0, *start, *carry, seconds, _FOR_EVER, 1.0]])
+        row = np.array([[t, 0.0, *start, *carry, seconds, _ENDLESS_HOLD, 1.0]])
         return arm._replace(path=np.zeros((0, 3)), grabs=row, held=np.full((1, 3), np.nan))
     speed = carry / seconds
     first = start - speed * t
-    return relaxed(arm)._replace(path=np.array([first, first + _SPAN * speed]), period=_SPAN)
+    return relaxed(arm)._replace(path=np.array([first, first + _SAMPLE_SPACING * speed]), period=_SAMPLE_SPACING)
 
 
 def tremor(t: float) -> Array:
     """Physiological tremor of an outstretched hand at a time [s], in H [m], shape (3,): 8 to 12 Hz, a tenth of a mm.
 
     A real hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54), so the plausibility check of a device
-    takes constant readings for a fault.
+    treats constant readings as a fault.
     """
-    return np.array([TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])
+    return np.array([TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR_WAVES])

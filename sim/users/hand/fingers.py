@@ -1,4 +1,4 @@
-"""The simulated fingers: the moment that turns the stylus; its tip is moved by the arm (see `sim.users.hand.arm`)."""
+"""The simulated fingers: the moment that turns the stylus; the arm moves its tip (see `sim.users.hand.arm`)."""
 
 import math
 

@@ -15,7 +15,7 @@ from sim.users.person.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
 
 @dataclass(frozen=True)
 class Bend:
-    """Take hold of the curve with the switch at given places, carry it, release it; in between be led by the field.
+    """Grab the curve with the switch at given places, carry it, release it; in between be led by the field.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Bend:
     Raises
     ------
     SimError
-        If there is no grab, grabs overlap, or one has no place, since a person decides where she takes hold.
+        If there is no grab, grabs overlap, or one has no place, since a person decides where she grabs the curve.
     """
 
     grabs: Sequence[Grab]
@@ -43,10 +43,10 @@ class Bend:
         t = moments(seconds)
         rows = resting(len(t))
         for grab in self.grabs:
-            held = grab.at + grab.reach
-            carried = between(t, held, held + grab.seconds)
-            busy = (t >= grab.at) & (t < grab.end)
-            rows[busy, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[busy]
-            rows[busy, ENGAGED] = 1.0
-            rows[busy & (t >= held), SWITCH] = 1.0
+            grip_start = grab.at + grab.reach
+            carried = between(t, grip_start, grip_start + grab.seconds)
+            is_busy = (t >= grab.at) & (t < grab.end)
+            rows[is_busy, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[is_busy]
+            rows[is_busy, ENGAGED] = 1.0
+            rows[is_busy & (t >= grip_start), SWITCH] = 1.0
         return Wishes(rows, PERIOD)

@@ -11,14 +11,14 @@ from sim.users.person.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class ChangeOver:
-    """Trace the curve, and from a given time on another one.
+    """Trace the curve and, from a given time on, another one.
 
     Parameters
     ----------
     to : Trajectory, optional
         The other curve; by default the same curve enlarged, where a cylindrical map blends other clips.
     at, seconds : float
-        Start of the change, by default after half of the run, and its duration [s].
+        Start of the change, by default at half the run, and its duration [s].
     """
 
     to: Trajectory | None = None
@@ -33,9 +33,9 @@ class ChangeOver:
         t = moments(seconds)
         at = 0.5 * seconds if self.at is None else self.at
         before, middle = curve.point(curve.start + t), centre(curve)
-        after = middle + _FURTHER * (before - middle) if self.to is None else self.to.point(self.to.start + t)
+        after = middle + _ENLARGEMENT * (before - middle) if self.to is None else self.to.point(self.to.start + t)
         share = between(t, at, at + self.seconds)[:, None]
         return Wishes(following((1.0 - share) * before + share * after), PERIOD)
 
 
-_FURTHER = 1.35  # factor by which the default curve is enlarged about its centre
+_ENLARGEMENT = 1.35  # factor by which the default curve is enlarged about its centre

@@ -9,12 +9,12 @@ from sim.users.person.wishes import Wishes, following
 
 @dataclass(frozen=True)
 class CutCorner:
-    """Trace the curve, with a straight line in place of one part of it.
+    """Trace the curve, with one part replaced by a straight line.
 
     Parameters
     ----------
     start, end : float
-        Phases of the lap between which the line is, 0 to 1.
+        Phases of the lap at the ends of the line, 0 to 1.
     """
 
     start: float = 0.3

@@ -30,17 +30,19 @@ class GetLost:
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
-        t, rng = moments(seconds), np.random.default_rng([seed, _LOT])
-        lost = np.clip((t - self.at) / self.seconds, 0.0, 1.0)
-        size = np.sin(np.pi * lost) ** 2
-        waves = 2.0 * np.pi * _WAVES * (t - self.at)[:, None]
-        turns = rng.uniform(0.0, 2.0 * np.pi, (3, len(_WAVES)))
-        wander = np.sqrt(2.0 / len(_WAVES)) * np.stack([np.cos(waves + turn).sum(axis=1) for turn in turns], axis=1)
+        t, rng = moments(seconds), np.random.default_rng([seed, _RANDOM_STREAM])
+        progress = np.clip((t - self.at) / self.seconds, 0.0, 1.0)
+        size = np.sin(np.pi * progress) ** 2
+        waves = 2.0 * np.pi * _FREQUENCIES * (t - self.at)[:, None]
+        turns = rng.uniform(0.0, 2.0 * np.pi, (3, len(_FREQUENCIES)))
+        wander = np.sqrt(2.0 / len(_FREQUENCIES)) * np.stack(
+            [np.cos(waves + turn).sum(axis=1) for turn in turns], axis=1
+        )
         rows = following(curve.point(curve.start + t) + self.away * size[:, None] * wander)
         # In the middle she is passive for a moment.
-        rows[(lost > 0.45) & (lost < 0.55), ENGAGED] = 0.0
+        rows[(progress > 0.45) & (progress < 0.55), ENGAGED] = 0.0
         return Wishes(rows, PERIOD)
 
 
-_WAVES = np.array([0.23, 0.41, 0.67])  # [Hz], without a short common period
-_LOT = 20  # number of this random stream of a run's seed
+_FREQUENCIES = np.array([0.23, 0.41, 0.67])  # [Hz] without a short common period
+_RANDOM_STREAM = 20  # number of this random stream under a run's seed

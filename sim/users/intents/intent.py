@@ -16,7 +16,7 @@ PERIOD = 0.02  # [s] sampling period of wishes: shorter than any submovement
 
 @runtime_checkable
 class PersonIntent(Protocol):
-    """What a person means to do."""
+    """What a person intends to do."""
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """Her wishes for a run of `seconds` on a curve; `seed` is for intents with random parts."""
@@ -24,7 +24,7 @@ class PersonIntent(Protocol):
 
 
 def moments(seconds: float) -> Array:
-    """Times of wishes [s]; they go beyond the run, since her clock may run 1.5 times as fast and she plans ahead."""
+    """Times of wishes [s], beyond the end of the run: her clock may run 1.5 times as fast, and she plans ahead."""
     return np.arange(0.0, 1.5 * seconds + 1.0, PERIOD)
 
 
@@ -46,14 +46,14 @@ def centre(curve: Trajectory) -> Array:
 
 
 def check(intent: object, **numbers: tuple[float, float, float]) -> None:
-    """Check the kinds of all values of an intent, and its numbers, given by name as (value, least, most), and finite.
+    """Check the kinds of all values of an intent, and its finite numbers, given by name as (value, min, max).
 
     Raises
     ------
     ParameterError
         If a value is of another kind.
     SimError
-        If one is outside of its interval.
+        If a number is outside its interval.
     """
     check_kinds(intent)
     for name, (value, least, most) in numbers.items():

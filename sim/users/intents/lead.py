@@ -27,7 +27,7 @@ class Lead:
     Raises
     ------
     ParameterError
-        If the points are no numbers, or the period is no number.
+        If the points or the period are not numbers.
     SimError
         If there is no point, they have another shape or are not finite, or the period is not positive and finite.
     """
@@ -46,7 +46,7 @@ class Lead:
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
-        given = self.period * np.arange(len(self.points))
+        times = self.period * np.arange(len(self.points))
         t = moments(seconds)
-        points = np.stack([np.interp(t, given, self.points[:, k]) for k in range(3)], axis=1)
+        points = np.stack([np.interp(t, times, self.points[:, k]) for k in range(3)], axis=1)
         return Wishes(following(points), PERIOD)

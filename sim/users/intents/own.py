@@ -26,7 +26,7 @@ class Wish(NamedTuple):
     place : sequence of float, optional
         Wanted position of the stylus in H [m]; None: she is passive.
     velocity : sequence of float
-        Velocity of that position [m/s], by which she plans ahead.
+        Velocity of that position [m/s], with which she plans ahead.
     force : sequence of float
         Additional force that she exerts, in H [N].
     grip : float
@@ -93,8 +93,8 @@ class Own:
         try:
             return address_of(kernel, INTENT_ARGUMENTS)
         except NumbaError as error:
-            first = str(error).strip().splitlines()[0]
-            raise SimError(f"the intent {self.function.__name__} cannot be compiled: {first}") from None
+            first_line = str(error).strip().splitlines()[0]
+            raise SimError(f"the intent {self.function.__name__} cannot be compiled: {first_line}") from None
 
     def ask(self, person: PersonState, t: float) -> None:
         """Call the function in Python at time t [s] and set the person's wishes from its result.
@@ -104,9 +104,9 @@ class Own:
         SimError
             If the result is neither a `Wish` nor a position.
         """
-        said = self.function(t, person.vectors[BELIEF].copy(), person.vectors[FELT_FORCE].copy())
+        result = self.function(t, person.vectors[BELIEF].copy(), person.vectors[FELT_FORCE].copy())
         try:
-            wish = said if isinstance(said, Wish) else Wish(said)
+            wish = result if isinstance(result, Wish) else Wish(result)
             rows = resting(2)
             if wish.place is not None:
                 rows[0, PLACE : PLACE + 3], rows[0, ENGAGED] = wish.place, 1.0
@@ -115,4 +115,4 @@ class Own:
             person.wishes[:] = Wishes(rows, OWN).rows
         except (TypeError, ValueError):
             name = getattr(self.function, "__name__", "function")
-            raise SimError(f"the intent {name} gave {said!r}; expected a place of three numbers, or a Wish") from None
+            raise SimError(f"the intent {name} gave {result!r}; expected a place of three numbers, or a Wish") from None

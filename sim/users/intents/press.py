@@ -45,6 +45,6 @@ class Press:
         outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
         for push in self.pushes:
             phase = np.clip((t - push.at) / push.seconds, 0.0, 1.0)
-            way = outward if push.direction is None else np.array(push.direction) / np.linalg.norm(push.direction)
-            rows[:, FORCE : FORCE + 3] += (push.force * np.sin(np.pi * phase) ** 2)[:, None] * way
+            direction = outward if push.direction is None else np.array(push.direction) / np.linalg.norm(push.direction)
+            rows[:, FORCE : FORCE + 3] += (push.force * np.sin(np.pi * phase) ** 2)[:, None] * direction
         return Wishes(rows, PERIOD, curve.duration)

@@ -11,7 +11,7 @@ from sim.users.person.wishes import GRIP, PLACE, Wishes, following
 
 @dataclass(frozen=True)
 class Resist:
-    """Trace the curve, but stay at one place of it for some time, with a firm grip, against the field; then go on.
+    """Trace the curve, but hold one place on it for some time against the field, with a firm grip; then go on.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ class Resist:
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
         t = moments(seconds)
-        stays = (t >= self.at) & (t < self.at + self.seconds)
-        own = t - np.clip(t - self.at, 0.0, self.seconds)
-        rows = following(curve.point(curve.start + own))
-        rows[stays, PLACE : PLACE + 3] = curve.point(curve.start + self.at)
-        rows[stays, GRIP] = self.grip
+        is_staying = (t >= self.at) & (t < self.at + self.seconds)
+        curve_time = t - np.clip(t - self.at, 0.0, self.seconds)
+        rows = following(curve.point(curve.start + curve_time))
+        rows[is_staying, PLACE : PLACE + 3] = curve.point(curve.start + self.at)
+        rows[is_staying, GRIP] = self.grip
         return Wishes(rows, PERIOD)

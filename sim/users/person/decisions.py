@@ -46,12 +46,12 @@ BEND = 0.1  # [s] half-width of the velocity difference that estimates a path's 
 
 @njit
 def want(person: PersonState, switch: Array) -> None:
-    """Read the current wish, begin a submovement if it is time to, and follow the one in progress."""
+    """Read the current wish, begin a submovement if one is due, and follow the one in progress."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = work_array((3, 3)), work_array((3, 3))
     wanted[:], goal[:] = 0.0, 0.0
-    aims, owns = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
-    if owns:
+    has_targets, is_user_defined = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
+    if is_user_defined:
         if person.units[1] != 0:
             call_intent(person.units[1], (m[TICKS] * n[PERIOD], V[BELIEF], V[FELT_FORCE], rows))
         row = rows[0]
@@ -59,62 +59,62 @@ def want(person: PersonState, switch: Array) -> None:
         for k in range(3):
             goal[0, k] = wanted[0, k] + n[HORIZON] * wanted[1, k]
         switch[0] = row[SWITCH]
-    elif aims:
+    elif has_targets:
         row = rows[min(int(m[TARGET]), rows.shape[0] - 1)]
         wanted[0], goal[0] = row[PLACE : PLACE + 3], row[PLACE : PLACE + 3]
         switch[0] = 0.0
     else:
         row = rows[wanted_motion(rows, n[WISH_PERIOD], m[CLOCK], wanted)]
-        _foresee(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
+        _predict_wanted_motion(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
         switch[0] = row[SWITCH]
     engaged = row[ENGAGED] > 0.0
     m[CLOCK] += n[PERIOD] * (
-        1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
+        1.0 + _clock_speed_up(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
     )
     grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
-    follow = n[PERIOD] / ENGAGING_TIME
-    m[ENGAGED_SHARE] += follow * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
-    m[STIFFER] += follow * (max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFER])
+    activation_step = n[PERIOD] / ENGAGING_TIME
+    m[ENGAGED_SHARE] += activation_step * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
+    m[STIFFER] += activation_step * (max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFER])
     for k in range(3):
-        V[WANTED_FORCE, k] += follow * (row[FORCE + k] - V[WANTED_FORCE, k])
+        V[WANTED_FORCE, k] += activation_step * (row[FORCE + k] - V[WANTED_FORCE, k])
     if not engaged:
-        _yield(person)
+        _relax_arm(person)
         return
-    if aims:
+    if has_targets:
         if may_decide(person, True) and aim(person, goal, row[WIDTH]):
             m[TARGET] += 1.0
             switch[0] = 1.0
     elif may_decide(person, False):
         submove(person, goal, n[HORIZON])
     drive(person)
-    _learn(person, wanted)
+    _learn_force(person, wanted)
 
 
 @njit
-def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
-    """Set the motion that will be wanted at time t [s]; its acceleration is averaged over ± `BEND`, also at corners."""
-    before, bend = work_array((3, 3)), work_array(3)
+def _predict_wanted_motion(rows: Array, period: float, t: float, goal: Array) -> None:
+    """Set the motion that will be wanted at time t [s]; its acceleration is a mean over ± `BEND`, even at corners."""
+    before, acceleration = work_array((3, 3)), work_array(3)
     before[:] = 0.0
     wanted_motion(rows, period, t - BEND, before)
     wanted_motion(rows, period, t + BEND, goal)
     for k in range(3):
-        bend[k] = (goal[1, k] - before[1, k]) / (2.0 * BEND)
+        acceleration[k] = (goal[1, k] - before[1, k]) / (2.0 * BEND)
     wanted_motion(rows, period, t, goal)
-    goal[2] = bend
+    goal[2] = acceleration
 
 
 @njit
-def _ahead(entrainment: float, place: Array, wanted: Array) -> float:
+def _clock_speed_up(entrainment: float, place: Array, wanted: Array) -> float:
     """Relative speed-up of her clock [1], −0.5 to 0.5: positive if the hand is ahead of the wanted motion."""
-    speed, way = 0.0, 0.0
+    speed, lead = 0.0, 0.0
     for k in range(3):
         speed += wanted[1, k] * wanted[1, k]
-        way += wanted[1, k] * (place[k] - wanted[0, k])
-    return 0.0 if speed < 1e-6 else min(max(entrainment * way / speed, -0.5), 0.5)
+        lead += wanted[1, k] * (place[k] - wanted[0, k])
+    return 0.0 if speed < 1e-6 else min(max(entrainment * lead / speed, -0.5), 0.5)
 
 
 @njit
-def _yield(person: PersonState) -> None:
+def _relax_arm(person: PersonState) -> None:
     """Be passive: the arm's rest position follows the believed position of the hand."""
     n, m, V = person.numbers, person.memory, person.vectors
     for k in range(3):
@@ -124,27 +124,28 @@ def _yield(person: PersonState) -> None:
 
 
 @njit
-def _learn(person: PersonState, wanted: Array) -> None:
+def _learn_force(person: PersonState, wanted: Array) -> None:
     r"""Learn the force that keeps the hand on the wanted motion, for each part of a lap.
 
     .. math:: f_{n+1} = A f_n + B K (p_d - p)
 
-    per repetition (Thoroughman & Shadmehr 2000). The learned force is applied earlier by the time of muscle activation.
+    per repetition (Thoroughman & Shadmehr 2000). The learned force is applied earlier by the time constant of
+    muscle activation.
     """
     n, m, V = person.numbers, person.memory, person.vectors
     if n[LEARNING] == 0.0 or n[LAP] == 0.0:
         return
-    part, ready = _part(m[CLOCK] / n[LAP]), _part((m[CLOCK] + ENGAGING_TIME) / n[LAP])
+    part, activated_part = _lap_part(m[CLOCK] / n[LAP]), _lap_part((m[CLOCK] + ENGAGING_TIME) / n[LAP])
     share = n[PERIOD] * LEARNED_PARTS / n[LAP]
     for k in range(3):
         pull = 0.0
         for j in range(3):
             pull += person.stiffness[k, j] * (wanted[0, j] - V[BELIEF, j])
         person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETAINED) * person.learned[part, k])
-        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[ready, k]
+        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[activated_part, k]
 
 
 @njit
-def _part(laps: float) -> int:
+def _lap_part(laps: float) -> int:
     """Index of the part of a lap after a number of laps."""
     return int(LEARNED_PARTS * (laps - math.floor(laps))) % LEARNED_PARTS

@@ -1,6 +1,6 @@
 r"""A person's vision: an estimate of her hand's place from the pose of the figure that she sees.
 
-She has learned the map h along the motion that she intends and close beside it. From the pose q that she sees and the
+She has learned the map h along, and close to, the motion that she intends. From the pose q that she sees and the
 place f where she feels her hand, she estimates the most likely place p. With standard deviations σ_q of the seen pose
 and σ_f of the felt place, and λ = σ_q/σ_f,
 
@@ -8,7 +8,7 @@ and σ_f of the felt place, and λ = σ_q/σ_f,
           H^+ = (H^T H + \lambda^2)^{-1} H^T, \qquad \varphi = \varphi(s^*), \\
           s^* = \arg\min_s \|q \ominus h(\varphi(s))\|^2 + \lambda^2 \|f - \varphi(s)\|^2
 
-where H is the derivative of h by the hand's place. Directions that do not show in the figure are taken from
+where H is the derivative of h by the hand's place. Directions that are not visible in the figure are taken from
 proprioception: each sense is weighted by direction, as people combine vision and proprioception (van Beers, Sittig &
 Gon 1999, J. Neurophysiol. 81: 1355-1364).
 """
@@ -21,8 +21,8 @@ from numba import njit
 from controllers.rotations import logarithm, relative
 from controllers.state import Array
 
-LOOKS = 0.008  # [s] between two pictures of the figure: about 120 a second
-_NEAR = 1.0 / 8.0  # share of the motion, around the felt place, in which a pose is sought: steps of a gait look alike
+LOOKS = 0.008  # [s] between two images of the figure: about 120 a second
+_SEARCH_FRACTION = 1.0 / 8.0  # of the motion, around the felt place, searched for a pose: steps of a gait look alike
 
 
 class Eye(NamedTuple):
@@ -58,28 +58,28 @@ def no_eye() -> Eye:
 
 
 @njit
-def _likeliest(eye: Eye, felt: Array) -> int:
+def _most_likely_sample(eye: Eye, felt: Array) -> int:
     """Index of the most likely sample of the motion for the pose shown, near the felt place of the hand."""
-    n, q, around, best = eye.poses.shape[0], eye.pose, 0, np.inf
-    away = np.zeros(n)
+    n, q, nearest, best = eye.poses.shape[0], eye.pose, 0, np.inf
+    squared_distance = np.zeros(n)
     for i in range(n):
         for k in range(3):
-            away[i] += (felt[k] - eye.places[i, k]) ** 2
-        if away[i] < best:
-            around, best = i, away[i]
-    best, likeliest, reach = np.inf, around, max(1, int(0.5 * _NEAR * n))
+            squared_distance[i] += (felt[k] - eye.places[i, k]) ** 2
+        if squared_distance[i] < best:
+            nearest, best = i, squared_distance[i]
+    best, likeliest, reach = np.inf, nearest, max(1, int(0.5 * _SEARCH_FRACTION * n))
     for step in range(-reach, reach + 1):
-        i = (around + step) % n
-        other, far = eye.poses[i], eye.trust[i] * away[i]
+        i = (nearest + step) % n
+        other, cost = eye.poses[i], eye.trust[i] * squared_distance[i]
         for k in range(3):
-            far += (q[k] - other[k]) ** 2
+            cost += (q[k] - other[k]) ** 2
         for joint in range(3, q.shape[0], 4):
             dot = 0.0
             for k in range(joint, joint + 4):
                 dot += q[k] * other[k]
-            far += 4.0 * (1.0 - dot * dot)
-        if far < best:
-            best, likeliest = far, i
+            cost += 4.0 * (1.0 - dot * dot)
+        if cost < best:
+            best, likeliest = cost, i
     return likeliest
 
 
@@ -98,7 +98,7 @@ def seen_place(eye: Eye, felt: Array, difference: Array, place: Array) -> None:
     place : Array
         Set: p [m], shape (3,).
     """
-    q, i = eye.pose, _likeliest(eye, felt)
+    q, i = eye.pose, _most_likely_sample(eye, felt)
     other = eye.poses[i]
     for k in range(3):
         difference[k] = q[k] - other[k]

@@ -30,17 +30,17 @@ from sim.users.person.random_numbers import normal
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.person.wishes import PLACE
 
-ACROSS = 0.85  # endpoint scatter across the direction over that along it (below 1: Gordon et al. 1994 I; the value: m)
+ACROSS = 0.85  # endpoint scatter across the direction over that along it (< 1: Gordon et al. 1994 I; value from memory)
 LEAST_SECONDS = 0.16  # [s] duration of the shortest submovement
-WATCHED = 0.8  # share of a submovement's time, 94 % of its way, after which its endpoint can be seen
-SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan [m] that is corrected, and after what time [s]
+WATCHED = 0.8  # share of a submovement's duration (94 % of its length) after which its endpoint can be seen
+SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan that is corrected [m], and the delay [s]
 
 
 @njit
 def may_decide(person: PersonState, waits: bool) -> bool:
     """Whether a new submovement may begin: in the second half of the last one, or earlier after a deviation from it.
 
-    A person who aims at a target `waits` until she has seen where the last submovement ends.
+    A person who aims at a target waits (`waits`) until she has seen where the last submovement ends.
     """
     n, m, V = person.numbers, person.memory, person.vectors
     now = m[TICKS] * n[PERIOD]
@@ -53,10 +53,10 @@ def may_decide(person: PersonState, waits: bool) -> bool:
         return True
     believed = work_array((3, 3))
     submovement(person.plans[1], m[LASTS], elapsed, believed)
-    off = 0.0
+    squared_deviation = 0.0
     for k in range(3):
-        off += (V[BELIEF, k] - believed[0, k]) ** 2
-    if off < SURPRISE * SURPRISE:
+        squared_deviation += (V[BELIEF, k] - believed[0, k]) ** 2
+    if squared_deviation < SURPRISE * SURPRISE:
         m[CALM] = now
     return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION
 
@@ -68,18 +68,18 @@ def aim(person: PersonState, goal: Array, width: float) -> bool:
     A target is a strip across the line from the previous target, as in Fitts 1954; the first one is a ball.
     """
     n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[TARGET])
-    away, along, apart = 0.0, 0.0, 0.0
+    distance, along, squared_spacing = 0.0, 0.0, 0.0
     for k in range(3):
-        away += (goal[0, k] - V[BELIEF, k]) ** 2
+        distance += (goal[0, k] - V[BELIEF, k]) ** 2
         if 0 < turn < rows.shape[0]:
-            way = rows[turn, PLACE + k] - rows[turn - 1, PLACE + k]
-            along += way * (goal[0, k] - V[BELIEF, k])
-            apart += way * way
-    away = math.sqrt(away) if apart == 0.0 else abs(along) / math.sqrt(apart)
-    if away < 0.5 * width:
+            spacing = rows[turn, PLACE + k] - rows[turn - 1, PLACE + k]
+            along += spacing * (goal[0, k] - V[BELIEF, k])
+            squared_spacing += spacing * spacing
+    distance = math.sqrt(distance) if squared_spacing == 0.0 else abs(along) / math.sqrt(squared_spacing)
+    if distance < 0.5 * width:
         return True
     overhead = n[PERIOD] * n[SEEN_TICKS]
-    seconds = aimed_seconds(2.0 * away / width, n[CAUTION] * n[MOTOR_NOISE], overhead, LEAST_SECONDS)
+    seconds = aimed_seconds(2.0 * distance / width, n[CAUTION] * n[MOTOR_NOISE], overhead, LEAST_SECONDS)
     submove(person, goal, seconds)
     return False
 
@@ -93,11 +93,11 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     the command (Harris & Wolpert 1998).
     """
     n, m, V = person.numbers, person.memory, person.vectors
-    start, end, way, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
+    start, end, displacement, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
     end[:] = goal
     for k in range(3):
-        way[k] = goal[0, k] - V[BELIEF, k]
-        length += way[k] * way[k]
+        displacement[k] = goal[0, k] - V[BELIEF, k]
+        length += displacement[k] * displacement[k]
     length = math.sqrt(length)
     start[0], start[1], start[2] = V[BELIEF], V[DRIVEN_V], V[DRIVEN_A]
     set_submovement(person.plans[1], start, goal, seconds)
@@ -105,9 +105,9 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     across = ACROSS * scatter
     along = math.sqrt(scatter * scatter - across * across) * normal(person.chance)
     for k in range(3):
-        unit = way[k] / length if length > 0.0 else 0.0
-        miss = along * unit + across * normal(person.chance)
-        end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + miss
+        unit = displacement[k] / length if length > 0.0 else 0.0
+        error = along * unit + across * normal(person.chance)
+        end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + error
     start[0] = V[DRIVEN_P]
     set_submovement(person.plans[0], start, end, seconds)
     m[LASTS], m[BEGUN] = seconds, m[TICKS] * n[PERIOD]

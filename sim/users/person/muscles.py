@@ -36,7 +36,7 @@ from sim.users.person.person_state import (
 
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
 RECOVERY = 0.04  # R [1/min] of fatigued muscle, for grip (Frey-Law et al. 2012, m)
-RESTED, RESTING = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m); share of strength below which it is rest
+RESTED, RESTING = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m); share of strength below which a muscle rests
 
 
 @njit
@@ -49,28 +49,28 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
     engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
     spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
     damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
-    muscle, size, held = work_array(3), 0.0, 0.0
+    muscle, size, force_size = work_array(3), 0.0, 0.0
     for k in range(3):
-        pull = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
+        component = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
         for j in range(3):
-            pull += spring * person.stiffness[k, j] * (V[DRIVEN_P, j] - V[HAND_P, j])
-            pull += damper * person.damping[k, j] * (V[DRIVEN_V, j] - V[HAND_V, j])
-            pull += person.inertia[k, j] * (n[SKILL] * V[DRIVEN_A, j] + V[TREMOR, j])
-        muscle[k] = pull
-        size += pull * pull
+            component += spring * person.stiffness[k, j] * (V[DRIVEN_P, j] - V[HAND_P, j])
+            component += damper * person.damping[k, j] * (V[DRIVEN_V, j] - V[HAND_V, j])
+            component += person.inertia[k, j] * (n[SKILL] * V[DRIVEN_A, j] + V[TREMOR, j])
+        muscle[k] = component
+        size += component * component
     size = math.sqrt(size)
     for k in range(3):
         muscle[k] += size * V[UNSTEADY, k]
-    most = n[STRENGTH] * m[CAPACITY]
-    scale = min(1.0, most / max(size, 1e-12))
+    max_force = n[STRENGTH] * m[CAPACITY]
+    scale = min(1.0, max_force / max(size, 1e-12))
     for k in range(3):
         muscle[k] *= scale
         force[k] = stiffer * (n[GRIP_STIFFNESS] * (V[HAND_P, k] - p[k]) + n[GRIP_DAMPING] * (V[HAND_V, k] - v[k]))
-        held += force[k] * force[k]
-    held = math.sqrt(held)
-    if held > n[STRENGTH]:  # the stylus slips between the fingers
+        force_size += force[k] * force[k]
+    force_size = math.sqrt(force_size)
+    if force_size > n[STRENGTH]:  # the stylus slips between the fingers
         for k in range(3):
-            force[k] *= n[STRENGTH] / held
+            force[k] *= n[STRENGTH] / force_size
     for k in range(3):
         acceleration = 0.0
         for j in range(3):
@@ -79,6 +79,6 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
     for k in range(3):
         V[HAND_P, k] += dt * V[HAND_V, k]
     if n[FATIGUE] > 0.0:
-        load = min(size, most) / n[STRENGTH]
+        load = min(size, max_force) / n[STRENGTH]
         recovery = RECOVERY * (RESTED if load < RESTING else 1.0)
         m[CAPACITY] += dt / 60.0 * (recovery * (1.0 - m[CAPACITY]) - n[FATIGUE] * load)

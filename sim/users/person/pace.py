@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from controllers.state import Array
 
-_WAVES = 6  # Fourier terms of the logarithm of the speed along a lap
+_N_HARMONICS = 6  # Fourier terms of the logarithm of the speed along a lap
 
 
 def natural_times(points: Array, seconds: float) -> Array:
@@ -22,28 +22,28 @@ def natural_times(points: Array, seconds: float) -> Array:
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = np.concatenate(([0.0], np.cumsum(steps)))
     angle = 2.0 * np.pi * length / length[-1]
-    waves = np.concatenate([[np.cos(k * angle), np.sin(k * angle)] for k in range(1, _WAVES + 1)])
+    waves = np.concatenate([[np.cos(k * angle), np.sin(k * angle)] for k in range(1, _N_HARMONICS + 1)])
     n = len(points) - 1
     even = np.arange(n) / n
 
     def times(coefficients: Array) -> Array:
         slowness = np.exp(-coefficients @ waves)
-        passed = np.concatenate(([0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * steps)))
-        return passed / passed[-1]
+        cumulative_time = np.concatenate(([0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * steps)))
+        return cumulative_time / cumulative_time[-1]
 
     frequencies = np.fft.fftfreq(n, 1.0 / n)[:, None]
 
     def jerk(coefficients: Array) -> float:
         at = times(coefficients)
         x = np.stack([np.interp(even, at, points[:, k]) for k in range(points.shape[1])], axis=1)
-        # Only of low frequencies, since the path between its points is not known.
-        spectrum = np.where(np.abs(frequencies) <= 4 * _WAVES, np.fft.fft(x, axis=0), 0.0)
+        # Low frequencies only, since the path between its points is not known.
+        spectrum = np.where(np.abs(frequencies) <= 4 * _N_HARMONICS, np.fft.fft(x, axis=0), 0.0)
         return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
 
-    first = jerk(np.zeros(2 * _WAVES))
+    initial_jerk = jerk(np.zeros(2 * _N_HARMONICS))
 
-    def share(c: Array) -> float:
-        return jerk(c) / first
+    def relative_jerk(c: Array) -> float:
+        return jerk(c) / initial_jerk
 
-    found = minimize(share, np.zeros(2 * _WAVES), method="L-BFGS-B")
-    return seconds * times(found.x)
+    solution = minimize(relative_jerk, np.zeros(2 * _N_HARMONICS), method="L-BFGS-B")
+    return seconds * times(solution.x)

@@ -102,7 +102,7 @@ class Person:
     name : str
         Name, for tables.
     age : float
-        Age [years]; its effects are already in the other numbers, as `population` draws them.
+        Age [years]; its effects are already in the other numbers as drawn by `population`.
     hand : {"right", "left"}
         The hand that holds the stylus: the ellipsoids of inertia and stiffness are mirrored.
     skill : float
@@ -138,7 +138,7 @@ class Person:
     direction_noise : float
         Standard deviation of the error of a movement's felt direction [rad].
     refractory : float
-        Refractory period: least time between two decisions [s].
+        Refractory period: shortest time between two decisions [s].
     horizon : float
         Duration of a submovement in tracking [s].
     motor_noise : float
@@ -160,7 +160,7 @@ class Person:
     Raises
     ------
     SimError
-        If a number is outside of its interval, or `hand` is neither right nor left.
+        If a number is outside its interval, or `hand` is neither right nor left.
     """
 
     name: str = "median"

@@ -13,12 +13,12 @@ from sim.users.person.wishes import WISH_SIZE
  DIRECTION_NOISE, SEEN_NOISE, REFRACTORY, HORIZON, MOTOR_NOISE, FORCE_NOISE, TREMOR_GAIN, TREMOR_A, TREMOR_B,
  CORRECTION, CAUTION, ENTRAINMENT, LEARNING, PERIOD, WISH_PERIOD, LAP, REFLEX_TICKS, SEEN_TICKS, LOOK_TICKS,
  N_NUMBERS) = range(30)  # fmt: skip
-"""Places in `PersonState.numbers`: parameters of the person (for the tremor, of its filter), of her wishes, and delays
+"""Indices in `PersonState.numbers`: parameters of the person (for the tremor, of its filter), of her wishes, and delays
 in ticks."""
 
 (STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, CALM,
  N_MEMORY) = range(12)  # fmt: skip
-"""Places in `PersonState.memory`: 1 once she has begun, ticks so far, her own clock [s], start and duration of the
+"""Indices in `PersonState.memory`: 1 once she has begun, ticks so far, her own clock [s], start and duration of the
 current submovement [s], time of the last decision [s], share of strength left after fatigue, number of the current
 target, degree of muscle activation, impedance relative to that at the reference grip, and the last time at which the
 hand was where the submovement had it [s]."""

@@ -8,7 +8,7 @@ from controllers.checks import of_kind
 from sim.errors import SimError
 from sim.users.person.person import INTERVALS, Person
 
-_SPREAD = {
+_LOG_SPREAD = {
     "mass": 0.3, "stiffness": 0.35, "damping_ratio": 0.2, "anisotropy": 0.15, "grip_stiffness": 0.3,
     "grip_damping": 0.25, "strength": 0.25, "felt_noise": 0.25, "seen_noise": 0.2, "motor_noise": 0.2,
     "force_noise": 0.25, "tremor": 0.6, "tremor_frequency": 0.08, "reflex_delay": 0.12, "visual_delay": 0.07,
@@ -21,10 +21,10 @@ For tremor, as wide as the range of the normative study (a factor of 20 between 
 impedance, the inter-subject variation of arm models (a factor of about two either way); for the others, coefficients of
 variation of a healthy sample, some 10 to 30 %.
 """
-_SKILL = (8.5, 1.5)  # parameters of a beta distribution: adults know most of their arm's inertia, but not all of it
-_MEAN_SKILL = _SKILL[0] / sum(_SKILL)
-_LEFT = 0.1  # share of people who hold a pen in the left hand
-_AGING = 0.006  # relative slowing per year from age 30 on: choice reaction, movement times rise 5 to 10 % a decade
+_SKILL_BETA = (8.5, 1.5)  # of a beta distribution: adults know most, but not all, of their arm's inertia
+_MEAN_SKILL = _SKILL_BETA[0] / sum(_SKILL_BETA)
+_LEFT_HANDED_FRACTION = 0.1  # share of people who hold a pen in the left hand
+_SLOWING_PER_YEAR = 0.006  # relative, from age 30 on: choice reaction and movement times rise 5 to 10 % a decade
 
 PERSONAS = {
     "median": Person(),
@@ -53,20 +53,20 @@ def persona(name: str) -> Person:
     if name in PERSONAS:
         return PERSONAS[name]
     seed, _, place = name.partition(":")
-    if seed.isdecimal() and (place or "0").isdecimal() and int(place or "0") < _MOST:
-        return _drawn(int(seed), int(place or "0"))
+    if seed.isdecimal() and (place or "0").isdecimal() and int(place or "0") < _MAX_SIZE:
+        return _draw_person(int(seed), int(place or "0"))
     known = ", ".join(PERSONAS)
     raise SimError(f"no person {name!r}; there are {known}, or SEED:PLACE of a population, such as 7:3")
 
 
-_MOST = 1_000_000  # largest size of a population
+_MAX_SIZE = 1_000_000  # largest size of a population
 
 
 def population(number: int, seed: int) -> tuple[Person, ...]:
     """Draw a population; a larger one of the same seed begins with the same people.
 
-    Age is uniform between 20 and 75, skill is Beta(8.5, 1.5), one in ten is left-handed; the numbers of `_SPREAD` are
-    log-normal about the median person's, clipped to their intervals, all others are the median person's. Endpoint
+    Age is uniform between 20 and 75, skill is Beta(8.5, 1.5), one in ten is left-handed. The numbers of `_LOG_SPREAD`
+    are log-normal about the median person's, clipped to their intervals; all others are the median person's. Endpoint
     scatter and horizon grow as skill falls; delays, refractory period and horizon grow with age.
 
     Parameters
@@ -79,25 +79,27 @@ def population(number: int, seed: int) -> tuple[Person, ...]:
     Raises
     ------
     SimError
-        If a number is out of its interval.
+        If a number is outside its interval.
     """
     of_kind("number", number, int)
     of_kind("seed", seed, int)
-    if not 1 <= number <= _MOST:
-        raise SimError(f"a population of {number}; expected 1 to {_MOST} people")
+    if not 1 <= number <= _MAX_SIZE:
+        raise SimError(f"a population of {number}; expected 1 to {_MAX_SIZE} people")
     if seed < 0:
         raise SimError(f"the seed of a population is {seed}; expected 0 or more")
-    return tuple(_drawn(seed, place) for place in range(number))
+    return tuple(_draw_person(seed, place) for place in range(number))
 
 
-def _drawn(seed: int, place: int) -> Person:
+def _draw_person(seed: int, place: int) -> Person:
     rng, name, median = np.random.default_rng([seed, place]), f"{seed}:{place}", Person()
-    age, skill, left = rng.uniform(20.0, 75.0), rng.beta(*_SKILL), rng.random() < _LEFT
-    values = {key: getattr(median, key) * np.exp(spread * rng.normal()) for key, spread in _SPREAD.items()}
-    slower, clumsier = 1.0 + _AGING * max(0.0, age - 30.0), 1.0 + 0.8 * (_MEAN_SKILL - skill)
+    age, skill, is_left = rng.uniform(20.0, 75.0), rng.beta(*_SKILL_BETA), rng.random() < _LEFT_HANDED_FRACTION
+    values = {key: getattr(median, key) * np.exp(spread * rng.normal()) for key, spread in _LOG_SPREAD.items()}
+    slowing, scatter_factor = 1.0 + _SLOWING_PER_YEAR * max(0.0, age - 30.0), 1.0 + 0.8 * (_MEAN_SKILL - skill)
     for key in ("visual_delay", "reflex_delay", "refractory", "horizon"):
-        values[key] *= slower
+        values[key] *= slowing
     for key in ("motor_noise", "horizon"):
-        values[key] *= clumsier
-    inside = {key: float(np.clip(value, *INTERVALS[key][:2])) for key, value in values.items()}
-    return replace(median, name=name, age=float(age), hand="left" if left else "right", skill=float(skill), **inside)
+        values[key] *= scatter_factor
+    clipped = {key: float(np.clip(value, *INTERVALS[key][:2])) for key, value in values.items()}
+    return replace(
+        median, name=name, age=float(age), hand="left" if is_left else "right", skill=float(skill), **clipped
+    )

@@ -19,7 +19,7 @@ _FACTOR = np.uint64(0x2545F4914F6CDD1D)
 def fresh_chance(seed: int) -> State:
     """State of a generator, shape (1,), from an integer seed ≥ 0, hashed by NumPy's `SeedSequence`."""
     state = np.random.SeedSequence(seed).generate_state(1, np.uint64)
-    return np.maximum(state, np.uint64(1))  # the state zero would stay zero
+    return np.maximum(state, np.uint64(1))  # a zero state would stay zero
 
 
 @njit

@@ -58,7 +58,7 @@ from sim.users.person.random_numbers import normal
 DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
 CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
-DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen further from the felt one is rejected
+DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen farther from the felt one is rejected
 VEER_TIME = 0.5  # [s] correlation time of the error of felt direction, without which the steering law does not hold
 ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
 UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
@@ -68,24 +68,24 @@ UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (J
 def sense(person: PersonState, p: Array, force: Array) -> None:
     """Store what is felt and seen now, and update the estimate, reflexes and tremor from what arrives now."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
-    _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
+    _advance_noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
     go_astray(person)
-    _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
-    _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
+    _advance_noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
+    _advance_noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
     if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
-        _noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
+        _advance_noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
     tick = int(m[TICKS])
     now = past[tick % size]
     felt, seen = past[(tick - int(n[REFLEX_TICKS])) % size], past[(tick - int(n[SEEN_TICKS])) % size]
-    _look(person, p)
-    kept = math.exp(-n[PERIOD] / CALIBRATION_TIME)
+    _update_vision(person, p)
+    decay = math.exp(-n[PERIOD] / CALIBRATION_TIME)
     for k in range(3):
         now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k], V[SHOWN, k] + V[BLUR, k]
         now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
         now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
-        V[OFFSET, k] = kept * V[OFFSET, k] + (1.0 - kept) * (seen[SEEN + k] - seen[SENSED + k])
+        V[OFFSET, k] = decay * V[OFFSET, k] + (1.0 - decay) * (seen[SEEN + k] - seen[SENSED + k])
         V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
         V[FELT_FORCE, k] = (1.0 + V[MISFELT, k]) * felt[PRESSED + k]
     for k in range(3):
@@ -93,20 +93,20 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         for j in range(3):
             V[REFLEX, k] += person.stiffness[k, j] * felt[DEVIATION + j] + person.damping[k, j] * felt[DEVIATING + j]
         V[REFLEX, k] *= n[REFLEX_GAIN]
-    wave = n[TREMOR_GAIN]
+    tremor_gain = n[TREMOR_GAIN]
     for k in range(3):
-        fresh = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + wave * normal(person.chance)
-        V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], fresh
+        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.chance)
+        V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], tremor
     m[TICKS] += 1.0
 
 
 @njit
-def _noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
+def _advance_noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
     """Advance a noise vector, an Ornstein–Uhlenbeck process of given standard deviation and correlation time [s]."""
-    kept = math.exp(-person.numbers[PERIOD] / seconds)
-    fresh = deviation * math.sqrt(1.0 - kept * kept)
+    decay = math.exp(-person.numbers[PERIOD] / seconds)
+    noise_gain = deviation * math.sqrt(1.0 - decay * decay)
     for k in range(3):
-        person.vectors[which, k] = kept * person.vectors[which, k] + fresh * normal(person.chance)
+        person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.chance)
 
 
 @njit
@@ -118,7 +118,7 @@ def go_astray(person: PersonState) -> None:
     with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
     (Gordon, Ghilardi & Ghez 1994 I).
     """
-    _noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
+    _advance_noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
     V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
     period = person.numbers[PERIOD]
     for k in range(3):
@@ -127,17 +127,17 @@ def go_astray(person: PersonState) -> None:
 
 
 @njit
-def _look(person: PersonState, p: Array) -> None:
+def _update_vision(person: PersonState, p: Array) -> None:
     """Look at the figure or, if there is none, at the stylus (p)."""
     m, V, eye = person.memory, person.vectors, person.eye
     if eye.pose.shape[0] == 0:
         V[SHOWN] = p
     elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
-        felt, away = work_array(3), 0.0
+        felt, squared_distance = work_array(3), 0.0
         for k in range(3):
             felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k]
         seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
         for k in range(3):
-            away += (V[SHOWN, k] - felt[k]) ** 2
-        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # rejected: taken for another pose
+            squared_distance += (V[SHOWN, k] - felt[k]) ** 2
+        if squared_distance > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # rejected: mistaken for another pose
             V[SHOWN] = felt

@@ -12,7 +12,7 @@ from numba import njit
 
 from controllers.state import Array
 
-MOST_STAGES = 8  # most submovements to a target that are planned ahead; more would leave a 2000th of the way
+MOST_STAGES = 8  # largest number of submovements planned to a target; more would leave 1/2000 of the distance
 
 
 @njit
@@ -76,9 +76,9 @@ def aimed_seconds(difficulty: float, scatter: float, overhead: float, least: flo
     least : float
         D_min, duration of the shortest submovement [s].
     """
-    soonest, seconds = np.inf, least
+    shortest_total, seconds = np.inf, least
     for n in range(1, MOST_STAGES + 1):
         each = max(least, scatter * max(difficulty, 1.0) ** (1.0 / n))
-        if n * (overhead + each) < soonest:
-            soonest, seconds = n * (overhead + each), each
+        if n * (overhead + each) < shortest_total:
+            shortest_total, seconds = n * (overhead + each), each
     return seconds

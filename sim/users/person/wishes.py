@@ -1,4 +1,4 @@
-"""Wishes of a person over time: the table that an intent is turned into, and its interpolation."""
+"""Wishes of a person over time: the table into which an intent is converted, and its interpolation."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from sim.errors import SimError
 
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
 """Columns of a wish: position (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target
-[m], 1 if the switch is pressed, and 1 if the person is active; if not, she lets the stylus be led."""
+[m], 1 if the switch is pressed, and 1 if the person is active; otherwise she lets the field lead the stylus."""
 OWN = -1.0
 """Value of `Wishes.period` that marks wishes written by a user-defined intent."""
 
@@ -79,10 +79,10 @@ def wanted_motion(rows: Array, period: float, t: float, motion: Array) -> int:
     Rows are interpolated by cubics with central differences as velocities; after the last row the motion is at rest.
     """
     n = rows.shape[0]
-    place = min(max(t / period, 0.0), float(n - 1))
-    i = min(int(place), n - 1)
+    position = min(max(t / period, 0.0), float(n - 1))
+    i = min(int(position), n - 1)
     j = min(i + 1, n - 1)
-    s = place - i
+    s = position - i
     for k in range(3):
         a, b = rows[i, k], rows[j, k]
         before, after = rows[max(i - 1, 0), k], rows[min(j + 1, n - 1), k]
@@ -93,6 +93,6 @@ def wanted_motion(rows: Array, period: float, t: float, motion: Array) -> int:
         motion[0, k] = a + s * (u + s * (c2 + s * c3))
         motion[1, k] = (u + s * (2.0 * c2 + 3.0 * s * c3)) / period
         motion[2, k] = (2.0 * c2 + 6.0 * s * c3) / (period * period)
-    if place >= n - 1:
+    if position >= n - 1:
         motion[1:3] = 0.0
     return i

@@ -45,12 +45,12 @@ def test_the_force_is_drawn_from_the_tip_along_the_force(page):
 def test_the_lag_of_a_hand_is_drawn_from_the_stylus_to_where_it_means_to_be(page):
     stage = page._stage
     page.show(moment(stage._model, (0.0, 0.0, 0.0), target=(0.01, 0.0, 0.0)))
-    assert stage._lag.visible
+    assert stage._lag_line.visible
     np.testing.assert_allclose(
-        stage._lag.points[0], [drawn_at(np.zeros(3)), drawn_at(np.array([0.01, 0, 0]))], atol=1e-6
+        stage._lag_line.points[0], [drawn_at(np.zeros(3)), drawn_at(np.array([0.01, 0, 0]))], atol=1e-6
     )
     stage.show(moment(stage._model))
-    assert not stage._lag.visible
+    assert not stage._lag_line.visible
 
 
 def test_states_that_come_too_fast_are_skipped(page):
@@ -69,12 +69,12 @@ def test_a_figure_that_travels_is_followed_and_one_that_dances_is_not(page):
     stage = page._stage
     stage.show(moment(stage._model))
     stage.show(moment(stage._model, root=1.0))
-    assert np.all(stage._followed == 0.0)
+    assert np.all(stage._view_offset == 0.0)
     for k in range(200):
         stage.show(moment(stage._model, root=1.0 + 0.02 * k, t=0.02 * k))
-    assert 3.0 < stage._followed[0] < 5.0
+    assert 3.0 < stage._view_offset[0] < 5.0
     stage.show(moment(stage._model))  # put back
-    assert np.all(stage._followed == 0.0)
+    assert np.all(stage._view_offset == 0.0)
 
 
 def test_where_a_point_is_drawn_tells_the_point():
