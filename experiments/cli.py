@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
 
 
-def _counted_only(warning: str) -> None:
+def _ignore_warning(warning: str) -> None:
     """Do nothing at a warning of MuJoCo's, which counts it."""
 
 
@@ -62,7 +62,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         import mujoco  # the words of the commands are told without it
 
         # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a summary has their counts.
-        mujoco.set_mju_user_warning(_counted_only)
+        mujoco.set_mju_user_warning(_ignore_warning)
         return command()
     except BrokenPipeError:
         raise
@@ -70,30 +70,30 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf: {in_options(error)}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"hvf: {_by_the_system(error)}", file=sys.stderr)
+        print(f"hvf: {_system_error_message(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"hvf: stopped; {_kept(command)}", file=sys.stderr)
+        print(f"hvf: stopped; {_interruption_message(command)}", file=sys.stderr)
         return 130
 
 
-def _by_the_system(error: OSError) -> str:
+def _system_error_message(error: OSError) -> str:
     """Message for an error of the operating system; an error of a full disk does not name its file."""
     if error.errno == errno.ENOSPC:
         return "the disk is full; expected room on it, or another --out"
     return f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else str(error)
 
 
-def _kept(command: Any) -> str:
+def _interruption_message(command: Any) -> str:
     """What an interrupted command leaves on disk, and how to go on, in words."""
     from experiments.hardware.run_options import RunHardware  # imported late: they load MuJoCo and numba
     from experiments.results.folder import RECORDING
 
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
-    recorded = command.which if isinstance(command, command_class("hardware")) else command
-    if isinstance(recorded, command_class("arm") | RunHardware) and (recorded.out / RECORDING).exists():
-        return f"what was recorded until then is in {recorded.out}: hvf report {recorded.out} writes its page"
+    recorder = command.which if isinstance(command, command_class("hardware")) else command
+    if isinstance(recorder, command_class("arm") | RunHardware) and (recorder.out / RECORDING).exists():
+        return f"what was recorded until then is in {recorder.out}: hvf report {recorder.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"
@@ -118,16 +118,18 @@ def parsed(words: Sequence[str]) -> Any:
         If it was mistyped; tyro's boxed message is shortened to one line.
     """
     _refuse_empty(words)
-    words = _with_axes(words)
-    said = io.StringIO()
-    named = words[0] if words and words[0] in commands.NAMES else None
+    words = _join_axis_values(words)
+    error_output = io.StringIO()
+    command_name = words[0] if words and words[0] in commands.NAMES else None
     # The other commands' options are not even imported.
-    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if named is None else (
-        f"hvf {named}", words[1:], command_class(named)
+    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if command_name is None else (
+        f"hvf {command_name}", words[1:], command_class(command_name)
     )  # fmt: skip
     try:
-        with contextlib.redirect_stderr(said):
-            return tyro.cli(choice, prog=prog, args=rest, description=None if named else _DESCRIPTION, config=_STYLE)
+        with contextlib.redirect_stderr(error_output):
+            return tyro.cli(
+                choice, prog=prog, args=rest, description=None if command_name else _DESCRIPTION, config=_STYLE
+            )
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
@@ -137,7 +139,7 @@ def parsed(words: Sequence[str]) -> Any:
             if isinstance(cause, ParameterError):
                 raise cause from None
             cause = cause.__cause__ or cause.__context__
-        raise ParameterError(_one_line(said.getvalue(), words)) from None
+        raise ParameterError(_shorten_message(error_output.getvalue(), words)) from None
 
 
 def _refuse_empty(words: Sequence[str]) -> None:
@@ -146,12 +148,12 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
             raise ParameterError(f"nothing is given behind {option}; expected a value")
-    for word, behind in itertools.pairwise([*words, "--"]):
-        if word == "--clips" and behind.startswith("--"):  # tyro takes it for the default ones
+    for word, following in itertools.pairwise([*words, "--"]):
+        if word == "--clips" and following.startswith("--"):  # tyro takes it for the default ones
             raise ParameterError("nothing is given behind --clips; expected one or more names")
 
 
-def _with_axes(words: Sequence[str]) -> list[str]:
+def _join_axis_values(words: Sequence[str]) -> list[str]:
     """The words with ``--up -Y`` as one: argparse takes an axis with a minus for an option, and misses the value."""
     joined: list[str] = []
     for word in words:
@@ -162,35 +164,37 @@ def _with_axes(words: Sequence[str]) -> list[str]:
     return joined
 
 
-def _one_line(said: str, words: Sequence[str]) -> str:
+def _shorten_message(message: str, words: Sequence[str]) -> str:
     """Text of tyro's first box in one line: option, value, what is expected; and where to read more."""
-    lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in said.splitlines()][1:])  # without the title
-    first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(said.split())
+    lines = itertools.dropwhile(
+        _is_box_rule, [line.strip("│ ") for line in message.splitlines()][1:]
+    )  # without the title
+    first = " ".join(itertools.takewhile(lambda line: not _is_box_rule(line), lines)) or " ".join(message.split())
     first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ")
-    for pattern, expected in _MISTAKES:
-        found = re.search(pattern, first)
-        if found is not None:
-            value = found["value"]
+    for pattern, expected in _VALUE_ERRORS:
+        match_found = re.search(pattern, first)
+        if match_found is not None:
+            value = match_found["value"]
             option = words[words.index(value) - 1] if value in words[1:] else "an option"
             choices = sorted(set(re.findall(r"'([^']*)'", first.split("Expected")[-1])) - {"None"})
             first = f"{option} is {value!r}; expected {expected or ', '.join(choices)}"
             break
-    named = words[0] if words and words[0] in commands.NAMES else "COMMAND"
+    command_name = words[0] if words and words[0] in commands.NAMES else "COMMAND"
     rewordings = (
         (r"PATH (.+?)\. \(required\)", r"PATH (\1),"),
         (r"^Missing value for argument '(-\S+)'.*", r"nothing is given behind \1; expected a value"),
-        (r"^Missing value for argument '.*", f"missing from hvf {named}: PATH, or an option is mistyped"),
+        (r"^Missing value for argument '.*", f"missing from hvf {command_name}: PATH, or an option is mistyped"),
     )
     for pattern, better in rewordings:
         first = re.sub(pattern, better, first).rstrip(",")
-    return f"{first[0].lower()}{first[1:]}; hvf {named} --help lists what there is"
+    return f"{first[0].lower()}{first[1:]}; hvf {command_name} --help lists what there is"
 
 
-def _is_rule(line: str) -> bool:
+def _is_box_rule(line: str) -> bool:
     return bool(line) and set(line) <= set("─-")
 
 
-_MISTAKES = (
+_VALUE_ERRORS = (
     (r"could not convert string to float: '(?P<value>[^']*)'", "a number"),
     (r"invalid literal for int\(\) with base 10: '(?P<value>[^']*)'", "a whole number"),
     (r"invalid choice '(?P<value>[^']*)'", ""),

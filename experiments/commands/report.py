@@ -25,6 +25,6 @@ class Command:
         with working("drawing the report"):
             lines = finish(self.folder)
         page = str(self.folder / REPORT)
-        told = [*lines, f"Written: {page}; open it in a browser."]
-        say({"lines": lines, "report": page}, self.json, told)
+        lines_and_page = [*lines, f"Written: {page}; open it in a browser."]
+        say({"lines": lines, "report": page}, self.json, lines_and_page)
         return 0

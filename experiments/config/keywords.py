@@ -14,19 +14,19 @@ from models.errors import ModelError
 from sim.errors import SimError
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_OPTION = re.compile(
+_OPTION_PATTERN = re.compile(
     r"`[^`]*`"  # a whole command stays as it is typed
     r"|(?<![\w-])--(?P<chosen>mode|map|user|person|figure) (?P<kind>[a-z][a-z-]{2,})"
     r"|(?<![\w-])--(?P<name>[a-z]+(?:[-.][a-z0-9]+)*)(?: (?P<number>-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.]*\d))?"
 )
 
 
-_OPTIONS = "options"  # attribute of an error: its message as it was written, with options
+_ORIGINAL_MESSAGE = "options"  # attribute of an error: its message as it was written, with options
 
 
 def in_options(error: Exception) -> str:
     """Message of an error as the command line says it, also where `in_keywords` has put it into keywords."""
-    return vars(error).get(_OPTIONS, str(error))
+    return vars(error).get(_ORIGINAL_MESSAGE, str(error))
 
 
 def keywords(text: str, **others: str) -> str:
@@ -48,22 +48,22 @@ def keywords(text: str, **others: str) -> str:
         name = found["name"].replace("-", "_")
         return others.get(name, name) + (f"={found['number']}" if found["number"] else "")
 
-    return _OPTION.sub(keyword, text)
+    return _OPTION_PATTERN.sub(keyword, text)
 
 
 def in_keywords(**others: str) -> Callable[[_F], _F]:
     """Decorator of a function that is called from Python: its errors name keywords; see `keywords`."""
 
-    def decorated(function: _F) -> _F:
+    def decorate(function: _F) -> _F:
         @wraps(function)
-        def called(*arguments: Any, **given: Any) -> Any:
+        def wrapper(*arguments: Any, **given: Any) -> Any:
             try:
                 return function(*arguments, **given)
             except (ControllerError, ModelError, SimError) as error:
-                vars(error).setdefault(_OPTIONS, str(error))
+                vars(error).setdefault(_ORIGINAL_MESSAGE, str(error))
                 error.args = (keywords(str(error), **others),)
                 raise
 
-        return cast(_F, called)
+        return cast(_F, wrapper)
 
-    return decorated
+    return decorate

@@ -74,12 +74,12 @@ def _schema(cls: type, source: type, handler: GetCoreSchemaHandler) -> CoreSchem
 
     Pydantic's own strict mode is not used: it also refuses lists for tuples, and NumPy's whole numbers.
     """
-    return _uncoerced(handler.resolve_ref_schema(handler(source)), handler)
+    return _without_coercion(handler.resolve_ref_schema(handler(source)), handler)
 
 
-def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
+def _without_coercion(schema: Any, handler: GetCoreSchemaHandler) -> Any:
     if isinstance(schema, list):
-        return [_uncoerced(inner, handler) for inner in cast(list[Any], schema)]
+        return [_without_coercion(inner, handler) for inner in cast(list[Any], schema)]
     if not isinstance(schema, dict):
         return schema
     inner = cast(dict[str, Any], schema)
@@ -89,13 +89,13 @@ def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
         if hasattr(inner["cls"], "__get_pydantic_core_schema__"):
             return schema
         del inner["ref"]  # a dataclass that is no part, such as a push
-    check = _number if kind in ("float", "int") else _truth if kind == "bool" else None
+    check = _check_number if kind in ("float", "int") else _check_bool if kind == "bool" else None
     if check is not None:
         return core_schema.no_info_before_validator_function(check, cast(CoreSchema, inner))
-    return {key: _uncoerced(value, handler) for key, value in inner.items()}
+    return {key: _without_coercion(value, handler) for key, value in inner.items()}
 
 
-def _number(value: object) -> object:
+def _check_number(value: object) -> object:
     if isinstance(value, str) and value == INFINITE:
         return np.inf
     if isinstance(value, str | bytes | bool | np.bool_):
@@ -103,7 +103,7 @@ def _number(value: object) -> object:
     return value
 
 
-def _truth(value: object) -> object:
+def _check_bool(value: object) -> object:
     if not isinstance(value, bool | np.bool_):
         raise PydanticCustomError("truth", "expected true or false")
     return value
@@ -172,20 +172,20 @@ def one_line(error: ValidationError, cls: type) -> str:
     place, kind, context = first["loc"], first["type"], first.get("ctx", {})
     names = [str(name) for name in place if not isinstance(name, int)]
     option = "--" + names[-1].replace("_", "-") if names else cls.__name__
-    unit = _unit(cls, place)
+    unit = _unit_text(cls, place)
     finite = ", and finite"
     if kind in ("greater_than_equal", "greater_than", "finite_number"):
         least = context.get("ge", context.get("gt"))
-        field = _field(cls, place)
+        field = _field_at(cls, place)
         if least is None and field is not None:
             least = next((getattr(m, a) for m in field.metadata for a in ("ge", "gt") if hasattr(m, a)), None)
-        opens = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
-        bound = f"more than {least:g}{unit}" if opens else f"{least:g}{unit} or more"
+        exclusive = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
+        bound = f"more than {least:g}{unit}" if exclusive else f"{least:g}{unit} or more"
         infinite = field is not None and any(getattr(m, "allow_inf_nan", None) is True for m in field.metadata)
         return f"{option} is {float(first['input']):g}; expected {bound}{'' if infinite else finite}"
     if kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_positional_argument"):
-        within = _within(cls, place[:-1])
-        known = ", ".join(field.name for field in fields(cast(Any, within)))
+        part_type = _part_at(cls, place[:-1])
+        known = ", ".join(field.name for field in fields(cast(Any, part_type)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
     if kind == "less_than_equal":
         return f"{option} is {float(first['input']):g}; expected at most {context['le']:g}{unit}"
@@ -207,16 +207,16 @@ def one_line(error: ValidationError, cls: type) -> str:
     return f"{where or cls.__name__} is {first['input']!r}; {first['msg'][0].lower()}{first['msg'][1:]}"
 
 
-def _field(cls: type, place: Sequence[str | int]) -> Any:
+def _field_at(cls: type, place: Sequence[str | int]) -> Any:
     """Pydantic's field at a place of a part; None where there is none."""
     for depth in reversed(range(len(place))):
-        table = getattr(_within(cls, place[:depth]), "__pydantic_fields__", {})
+        table = getattr(_part_at(cls, place[:depth]), "__pydantic_fields__", {})
         if place[depth] in table:
             return table[place[depth]]
     return None
 
 
-def _within(cls: type, place: Sequence[str | int]) -> type:
+def _part_at(cls: type, place: Sequence[str | int]) -> type:
     """The part that is at a place of another."""
     for name in place:
         if get_origin(cls) is dict:  # of parts by name
@@ -232,7 +232,7 @@ def _within(cls: type, place: Sequence[str | int]) -> type:
     return cls
 
 
-def _unit(cls: type, place: Sequence[str | int]) -> str:
-    field = _field(cls, place)
+def _unit_text(cls: type, place: Sequence[str | int]) -> str:
+    field = _field_at(cls, place)
     unit = (field.json_schema_extra or {}).get("unit", "") if field is not None else ""
     return f" {unit}" if unit else ""

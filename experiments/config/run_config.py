@@ -75,20 +75,21 @@ class User:
         return self.does == "trace" or self.does in PERSONAL
 
 
-_ANIMATED, _RESIDUAL = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
-_SIZE: dict[BodyKind, tuple[str, ...]] = {
+_ANIMATION_OPTIONS, _RESIDUAL_OPTIONS = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
+_MEANINGLESS_SIZES: dict[BodyKind, tuple[str, ...]] = {
     "physical": (), "kinematic": ("mass",), "none": ("stature", "mass"), "robot": ("stature", "mass")
 }  # fmt: skip
 MEANINGLESS: dict[BodyKind, tuple[str, ...]] = {
-    "physical": (), "kinematic": _RESIDUAL, "none": (*_ANIMATED, *_RESIDUAL), "robot": ("blend", *_RESIDUAL)
+    "physical": (), "kinematic": _RESIDUAL_OPTIONS, "none": (*_ANIMATION_OPTIONS, *_RESIDUAL_OPTIONS),
+    "robot": ("blend", *_RESIDUAL_OPTIONS)
 }  # fmt: skip
 """Numbers of a figure that have no meaning for what follows the hand, whatever is played."""
 
 
 def meaningless(body: str, leads: bool) -> tuple[str, ...]:
     """Numbers of a figure that have no meaning for what follows the hand; a figure that is led always has its size."""
-    one = cast(BodyKind, body)
-    return MEANINGLESS.get(one, ()) + (() if leads else _SIZE.get(one, ()))
+    kind = cast(BodyKind, body)
+    return MEANINGLESS.get(kind, ()) + (() if leads else _MEANINGLESS_SIZES.get(kind, ()))
 
 
 def no_meaning(name: str, value: object, body: str) -> ParameterError:
@@ -161,17 +162,17 @@ class Figure:
         return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless(kind, leads)})
 
     @model_serializer(mode="wrap")
-    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What a file holds: nothing that has no meaning for the kind."""
-        return self._meant(cast(dict[str, Any], plain(self)))
+        return self._meaningful_values(cast(dict[str, Any], plain(self)))
 
-    def _meant(self, held: Mapping[str, Any]) -> dict[str, Any]:
+    def _meaningful_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Those of the numbers that have a meaning; the size is one of a figure that is led, where it was given."""
         idle = meaningless(self.kind, leads=False)
-        return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
+        return {name: value for name, value in values.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
 
     def __repr__(self) -> str:
-        meant = self._meant({name: getattr(self, name) for name in FIGURE_DEFAULTS})
+        meant = self._meaningful_values({name: getattr(self, name) for name in FIGURE_DEFAULTS})
         return f"Figure({', '.join(f'{name}={value!r}' for name, value in meant.items())})"
 
 
@@ -333,7 +334,7 @@ class RunConfig:
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
     @model_serializer(mode="wrap")
-    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What a file holds: nothing of a figure in whose place there is a robot arm."""
         held = cast(dict[str, Any], plain(self))
         if self.body == "robot":

@@ -37,9 +37,9 @@ from sim.users.person.population import PERSONAS, persona
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
 _SWITCHES = ("governor", "walls")
-_USERS = ("relaxed", "trace", "push", "turn", *PERSONAL)
-_NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
-_HAND = {"user", "person", "pushes", "turns", "grabs"}
+_USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSONAL)
+_NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
+_HAND_OPTIONS = {"user", "person", "pushes", "turns", "grabs"}
 
 
 @dataclass(frozen=True)
@@ -65,22 +65,22 @@ def _vocabulary() -> dict[str, Word]:
     """All options by name."""
     words: dict[str, Word] = {}
     for cls in (*MODES, *ADDED.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
-        hints, help_of = get_type_hints(cls), parameters(cls)
+        hints, help_texts = get_type_hints(cls), parameters(cls)
         for option in fields(cast(Any, cls)):
-            if option.name in _NOT_WORDS:
+            if option.name in _NON_OPTIONS:
                 continue
             default = cast(Any, cls).__pydantic_fields__[option.name].default
-            said = help_of.get(option.name, "")
+            help_text = help_texts.get(option.name, "")
             known = words.get(option.name)
             if known is None:
-                shown = f" Default: {_shown(default)}." if default not in (None, "", False) else ""
-                words[option.name] = Word(plain(hints[option.name]), said + shown, (cls,))
+                default_text = f" Default: {_default_text(default)}." if default not in (None, "", False) else ""
+                words[option.name] = Word(plain(hints[option.name]), help_text + default_text, (cls,))
             else:
                 words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
     return words
 
 
-def _shown(default: object) -> str:
+def _default_text(default: object) -> str:
     return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
 
 
@@ -130,8 +130,8 @@ def run_config(
         interval.
     """
     given = dict(words)
-    _check_kinds(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
-    mode_cls = _named("mode", mode, MODES)
+    _check_option_types(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
+    mode_cls = _part_of_kind("mode", mode, MODES)
     if mode == "lead":
         wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
         if wrong:
@@ -145,29 +145,29 @@ def run_config(
         map_cls = MapFile
         given["file"] = map
     else:
-        map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
-    if mode != "lead" and user and user not in _USERS:
-        raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
+        map_cls = _part_of_kind("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
+    if mode != "lead" and user and user not in _USER_KINDS:
+        raise ParameterError(f"no user {user!r}; there are {', '.join(_USER_KINDS)}")
     if figure not in get_args(FigureKind):
         raise ParameterError(f"--figure is {figure!r}; expected {', '.join(get_args(FigureKind))}")
-    _refuse_idle(given, mode, "robot" if map_cls is RobotArm else figure, replay)
+    _refuse_meaningless(given, mode, "robot" if map_cls is RobotArm else figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
-    taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
-    mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
-    around = {"around": Circle(**taken.of(Circle))} if "around" in _names(map_cls) else {}
+    options = _GivenOptions(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
+    mode_part = mode_cls(**options.added(mode_cls), **options.of(mode_cls))
+    around = {"around": Circle(**options.of(Circle))} if "around" in _field_names(map_cls) else {}
     config = RunConfig(
         mode=mode_part,  # pyright: ignore[reportArgumentType]
-        map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
-        user=User(does=user or "relaxed", **_with_person(taken.of(User))),  # pyright: ignore[reportArgumentType]
-        figure=Figure(kind=figure, **taken.of(Figure)),  # pyright: ignore[reportArgumentType]
-        device=Replay(replay) if replay else Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
-        **taken.of(RunConfig, ("seconds", "seed")),
+        map=map_cls(**options.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
+        user=User(does=user or "relaxed", **_resolve_person(options.of(User))),  # pyright: ignore[reportArgumentType]
+        figure=Figure(kind=figure, **options.of(Figure)),  # pyright: ignore[reportArgumentType]
+        device=Replay(replay) if replay else Phantom(**options.of(Phantom)), clock=Clock(**options.of(Clock)),
+        **options.of(RunConfig, ("seconds", "seed")),
     )  # fmt: skip
-    taken.check_empty()
+    options.check_empty()
     return config
 
 
-def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
+def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
     """Refuse names that are no text, switches that are neither on nor off, and what only stands inside a part."""
     for name, value in chosen.items():
         if not isinstance(value, str):
@@ -176,10 +176,10 @@ def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> N
         if not isinstance(words.get(name, False), bool):
             raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
     for name in sorted({"around", "does", "file", "orientation", "run"} & words.keys()):
-        raise _unknown(f"--{name}")
+        raise _unknown_option(f"--{name}")
 
 
-def _refuse_idle(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
+def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
     """Refuse words that change nothing beside what is chosen, also if their value is the default."""
     for name in meaningless(body, mode == "lead"):
         if name in given:
@@ -190,33 +190,33 @@ def _refuse_idle(given: Mapping[str, object], mode: str, body: str, replay: str)
         raise ParameterError(NO_DRAG)
 
 
-def _unknown(option: str) -> ParameterError:
+def _unknown_option(option: str) -> ParameterError:
     return ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
 
 
-def _with_person(words: dict[str, Any]) -> dict[str, Any]:
+def _resolve_person(words: dict[str, Any]) -> dict[str, Any]:
     """Words of a user, with a person who is given by name."""
     named = words.get("person")
     return words | {"person": persona(named)} if isinstance(named, str) else words
 
 
-def _named(what: str, name: str, parts: tuple[type, ...]) -> Any:
-    kinds = _kinds(parts)
+def _part_of_kind(what: str, name: str, parts: tuple[type, ...]) -> Any:
+    kinds = _parts_by_kind(parts)
     if name not in kinds:
         known = ", ".join(kinds)
         raise ParameterError(f"no {what} {name!r}; there are {known}" + (", or give a file (.npz)" * (what == "map")))
     return kinds[name]
 
 
-def _kinds(parts: tuple[type, ...]) -> dict[str, type]:
+def _parts_by_kind(parts: tuple[type, ...]) -> dict[str, type]:
     return {cast(Any, cls).__pydantic_fields__["kind"].default: cls for cls in parts}
 
 
-def _names(cls: type) -> set[str]:
+def _field_names(cls: type) -> set[str]:
     return {option.name for option in fields(cast(Any, cls))} - {"kind"}
 
 
-class _Words:
+class _GivenOptions:
     """Words that are given, as they are taken by the parts they belong to."""
 
     def __init__(self, given: dict[str, object], chosen: str):
@@ -224,41 +224,41 @@ class _Words:
 
     def of(self, cls: type, names: Iterable[str] = ()) -> dict[str, Any]:
         """Take those of a part, or of some of its names."""
-        return {name: self._given.pop(name) for name in sorted(names or _names(cls)) if name in self._given}
+        return {name: self._given.pop(name) for name in sorted(names or _field_names(cls)) if name in self._given}
 
     def added(self, mode: type) -> dict[str, Any]:
         """Take the parts that are added to a mode."""
         found: dict[str, Any] = {}
         for name, cls in ADDED.items():
-            if name not in _names(mode):
+            if name not in _field_names(mode):
                 continue
             switched = bool(self._given.pop(name, False))
-            if switched or (name not in _SWITCHES and _names(cls) & self._given.keys()):
+            if switched or (name not in _SWITCHES and _field_names(cls) & self._given.keys()):
                 found[name] = cast(Any, cls)(**self.of(cls))
         return found
 
     def check_empty(self) -> None:
         """Refuse what no part has taken."""
-        left = {name: value for name, value in self._given.items() if value is not False}
-        if not left:
+        remaining = {name: value for name, value in self._given.items() if value is not False}
+        if not remaining:
             return
-        name = next(iter(left))
-        owners = [_kind(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
+        name = next(iter(remaining))
+        owners = [_choice_option(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
         if name in ADDED:
-            owners = [_kind(cls) for cls in MODES if name in _names(cls)]
+            owners = [_choice_option(cls) for cls in MODES if name in _field_names(cls)]
         option = "--" + name.replace("_", "-")
         if not owners:
-            raise _unknown(option)
+            raise _unknown_option(option)
         raise ParameterError(f"{option} has no meaning with {self._chosen}; it belongs to {', '.join(owners)}")
 
 
-def _kind(cls: type) -> str:
+def _choice_option(cls: type) -> str:
     """How a part is chosen on the command line."""
     added = next((name for name, part in ADDED.items() if part is cls), None)
     if added in _SWITCHES:
         return f"--{added}"
     if added is not None:
-        return ", ".join(_kind(mode) for mode in MODES if added in _names(mode))
+        return ", ".join(_choice_option(mode) for mode in MODES if added in _field_names(mode))
     kind = cast(Any, cls).__pydantic_fields__.get("kind")
     what = "--map" if cls in MAPS else "--mode"
     if cls is MapFile:
@@ -283,9 +283,9 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     """Fields of the options' dataclass."""
     top = parameters(RunConfig)
     yield option("config", Path | None, CONFIG_HELP, None)
-    yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
+    yield option("mode", str, "Field of force: " + ", ".join(_parts_by_kind(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, robot-arm, or a map's file (.npz).", "")
-    yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")
+    yield option("user", str, "The simulated hand: " + ", ".join(_USER_KINDS) + "; the last five of a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("replay", str, "Folder of a run whose hand is replayed: it moves as recorded, whatever the force.", "")
@@ -331,23 +331,23 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     ParameterError
         As `run_config`.
     """
-    kept, left = words_of(config), set[str]()
+    unchanged, dropped = words_of(config), set[str]()
     mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
     leads = (mode == "lead") != config.leads
     if mode != config.mode.kind:
-        left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
+        dropped |= _field_names(type(config.mode)).union(ADDED, *(_field_names(cls) for cls in ADDED.values()))
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
-        left |= _names(type(config.map)) | _names(Circle) | {"map"}
+        dropped |= _field_names(type(config.map)) | _field_names(Circle) | {"map"}
     if leads:
-        left |= {"user", "pushes", "turns", "grabs"}
+        dropped |= {"user", "pushes", "turns", "grabs"}
     if words.get("replay"):
-        left |= _HAND | _names(Phantom) | {"seed"}
-    if mode == "rivers" and gates(str(words.get("crossing", kept.get("crossing")))):
-        left.add("governor_drag")
+        dropped |= _HAND_OPTIONS | _field_names(Phantom) | {"seed"}
+    if mode == "rivers" and gates(str(words.get("crossing", unchanged.get("crossing")))):
+        dropped.add("governor_drag")
     body = "robot" if map == RobotArm.kind else str(words.get("figure", config.figure.kind))
-    left |= set(meaningless(body, mode == "lead"))
-    kept = {name: value for name, value in kept.items() if name not in left}
-    return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
+    dropped |= set(meaningless(body, mode == "lead"))
+    unchanged = {name: value for name, value in unchanged.items() if name not in dropped}
+    return run_config(**(unchanged | dict(words)))  # pyright: ignore[reportArgumentType]
 
 
 def words_of(config: RunConfig) -> dict[str, object]:
@@ -361,11 +361,15 @@ def words_of(config: RunConfig) -> dict[str, object]:
     if not config.leads:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
-        words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", "run", *ADDED, "around"}}
+        words |= {
+            name: getattr(part, name) for name in _field_names(type(part)) - {"does", "file", "run", *ADDED, "around"}
+        }
     for name, cls in ADDED.items():
         part = getattr(config.mode, name, None)
         if part is not None:
-            words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
+            words |= {word: getattr(part, word) for word in _field_names(cls)} | (
+                {name: True} if name in _SWITCHES else {}
+            )
     idle = set(meaningless(config.body, config.leads))
     if isinstance(config.mode, Rivers) and gates(config.mode.crossing):
         idle.add("governor_drag")

@@ -7,9 +7,11 @@ import time
 from contextlib import suppress
 from ctypes.util import find_library
 
-for _number in range(3):  # a file that is opened later would take the place of a closed stream, and get what is printed
+for _descriptor in range(
+    3
+):  # a file that is opened later would take the place of a closed stream, and get what is printed
     try:
-        os.fstat(_number)
+        os.fstat(_descriptor)
     except OSError:
         os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
 sys.stdout, sys.stderr = sys.stdout or open(os.devnull, "w"), sys.stderr or open(os.devnull, "w")  # noqa: SIM115
@@ -30,13 +32,28 @@ STARTED = time.perf_counter()
 """Start of the program on `time.perf_counter` [s], from which the time to the first tick is measured."""
 # The matrices are small, so that BLAS threads only slow each other down. NumPy reads this when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-_GRAPHICS = {"", "0", "1", "cgl", "disable", "egl", "enable", "false", "glfw", "off", "on", "osmesa", "true", "wgl"}
-_LIBRARIES = {"egl": ("EGL", "libegl1 libgl1-mesa-dri"), "osmesa": ("OSMesa", "libosmesa6")}
+_KNOWN_BACKENDS = {
+    "",
+    "0",
+    "1",
+    "cgl",
+    "disable",
+    "egl",
+    "enable",
+    "false",
+    "glfw",
+    "off",
+    "on",
+    "osmesa",
+    "true",
+    "wgl",
+}
+_BACKEND_LIBRARIES = {"egl": ("EGL", "libegl1 libgl1-mesa-dri"), "osmesa": ("OSMesa", "libosmesa6")}
 # MuJoCo fails to import with other values or without the library; rendering chooses its own backend
 # (`experiments.render.graphics`).
-_asked = os.environ.get("MUJOCO_GL", "").lower().strip()
-_library, _package = _LIBRARIES.get(_asked, ("", ""))
-if _asked not in _GRAPHICS:
+_requested_backend = os.environ.get("MUJOCO_GL", "").lower().strip()
+_library, _package = _BACKEND_LIBRARIES.get(_requested_backend, ("", ""))
+if _requested_backend not in _KNOWN_BACKENDS:
     print(f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, which MuJoCo does not know: left out", file=sys.stderr)
 elif _library and find_library(_library) is None:
     print(

@@ -14,7 +14,7 @@ from experiments.files.whole_file import whole_file
 from sim.errors import SimError
 
 VERSION = 1
-_MAKERS = {"map": "hvf lift", "field": "save_field"}
+_WRITERS = {"map": "hvf lift", "field": "save_field"}
 Content = TypeVar("Content")
 
 
@@ -63,7 +63,7 @@ def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]],
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a {what}") from None
     except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        raise SimError(f"{path}: is no file of a {what}, or damaged; expected what {_MAKERS[what]} writes") from None
+        raise SimError(f"{path}: is no file of a {what}, or damaged; expected what {_WRITERS[what]} writes") from None
     if version != VERSION:
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
     if kind not in kinds:

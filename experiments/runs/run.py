@@ -81,15 +81,15 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     session = wire(config, ready=lambda units: compile_once(console, units))
     for remark in session.remarks:
         console.print(remark, highlight=False)
-    whole = cast(RunConfig, session.config)
-    takes = foreseen(out, whole.seconds, groups(session.servo))
-    if takes is not None:
-        console.print(takes, highlight=False)
+    full_config = cast(RunConfig, session.config)
+    cost_message = foreseen(out, full_config.seconds, groups(session.servo))
+    if cost_message is not None:
+        console.print(cost_message, highlight=False)
     with claimed(out):
         check_holds(out, overwrite)
         clear_folder(out)
-        (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
-        summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
+        (out / CONFIG).write_text(to_json(full_config), encoding="utf-8")
+        summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
         from experiments.results.pages.report_of import write_report_of  # matplotlib and viser: after the first tick

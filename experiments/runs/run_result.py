@@ -192,8 +192,8 @@ class Run:
 
     def __repr__(self) -> str:
         alone = self.summary.path.deviation_rms_mm
-        told = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
-        return f"<run of {self.ticks['t'][-1]:.1f} s{told}>"
+        deviation = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
+        return f"<run of {self.ticks['t'][-1]:.1f} s{deviation}>"
 
     def _repr_html_(self) -> str:
         """The replay, in a notebook."""

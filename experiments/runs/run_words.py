@@ -54,9 +54,9 @@ def run(
     given: dict[str, Any] = {
         name: tuple(cast(list[object], value)) if isinstance(value, list) else value for name, value in words.items()
     }
-    whole = run_config(**given) if file is None else changed(load_config(file), given)
-    check_length(Path(record or tempfile.gettempdir()), whole.seconds, whole.clock.servo_period)
+    run_settings = run_config(**given) if file is None else changed(load_config(file), given)
+    check_length(Path(record or tempfile.gettempdir()), run_settings.seconds, run_settings.clock.servo_period)
     console = Console(stderr=True)
-    session = wire(whole, ready=lambda units: compile_once(console, units))
+    session = wire(run_settings, ready=lambda units: compile_once(console, units))
     resolved = cast(RunConfig, session.config)
     return Run.of(session, to_dict(resolved), resolved.seconds, record, overwrite)

@@ -77,7 +77,7 @@ class RunSummary:
             *bent,
             *changed,
             *([held] if self.tank.scaled_ticks else []),
-            *self._of_the_hand(),
+            *self._hand_lines(),
             *([went] if (went := self.path.line()) else []),
             *([] if self.animation is None else [self.animation.soles()]),
             *([] if figure is None else figure.lines()),
@@ -86,7 +86,7 @@ class RunSummary:
             f"MuJoCo's warnings: {warned}.",
         ]
 
-    def _of_the_hand(self) -> list[str]:
+    def _hand_lines(self) -> list[str]:
         """Sentences on stylus and animation, by kind of run: LEADING, a bent curve, or any other."""
         replayed = [self.trace.line()] if isinstance(self.trace, ReplaySummary) else []
         if self.lead is not None:

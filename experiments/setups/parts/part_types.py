@@ -155,8 +155,10 @@ class MapParts(Generic[Map]):
         """The same parts with the improved map, and what is said of it for a physical figure; needs compiled code."""
         if self.refined is None:
             return self
-        made, told = self.refined()
-        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks + (told if physical else ()))
+        made, figure_remarks = self.refined()
+        return replace(
+            self, haptic_map=made, remarks=self.remarks + made.remarks + (figure_remarks if physical else ())
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
