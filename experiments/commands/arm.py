@@ -8,7 +8,7 @@ from experiments.config.words import Options, config_of_options
 from experiments.console.output import Json, say
 from experiments.console.startup import STARTED
 
-_DEFAULT_OPTIONS = {"map": "robot-arm", "user": "push", "seconds": 12.0}
+_DEFAULTS = {"map": "robot-arm", "user": "push", "seconds": 12.0}
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,7 @@ class Command:
         """Run."""
         from experiments.runs.run import run
 
-        otherwise = (
-            _DEFAULT_OPTIONS
-            if not self.options.replay
-            else {name: _DEFAULT_OPTIONS[name] for name in ("map", "seconds")}
-        )
+        otherwise = _DEFAULTS if not self.options.replay else {name: _DEFAULTS[name] for name in ("map", "seconds")}
         config = config_of_options(self.options, otherwise)
         if config.body != "robot":
             raise ParameterError(f"the map {config.map.kind} moves a figure; expected --map robot-arm, or hvf run")

@@ -1,4 +1,4 @@
-"""``hvf certify``: what is certain of a field, a run, a map or a clip."""
+"""``hvf certify``: certificates of a field, a run, a map or a clip."""
 
 import sys
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 ASKED = "asked.json"
-"""What a certificate was asked for with, beside it."""
+"""File beside a certificate, with the options of the command that made it."""
 
 
 def _refuse_options(names: Sequence[str], beside: str, owner: str) -> None:
@@ -81,7 +81,7 @@ class Command:
         return 0
 
     def _refuse_unused(self) -> None:
-        """Refuse what changes nothing beside a clip, a run, nobody's hand, or a field without clips."""
+        """Refuse options that have no effect on a clip, a run, a stylus without a hand, or a field without clips."""
         from experiments.setups.certified_law import of_clips
 
         words = [*given_words(self.options)]
@@ -107,7 +107,7 @@ class Command:
         return Judging(self.tolerance, self.friction)
 
     def _config_and_clips(self) -> tuple[RunConfig, tuple[Clip, ...]]:
-        """The field, and the clips that are certified with it; gains alone have none."""
+        """Configuration of the field, and the clips that are certified with it; none where only gains matter."""
         from experiments.setups.certified_law import of_clips
 
         config = config_of_options(self.options)
@@ -142,7 +142,7 @@ class Command:
         return certificate
 
     def _original_command(self, file: Path) -> "Command":
-        """The command as it was when a certificate was made, where nothing else is asked for."""
+        """The command that made a certificate, unless this command has options of its own."""
         options_file = file.parent / ASKED
         if replace(self, verify=None, json=False) != Command() or not options_file.exists():
             return self

@@ -46,7 +46,7 @@ class Doctor:
     """Print the findings as JSON."""
 
     def __call__(self) -> int:
-        """Look, measure and say."""
+        """Measure, and print the findings."""
         from experiments.hardware.doctor import findings, measured_lateness
         from experiments.hardware.link import measured_link
         from sim.devices.hardware_list import found_devices, open_device
@@ -136,5 +136,5 @@ class Command:
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
 
     def __call__(self) -> int:
-        """Do it."""
+        """Run the subcommand."""
         return self.which()

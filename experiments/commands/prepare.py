@@ -37,7 +37,7 @@ class Command:
     json: Json = False
 
     def __call__(self) -> int:
-        """Prepare, and say how well-formed it is."""
+        """Prepare the file, and report how well-formed the clip is."""
         from experiments.preparation.command import prepare_file
         from experiments.preparation.prepared_file import summary
         from models.mocap.retargeting.hints import Hints

@@ -1,4 +1,4 @@
-"""``hvf report``: page and figures of a run, drawn again; of a run that was stopped, all that it would have left."""
+"""``hvf report``: page and figures of a run, drawn again; an interrupted run is completed first."""
 
 from dataclasses import dataclass
 from pathlib import Path

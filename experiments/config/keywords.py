@@ -1,7 +1,7 @@
-"""Messages in the words of Python: what they call an option of the command line is there a keyword argument.
+"""Error messages for Python callers: options of the command line become keyword arguments.
 
-They are written with options. What is called from Python puts them into keywords (`in_keywords`); the command line,
-which may be what calls, prints what was written (`in_options`).
+Messages are written with options. Functions that are called from Python translate them to keywords (`in_keywords`); the
+command line, which may call the same functions, prints the original message (`in_options`).
 """
 
 import re
@@ -21,11 +21,11 @@ _OPTION_PATTERN = re.compile(
 )
 
 
-_ORIGINAL_MESSAGE = "options"  # attribute of an error: its message as it was written, with options
+_ORIGINAL_MESSAGE = "options"  # attribute of an error: its message as written, with options
 
 
 def in_options(error: Exception) -> str:
-    """Message of an error as the command line says it, also where `in_keywords` has put it into keywords."""
+    """Message of an error in terms of options, even if `in_keywords` has translated it to keywords."""
     return vars(error).get(_ORIGINAL_MESSAGE, str(error))
 
 
@@ -37,7 +37,7 @@ def keywords(text: str, **others: str) -> str:
     text : str
         Message that names options.
     **others : str
-        Keywords of another name, by that of the option.
+        Keywords whose names differ from those of the options, by option.
     """
 
     def keyword(found: re.Match[str]) -> str:

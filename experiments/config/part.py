@@ -1,6 +1,6 @@
-"""What parts of a configuration are made of: frozen dataclasses, checked when they are made, by pydantic.
+"""Parts of a configuration: frozen dataclasses that pydantic validates when they are made.
 
-A part is given by keyword. One that is wrong raises `ParameterError`: the keyword, its value, what would be right.
+A part takes keyword arguments. A wrong one raises `ParameterError`, with the keyword, its value and what is expected.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from sim.errors import SimError
 
 _Part = TypeVar("_Part")
 MOST = 1e15
-"""No number of a part is larger, in SI units: its square, and that of a difference, is still a number."""
+"""Upper bound of the numbers of a part, in SI units: its square, and that of a difference, is still finite."""
 INFINITE = "Infinity"
-"""How JSON, which has no infinite number, spells one: pydantic's word."""
+"""How pydantic writes an infinite number in JSON, which has none."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="strings", arbitrary_types_allowed=True)
 
 
 def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
     """Number of a part that is `least` or more, at most `most`, by default finite; `unit` is for messages.
 
-    Without a default it stands in the annotation, where the command line is to find the default itself.
+    Without a default it is used in an annotation, and the field has an ordinary default that the command line reads.
     """
     limit = None if infinite else most
     return Field(default=default, ge=least, le=limit, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
 def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
-    """Whole number of a part from `least` on, by default within what a file's 64 bits hold."""
+    """Whole number of a part that is `least` or more and less than `below`, by default within the 64 bits of a file."""
     return Field(default=default, ge=least, lt=below)
 
 
@@ -62,7 +62,7 @@ def part(cls: type[_Part]) -> type[_Part]:
         try:
             init(self, **dict(zip(places, arguments, strict=False)), **values)
         except ValidationError as error:
-            own = error.errors()[0].get("ctx", {}).get("error")  # what the part itself raised
+            own = error.errors()[0].get("ctx", {}).get("error")  # raised by the part itself
             raise (own if isinstance(own, ParameterError) else ParameterError(one_line(error, made))) from None
 
     made.__init__ = __init__
@@ -70,7 +70,7 @@ def part(cls: type[_Part]) -> type[_Part]:
 
 
 def _schema(cls: type, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-    """Pydantic's schema of a part, in which neither text nor a truth value stands for a number, nor these for a bool.
+    """Pydantic's schema of a part, without conversion of text or bool to a number, or of these to bool.
 
     Pydantic's own strict mode is not used: it also refuses lists for tuples, and NumPy's whole numbers.
     """
@@ -163,7 +163,7 @@ _EXPECTED = {
     "string_too_short": "text that is not empty", "tuple_type": "a list", "dict_type": "values by name",
     "dataclass_type": "values by name, or {class_name}",
 }  # fmt: skip
-"""What is expected where pydantic's own word is of its schema."""
+"""What is expected, where pydantic's own message names types of its schema."""
 
 
 def one_line(error: ValidationError, cls: type) -> str:
@@ -197,7 +197,7 @@ def one_line(error: ValidationError, cls: type) -> str:
         return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
-    if kind == "value_error":  # what parts say of each other, and actions and persons of themselves
+    if kind == "value_error":  # raised by parts, actions and persons themselves
         return in_options(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
@@ -217,15 +217,15 @@ def _field_at(cls: type, place: Sequence[str | int]) -> Any:
 
 
 def _part_at(cls: type, place: Sequence[str | int]) -> type:
-    """The part that is at a place of another."""
+    """The part at a place within another part."""
     for name in place:
-        if get_origin(cls) is dict:  # of parts by name
+        if get_origin(cls) is dict:  # maps names to parts
             cls = get_args(cls)[1]
             continue
         table = getattr(cls, "__pydantic_fields__", {})
         if name in table:
             cls = table[name].annotation
-        # In a union the kind of the member, or its name, stands in the place.
+        # In a union, the place holds the kind of the member, or its name.
         cls = next((m for m in get_args(cls) if name in (getattr(m, "kind", None), getattr(m, "__name__", ""))), cls)
         members = [m for m in get_args(cls) if m is not type(None)]
         cls = members[0] if len(members) == 1 else cls

@@ -1,7 +1,7 @@
-"""A run in words: the flat options of the command line, made from the parts of a configuration and sorted into them.
+"""Flat options of a run, as on the command line: made from the parts of a configuration, and sorted into them.
 
-Each field of a part is an option of the same name. An option that is given and does not belong to the parts that are
-chosen is refused by name: nothing is ignored.
+Each field of a part is an option of the same name. A given option that does not belong to the chosen parts is refused
+by name: nothing is ignored.
 """
 
 import types
@@ -35,7 +35,7 @@ from experiments.config.run_config import (
 from sim.users.person.population import PERSONAS, persona
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
-"""Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
+"""Optional parts of a mode: an option of its name switches one on, or any of its numbers where those default to 0."""
 _SWITCHES = ("governor", "walls")
 _USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSONAL)
 _NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
@@ -52,7 +52,7 @@ class Word:
 
 
 def parameters(cls: type) -> dict[str, str]:
-    """What the parameters of a part mean, by name, from its docstring."""
+    """Descriptions of the parameters of a part, by name, from its docstring."""
     described = docstring_parser.parse(cls.__doc__ or "")
     found: dict[str, str] = {}
     for parameter in described.params:
@@ -85,14 +85,14 @@ def _default_text(default: object) -> str:
 
 
 def plain(hint: Any) -> Any:
-    """The type of a word that need not be given."""
+    """The type of an option that may be left out."""
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(inner for inner in get_args(hint) if inner is not type(None))
     return hint if hint is bool or get_origin(hint) is tuple else hint | None
 
 
 def _metavar(kind: Any) -> str | None:
-    """What stands for a value in the help: a type or the choices, without the None of what need not be given."""
+    """Placeholder of a value in the help: a type or the choices, without None."""
     inner = [k for k in get_args(kind) if k is not type(None)] if type(None) in get_args(kind) else []
     if not inner:
         return None
@@ -106,7 +106,7 @@ VOCABULARY = _vocabulary()
 def run_config(
     mode: str = "follow", map: str = "", user: str = "", figure: str = "physical", replay: str = "", **words: object
 ) -> RunConfig:
-    """A run in words, as the command line takes them.
+    """Configuration of a run from options, as on the command line.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ def run_config(
     Raises
     ------
     ParameterError
-        If there is no such mode, map or word, a word does not belong to what is chosen, or a number is out of its
-        interval.
+        If there is no such mode, map or option, an option does not belong to the chosen parts, or a number is out of
+        its interval.
     """
     given = dict(words)
     _check_option_types(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
@@ -168,7 +168,7 @@ def run_config(
 
 
 def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
-    """Refuse names that are no text, switches that are neither on nor off, and what only stands inside a part."""
+    """Refuse names that are not text, switches that are not bool, and fields that are not options."""
     for name, value in chosen.items():
         if not isinstance(value, str):
             raise ParameterError(f"--{name} is {value!r}; expected a name")
@@ -180,7 +180,7 @@ def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object
 
 
 def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
-    """Refuse words that change nothing beside what is chosen, also if their value is the default."""
+    """Refuse options that have no effect on the chosen parts, even if their value is the default."""
     for name in meaningless(body, mode == "lead"):
         if name in given:
             raise no_meaning(name, given[name], body)
@@ -195,7 +195,7 @@ def _unknown_option(option: str) -> ParameterError:
 
 
 def _resolve_person(words: dict[str, Any]) -> dict[str, Any]:
-    """Words of a user, with a person who is given by name."""
+    """Options of a user, with the person in place of a person's name."""
     named = words.get("person")
     return words | {"person": persona(named)} if isinstance(named, str) else words
 
@@ -217,17 +217,17 @@ def _field_names(cls: type) -> set[str]:
 
 
 class _GivenOptions:
-    """Words that are given, as they are taken by the parts they belong to."""
+    """Given options, from which each part takes those that belong to it."""
 
     def __init__(self, given: dict[str, object], chosen: str):
         self._given, self._chosen = given, chosen
 
     def of(self, cls: type, names: Iterable[str] = ()) -> dict[str, Any]:
-        """Take those of a part, or of some of its names."""
+        """Take the options of a part, or those of the given names."""
         return {name: self._given.pop(name) for name in sorted(names or _field_names(cls)) if name in self._given}
 
     def added(self, mode: type) -> dict[str, Any]:
-        """Take the parts that are added to a mode."""
+        """Take the optional parts of a mode."""
         found: dict[str, Any] = {}
         for name, cls in ADDED.items():
             if name not in _field_names(mode):
@@ -238,7 +238,7 @@ class _GivenOptions:
         return found
 
     def check_empty(self) -> None:
-        """Refuse what no part has taken."""
+        """Refuse options that no part has taken."""
         remaining = {name: value for name, value in self._given.items() if value is not False}
         if not remaining:
             return
@@ -271,7 +271,7 @@ def _choice_option(cls: type) -> str:
 
 
 def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
-    """Field of a dataclass of options: its name, its type with what the help shows of it, and its default."""
+    """Field of a dataclass of options: its name, its type with its help, and its default."""
     shown = tyro.conf.arg(help=text, help_behavior_hint="", metavar=_metavar(kind))
     return name, Annotated[kind, shown], field(default=default)
 
@@ -298,20 +298,20 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
 
 
 RunOptions = make_dataclass("RunOptions", list(_options()), frozen=True)
-"""The options of a run as the command line takes them; all but those of its parts are left out."""
+"""The options of a run on the command line; one that is not given is None, False or empty."""
 Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="run")]  # pyright: ignore
-"""The same for a command that has them among its own."""
+"""`RunOptions` as a field of a command that has options of its own too."""
 
 
 def given_words(options: object) -> dict[str, Any]:
     """Options that are given, by name."""
     given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
-    # A zero is given, although it equals False.
+    # A zero counts as given, although it equals False.
     return {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
 
 
 def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingProxyType({})) -> RunConfig:
-    """The configuration that options ask for; those that are given change the one of ``--config``, or else `otherwise`.
+    """The configuration that options ask for: given options change that of ``--config``, or else those of `otherwise`.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingPro
 
 
 def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
-    """A configuration with some of its words changed; a mode or a map of another kind begins with its own defaults.
+    """A configuration with some options changed; a mode or a map of another kind starts from its own defaults.
 
     Raises
     ------
@@ -351,7 +351,7 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
 
 
 def words_of(config: RunConfig) -> dict[str, object]:
-    """A configuration in words: the inverse of `run_config`."""
+    """The options of a configuration: the inverse of `run_config`."""
     words: dict[str, object] = {
         "seconds": config.seconds,
         "seed": config.seed,

@@ -14,10 +14,8 @@ from sim.recording.recorder import DISK_RESERVE, Group
 SIMULATING = "a simulated second"
 """Name under which the wall-clock time per simulated second is stored."""
 _MIN_BYTES_PER_TICK = 400.0  # bytes per tick that every run records: measurements, forces, motor commands
-_MIN_ANNOUNCED_TIME, _MIN_ANNOUNCED_SIZE = (
-    60.0,
-    1e9,
-)  # [s] of real time and [bytes] from which a run announces what it will take
+# [s] of real time and [bytes] from which a run announces what it will take
+_MIN_ANNOUNCED_TIME, _MIN_ANNOUNCED_SIZE = 60.0, 1e9
 
 
 def check_length(out: Path, seconds: float, servo_period: float) -> None:

@@ -78,7 +78,7 @@ def _durations_file() -> Path:
 
 
 def _stored_durations() -> dict[str, float]:
-    """Stored durations [s] by name; empty if the file is missing or unreadable, as they are only a help."""
+    """Stored durations [s] by name; empty if the file is missing or unreadable, as they only serve estimates."""
     try:
         stored = json.loads(_durations_file().read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -40,14 +40,14 @@ def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
 
 
 def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]], Content]], what: str) -> Content:
-    """What a file holds that `write_archive` wrote, made again from its arrays.
+    """Content of a file that `write_archive` wrote, rebuilt from its arrays.
 
     Parameters
     ----------
     path : Path
         The file.
     kinds : mapping of str to callable
-        Kinds of content that are accepted, and what makes them from arrays.
+        Accepted kinds of content, and the functions that rebuild them from arrays.
     what : str
         Their common name in messages.
 

@@ -26,7 +26,7 @@ _KNOWN_KEYS = ("format", *_VALUE_COUNTS, "calibration", "windows", "unexplained"
 _MAX_PARAMETER = 1e3
 """Bound that no parameter can reach, in any of the units [N m], [N m s/rad], [kg m²], [s], [rad]."""
 _MAX_TORQUE = max(PREMIUM_1_5.peak_torque)
-"""Friction and weight that no motor can overcome [N m]: with them nothing moves."""
+"""Bound of friction and weight [N m]: the motors cannot overcome more."""
 
 
 class Calibration(NamedTuple):
@@ -129,7 +129,7 @@ def read_device_file(path: Path) -> dict[str, Any]:
 
 
 def _check_content(content: Mapping[str, Any]) -> None:
-    """Refuse what does not belong into a device file, and numbers that no device has."""
+    """Refuse unknown keys, and numbers that no device can have."""
     _check_keys(content, _KNOWN_KEYS, "")
     _check_keys(content.get("calibration", {}), Calibration._fields, "calibration.")
     for name, length in _VALUE_COUNTS.items():
@@ -180,12 +180,8 @@ def linkage_from(content: Mapping[str, Any]) -> Linkage:
 
 def calibration_from(content: Mapping[str, Any]) -> Calibration | None:
     """Calibration in the content of a device file; None if it has none."""
-    calibration = content.get("calibration")
-    return (
-        Calibration(str(calibration["name"]), str(calibration["serial"]), int(calibration["power_up"]))
-        if calibration
-        else None
-    )
+    found = content.get("calibration")
+    return Calibration(str(found["name"]), str(found["serial"]), int(found["power_up"])) if found else None
 
 
 def content_of(device: Phantom | Replay) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class BodyMap(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class _AboutCurve:
-    """What maps about a curve are made of; see `Cylindrical`."""
+    """Base of maps about a curve; see `Cylindrical`."""
 
     most: ClassVar[int]
     """Number of clips that the map takes."""

@@ -132,7 +132,7 @@ def record(
     with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
-        session.haptic_map.check()  # before it is asked again for the measures, outside the tick
+        session.haptic_map.check()  # before the measures evaluate it again, outside a tick
         summary = measured(out, session, speed)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     return summary
@@ -160,7 +160,7 @@ def _simulate(
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
     loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
-    rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
+    rest = first * (round(seconds / first) - 1)  # a whole number of figure updates, as many as in a single call
     with session.naming_laws():
         loop.run(first)
     session.haptic_map.check()
@@ -181,7 +181,7 @@ def _simulate(
 
 
 def _live_page(session: Session) -> Page:
-    from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
+    from sim.viewer.live_page import LivePage  # importing viser takes a third of a second, and is rarely needed
 
     static = session.static()
     radius = float(np.asarray(static["tube_radius"]))

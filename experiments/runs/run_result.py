@@ -40,7 +40,7 @@ from sim.recording.recording import Recording
 
 
 def check_record(record: str | Path | None, overwrite: bool) -> None:
-    """Refuse values of another kind of what `Run.of` takes, before anything is compiled."""
+    """Refuse arguments of `Run.of` that have a wrong type, before anything is compiled."""
     if record is not None:
         given_path("record", record)
     of_kind("overwrite", overwrite, bool)
@@ -56,7 +56,7 @@ class Channels(Mapping[str, Array]):
     """Channels of a run at one rate, by name: ``run.ticks["force"]``, shape (n, ...)."""
 
     def __init__(self, run: "Run", group: str):
-        self._run, self._group = run, group  # the run, since a temporary folder is deleted with it
+        self._run, self._group = run, group  # keeps the run, as a temporary folder is deleted with it
 
     def __getitem__(self, name: str) -> Array:
         with Recording(self._run.folder / RECORDING) as recording:
@@ -88,7 +88,7 @@ class Run:
     summary : RunSummary
         Measures as numbers; `str` of a run gives them in words.
     remarks : tuple of str
-        What was said before the run: what its clips and its map are not fit for, what was chosen instead. `str` has
+        Remarks before the run: what its clips and its map are not suited for, and what was chosen instead. `str` has
         them first.
     """
 
@@ -129,7 +129,7 @@ class Run:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was said before the run."""
+        """Remarks before the run."""
         return tuple(map(keywords, self._session.remarks))
 
     @property

@@ -1,4 +1,4 @@
-"""Parts of a simulation as a prompt shows them: what is not its default, clips and functions by name."""
+"""Short text of the parts of a simulation, for a prompt: values that are not defaults, clips and functions by name."""
 
 import reprlib
 from collections.abc import Iterable, Sequence
@@ -12,9 +12,8 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
 from models.mocap.motion.clip import Clip
 
-_MAX_SHOWN = (
-    4  # values of a part or of a sequence that are shown: those of a simulation then fit into some 200 characters
-)
+# Values of a part or of a sequence that are shown: those of a simulation then fit into some 200 characters.
+_MAX_SHOWN = 4
 
 
 def name_of(law: Law) -> str:
@@ -23,7 +22,7 @@ def name_of(law: Law) -> str:
 
 
 def short_text(part: object) -> str:
-    """A part as ``Name(what is not its default)``, without memory addresses."""
+    """A part as ``Name(field=value)`` with the fields that differ from their defaults, without memory addresses."""
     if isinstance(part, Clip):
         return repr(part.name)
     if isinstance(part, Trajectory):

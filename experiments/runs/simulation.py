@@ -81,7 +81,7 @@ class User:
 
     @property
     def acts(self) -> bool:
-        """Whether the hand does anything of itself, or is a person's."""
+        """Whether the hand acts on its own, or is a person's."""
         does = (self.pushes, self.turns, self.grabs, self.traces, self.person, self.intent)
         return any(part is not None and part != () and part != [] for part in does)
 
@@ -312,7 +312,7 @@ _PART_TYPES: dict[str, tuple[tuple[type, ...], str]] = {
 
 
 def _check_kinds(sim: Simulation) -> None:
-    """Refuse parts of another kind by name, with what would be right."""
+    """Refuse parts of a wrong type, with the part's name and what is expected."""
     for name, (kinds, expected) in _PART_TYPES.items():
         if not isinstance(getattr(sim, name), kinds) or isinstance(getattr(sim, name), bool):
             raise ParameterError(f"{name} is {getattr(sim, name)!r}; expected {expected}")

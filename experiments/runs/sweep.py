@@ -19,7 +19,7 @@ from experiments.runs.simulation import Simulation
 from experiments.setups.wiring import check_seconds
 
 _LIMIT_NAME = "limited"  # the operation `Law.limited`
-_LIMIT_UNITS = {"force": "N", "torque": "N m"}  # its numbers, in order
+_LIMIT_UNITS = {"force": "N", "torque": "N m"}  # units of its bounds, in order
 
 
 class Swept(NamedTuple):
@@ -122,7 +122,7 @@ def _with_parameter(part: Any, names: Sequence[str], value: Any, path: str) -> A
 
 
 def _with_limit(program: Program, names: Sequence[str], value: Any, path: str) -> Program:
-    """The same field with a bound of its one limit set."""
+    """The same field with one bound of its only limit set."""
     limits = [row[OP_PARAMETERS] for row in program.ops.tolist() if row[OP_CODE] == Join.LIMIT]
     if len(names) != 2 or names[1] not in _LIMIT_UNITS or len(limits) != 1:
         expected = " or ".join(f"{_LIMIT_NAME}.{bound}" for bound in _LIMIT_UNITS)

@@ -1,6 +1,6 @@
 """Laws of force and gains of a run in the form that certificates take, by mode.
 
-Imports only configurations, since certificates import it.
+Imports nothing but configurations, since certificates import it.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def certified_laws(config: RunConfig) -> Laws:
 
 
 def leading_gains(config: RunConfig) -> tuple[float, float]:
-    """Stiffness [N/m] and damping [N s/m] for which a run's course is timed; 0 where it does not lead along its curve.
+    """Stiffness [N/m] and damping [N s/m] for which a run's course is timed; 0 if it does not lead along its curve.
 
     The stiffness is 0 also with a parallel flow, where a hand that runs outside a bend keeps the curve's pace.
     """
@@ -67,7 +67,7 @@ def of_clips(config: RunConfig) -> bool:
 
 
 def left_out(config: RunConfig) -> tuple[str, ...]:
-    """Names of what a run executes besides its certified laws and no certificate covers."""
+    """Names of the parts of a run that act besides its certified laws, and that no certificate covers."""
     mode = config.mode
     names: list[str] = []
     if getattr(mode, "walls", None) is not None:

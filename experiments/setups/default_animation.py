@@ -32,7 +32,7 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
 
 
 def _river_animation(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
-    """Likewise where each river plays a clip of its own, with the transitions between clips that the figure had."""
+    """The same where each river plays its own clip, with the transitions between clips that the figure made."""
     period = stride * session.servo.figure_ticks * session.servo.plant.period
     compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.body
     reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))

@@ -81,7 +81,7 @@ class Session:
 
     @contextmanager
     def naming_laws(self) -> Generator[None]:
-        """For the ticks: name the compiled law of one's own that raises at the hand of an error, if one does."""
+        """Context of ticks: after an error, the user-defined law that raises at the current hand state is named."""
         try:
             yield
         except Exception:

@@ -208,7 +208,7 @@ def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
 
 
 def _start_state(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
-    """How the stylus begins, and its orientation; without one the gimbal's joints are at zero."""
+    """Start state of the stylus, and its orientation; if that is None, the gimbal's joints are at zero."""
     hand = known_start(servo.device)
     if hand is not None:
         w, x, y, z = (float(number) for number in hand.q)

@@ -29,14 +29,12 @@ from sim.reference.reference import make_reference, reference_along
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
 _TUBE_RADIUS = 0.015  # [m] radius
-_CHANGE_DURATION, _MEASURED_TIME = (
-    0.3,
-    0.8,
-)  # [s] duration of the hand's change, and time measured from its beginning on
+# [s] duration of the hand's change, and time measured from its beginning on
+_CHANGE_DURATION, _MEASURED_TIME = 0.3, 0.8
 _THROW_DISPLACEMENT = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
 _FIRST_MOMENT, _MOMENT_RANGE = 1.2, 3.0  # [s] earliest moment, and range of the moments
 _TRIAL_COUNT, _SEED = 200, 11  # of random moments
-_MAX_SKATE = 0.03  # [m] largest foot skate that is no slide
+_MAX_SKATE = 0.03  # [m] foot skate above which a change counts as a slide
 
 
 class Change(NamedTuple):

@@ -139,7 +139,7 @@ def pushed_passage(second: River, form: Form, newtons: float, alone: bool = Fals
 
 
 def verdict(way: Passage) -> str:
-    """Which river had the hand at the end, and whether one let it go for longer than 20 ms."""
+    """Which river had the hand at the end, and for how long none had it, if that was 20 ms or more."""
     lost = float(np.sum(way.river < 0.0)) * 1e-3
     end = "out" if way.river[-1] < 0.0 else f"{int(way.river[-1]) + 1}"
     return end if lost < 0.02 else f"{end} ({lost:.2f} s)"

@@ -95,7 +95,7 @@ def _with_name(clip: Clip, name: str) -> Clip:
 
 
 def _rest_clip(clip: Clip) -> Clip:
-    """Some other clip, with which it is tested whether a clip can be blended at all."""
+    """A clip at rest, against which is tested whether a clip can be blended at all."""
     return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from models.robot_arm.spec import ARM_JOINTS, arm_limits, arm_model
 from sim.recording.recording import Recording
 
-_START_TIME = 1.0  # [s] in which the arm, at rest at first, catches up with a hand that the field takes along
+_START_TIME = 1.0  # [s] in which the arm, initially at rest, catches up with the hand
 
 
 @dataclass(frozen=True)

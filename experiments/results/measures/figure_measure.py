@@ -44,13 +44,7 @@ class FigureMeasure:
         self._stance, self._flight, self._airborne = (
             ResidualMeasure(self._weight, height, 1.0 / self._rate) for _ in range(3)
         )
-        self._frame_count, self._up_count, self._lost_count, self._saturated_sum, self._ground_force_sum = (
-            0,
-            0,
-            0,
-            0.0,
-            0.0,
-        )
+        self._frames, self._up, self._lost, self._saturated, self._ground = (0, 0, 0, 0.0, 0.0)
         self._was_up, self._falls = True, list[float]()
 
     def add(self, frames: Mapping[str, Array]) -> None:
@@ -58,11 +52,7 @@ class FigureMeasure:
         up = frames["down"] == UP
         falls = ~up & np.concatenate(([self._was_up], up[:-1]))
         self._falls += frames["t"][falls].tolist()
-        self._was_up, self._frame_count, self._up_count = (
-            bool(up[-1]),
-            self._frame_count + len(up),
-            self._up_count + int(np.sum(up)),
-        )
+        self._was_up, self._frames, self._up = (bool(up[-1]), self._frames + len(up), self._up + int(np.sum(up)))
         in_flight, supported = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > SUPPORTS
         residual = frames["residual"][up]
         self._joints.add(frames["joint_error"][up])
@@ -70,18 +60,18 @@ class FigureMeasure:
         self._stance.add(residual[~in_flight])
         self._flight.add(residual[in_flight])
         self._airborne.add(residual[~supported])
-        self._lost_count += int(np.sum(~in_flight & ~supported))
-        self._saturated_sum += float(np.sum(frames["saturated"][up]))
-        self._ground_force_sum += float(np.sum(frames["ground"][up][:, 2]))
+        self._lost += int(np.sum(~in_flight & ~supported))
+        self._saturated += float(np.sum(frames["saturated"][up]))
+        self._ground += float(np.sum(frames["ground"][up][:, 2]))
 
     def summary(self) -> FigureSummary:
         """Summary of all frames so far."""
-        up, stance, flight = max(self._up_count, 1), self._stance.summary(), self._flight.summary()
+        up, stance, flight = max(self._up, 1), self._stance.summary(), self._flight.summary()
         return FigureSummary(
             falls=tuple(self._falls),
             fell_at=self._falls[0] if self._falls else None,
-            seconds=self._frame_count / self._rate,
-            up_seconds=self._up_count / self._rate,
+            seconds=self._frames / self._rate,
+            up_seconds=self._up / self._rate,
             joint_error_rms_deg=math.degrees(self._joints.root),
             root_error_rms_cm=100.0 * self._root.root,
             root_error_max_cm=100.0 * self._root.largest,
@@ -91,8 +81,8 @@ class FigureMeasure:
             without_ground_force=self._airborne.summary(),
             residual_in_flight_max=max(flight.force_max, flight.moment_max),
             flight_seconds=flight.seconds,
-            lost_contact_seconds=self._lost_count / self._rate,
-            saturated=self._saturated_sum / up / (N_TANGENT - 6),
-            grounded=1.0 - self._lost_count / self._rate / stance.seconds if stance.seconds else 1.0,
-            ground_force_mean=self._ground_force_sum / up / self._weight,
+            lost_contact_seconds=self._lost / self._rate,
+            saturated=self._saturated / up / (N_TANGENT - 6),
+            grounded=1.0 - self._lost / self._rate / stance.seconds if stance.seconds else 1.0,
+            ground_force_mean=self._ground / up / self._weight,
         )

@@ -16,11 +16,9 @@ from models.mocap.motion.quaternions import heading
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
 
-_DISTANCE_SCALE, _TURN_SCALE = (
-    0.01,
-    math.radians(2.0),
-)  # [m] and [rad] weighted equally in the search for the nearest earlier pose
-_MAX_STORED_POSES = 6000  # poses kept of the way forwards, one per centimetre of the path
+# [m] and [rad] weighted equally in the search for the nearest earlier pose
+_DISTANCE_SCALE, _TURN_SCALE = 0.01, math.radians(2.0)
+_MAX_STORED_POSES = 6000  # poses of the outward path that are kept, one per centimetre
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,8 @@ class LeadSummary:
         Foot skate: largest distance that a point of the animation's soles slid while in contact; the same for the
         physical figure's soles, until its first fall.
     retrace_cm, retrace_deg : float or None
-        On the way back, largest distance and yaw difference of the animation's root from its path on the way forwards;
-        None if it never went back.
+        On the way back, largest distance and yaw difference of the animation's root from its outward path; None if it
+        never went back.
     physical_retrace_cm, physical_retrace_deg : float or None
         The same for the physical figure, until its first fall.
     """
@@ -123,7 +121,7 @@ def turn_rates(gait: Gait, walkers: Array, s: Array, speed: Array) -> Array:
 
 
 class _Retrace:
-    """Distance of a figure that is led back from the path on which it came."""
+    """Deviation of a figure, while it is led back, from its own outward path."""
 
     def __init__(self) -> None:
         self._outward_path = np.empty((0, 4))
@@ -138,13 +136,13 @@ class _Retrace:
         new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
         self._outward_path = np.concatenate([self._outward_path, rows[new]])[-_MAX_STORED_POSES:]
         for place, ahead in zip(rows, front[1:], strict=True):
-            # Near the turning point the filtered figure lags behind, and its way forwards is not yet recorded there.
+            # Near the turning point the filtered figure lags behind, and its outward path is not yet recorded there.
             if ahead - place[0] > 0.1:
                 self._compare(place)
 
     def _compare(self, place: Array) -> None:
         near = self._outward_path[np.abs(self._outward_path[:, 0] - place[0]) < 0.3]
-        # Behind the start there is no way forwards to compare with.
+        # Behind the start there is no outward path to compare with.
         if len(near) < 2 or place[0] < self._outward_path[0, 0]:
             return
         start, step = near[:-1], np.diff(near, axis=0)

@@ -148,7 +148,7 @@ class PathMeasure:
         self._replayed = "replayed" in recording.texts
         self._pushes: list[PushSummary] = []
         self._pushing, self._push_origin = False, np.zeros(3)
-        self._near_curve = False  # whether the field has been along a curve at any tick
+        self._has_curve = False  # whether the field had a curve at any tick
 
     def add(self, ticks: Mapping[str, Array]) -> Mask:
         """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
@@ -157,8 +157,8 @@ class PathMeasure:
         last = np.maximum.accumulate(np.where(at_work, t, self._last_push_time))
         pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
         self._last_push_time = float(last[-1])
-        along = np.isfinite(ticks["distance"])  # a law without a curve leaves it infinite
-        self._near_curve |= bool(along.any())
+        along = np.isfinite(ticks["distance"])  # infinite for a law without a curve
+        self._has_curve |= bool(along.any())
         self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed & along])
         self._add_phase(t, ticks["phase"])
         self._add_position(t, ticks["p"])
@@ -211,7 +211,7 @@ class PathMeasure:
         lap_seconds = seconds / laps if laps >= 1.0 else None
         stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING else None
         moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
-        pace = None if math.isnan(clip) or not self._near_curve else laps * clip / moving
+        pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
         alone, most = (
             (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
         )

@@ -104,7 +104,7 @@ def _press_summary(ticks: dict[str, Array], curve: Trajectory, epsilon: float, b
     if what == "pushed":
         changes = np.flatnonzero(np.diff(phase))
         since = k + int(changes[-1]) if len(changes) else 0
-        # While a tube is pushed the phase stays and the point moves; if the point stays too, nothing was touched.
+        # While a tube is pushed, the phase stays and the point moves; if the point stays too, the tube was not touched.
         if np.all(nearest[since + 1 :] == nearest[-1]):
             what = "nothing"
     if what not in ("held", "pushed"):

@@ -42,7 +42,7 @@ def plots_html(recording: Recording) -> str:
         "plots": [
             {
                 "unit": plot.unit,
-                "lines": [{"name": n, "color": c, "y": _short_numbers(values)} for n, c, values in plot.lines],
+                "lines": [{"name": n, "color": c, "y": _short_numbers(values)} for n, c, values in plot.lines]
             }
             for plot in plots
         ],

@@ -45,7 +45,7 @@ def cylindrical_parts(
     Raises
     ------
     ControllerError
-        If there are none, or more than four, or they do not fit together.
+        If there are no clips, or more than four, or they do not fit together.
     """
     motions, reach = motions_of(clips, CORNERS, "cylindrical"), place.reach
     radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
@@ -63,7 +63,7 @@ def cylindrical_parts(
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
         if same(clips):
             balanced_map = balanced(made, figure, lap)
-            # An open clip is played there and back. Backwards it needs the same forces, but is followed less well.
+            # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
             as_prepared = clips[0].closes(CLOSES) and keep_own_pace(clips[:1], made.loops[:1], lap)
             return balanced_map, () if as_prepared else unbearable(balanced_map, clips[0].name, lap, parallel)
         return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()

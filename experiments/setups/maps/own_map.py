@@ -13,7 +13,7 @@ from experiments.setups.parts.pace import reached
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
 
-_N_COMPARED = 5  # places of a lap at which a user-defined derivative is compared: few symmetries of a map have all five
+_N_COMPARED = 5  # phases of a lap at which a user-defined derivative is checked: few symmetries of a map share all five
 
 
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:

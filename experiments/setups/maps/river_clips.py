@@ -22,7 +22,7 @@ from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
-_MAX_LAPS = 4  # in a round: with more, a hand waits long for a change, and there are many changes to compute
+_MAX_LAPS = 4  # laps in a round: with more, a hand waits long for a transition, and there are many to compute
 
 
 def river_clips_setup(
@@ -58,9 +58,9 @@ def river_clips_setup(
 
 
 def _fit_round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
-    """Laps in a round of clips on `count` rivers, and whether strides are apart: the fewest laps that keep their pace.
+    """Fewest laps of a round in which clips on `count` rivers keep their pace, and whether their strides are apart.
 
-    If none do, the laps in which the clip furthest from its own pace is nearest to it.
+    If there are none, the laps for which the largest deviation of a clip from its own pace is smallest.
     """
     if same(clips):
         return 1, False

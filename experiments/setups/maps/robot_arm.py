@@ -24,13 +24,11 @@ from sim.reference.reference import poses_along
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
 _TOOL_TILT = np.radians(75.0)  # tilt of the tool from the vertical
 ORIENTATION = np.array([np.cos(0.5 * _TOOL_TILT), 0.0, np.sin(0.5 * _TOOL_TILT), 0.0])
-_TOOL_RANGE = (
-    0.105,
-    0.15,
-)  # [m] way of the tool up to which it follows the stylus exactly, and its bound in saturation
-_TURN_RANGE = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
+# [m] displacement up to which the tool follows the stylus exactly, and its bound in saturation
+_TOOL_RANGE = (0.105, 0.15)
+_TURN_RANGE = (np.radians(15.0), np.radians(25.0))  # [rad] the same for the rotation of the stylus
 _ARM_ANGLE = np.radians(30.0)  # ψ of `controllers.haptic_map.robot_arm.RobotArm` [rad]
-_SAMPLE_COUNT = 241  # of a curve, where it is furthest away
+_SAMPLE_COUNT = 241  # samples of a curve in the search for its farthest point
 _CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
 
 
@@ -65,8 +63,8 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     Raises
     ------
     ParameterError
-        If the tool would not go all the way that the curve, scaled, leads it. What the arm does not reach is refused
-        when the parts are refined, which evaluates the map.
+        If the scaled curve leads the tool farther than it follows exactly. What the arm does not reach is refused when
+        the parts are refined, which evaluates the map.
     SimError
         If the Phantom does not reach the curve.
     """
@@ -74,7 +72,8 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     if scale * away > _TOOL_RANGE[0]:
         raise ParameterError(
             f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most "
-            f"{1e3 * _TOOL_RANGE[0]:.0f} mm from its home; expected --scale {_TOOL_RANGE[0] / away:.2g} or less, or a smaller curve"
+            f"{1e3 * _TOOL_RANGE[0]:.0f} mm from its home; expected --scale {_TOOL_RANGE[0] / away:.2g} or less, or a "
+            "smaller curve"
         )
     made = robot_arm_map(arm, scale)
 

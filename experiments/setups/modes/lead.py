@@ -24,10 +24,11 @@ from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
-_START_RADIUS = 0.025  # [m] from its place on the curve within which a hand begins
-# Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
+_START_RADIUS = 0.025  # [m] largest distance of the hand from its place on the curve at the start
+# Largest lateral acceleration of a gait with flights [m/s²]: leaning more, the figure falls after a slightly missed
+# landing.
 _MAX_FLYING_LATERAL = 1.2
-# Largest pace of a gait with flights, over the clip's own: played faster it lands late, since gravity stays the same.
+# Largest pace of a gait with flights over the clip's own: played faster, it lands late, since gravity stays the same.
 # The same holds for a run led by steps: its limbs already swing as fast as in the run; if they swing faster, motors of
 # the stance leg saturate.
 _MAX_RUNNING_PACE = 1.0

@@ -18,12 +18,12 @@ from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
 from sim.users.hand.actions import Push
 
-_SPEED_RANGE = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
+# Admissible speeds over the river's own: a hand from a neighbouring river has that river's speed.
+_SPEED_RANGE = (0.5, 2.0)
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
-_PUSH_LEAD_TIME = (
-    0.36  # [s] before the transition at which the push begins: with 0.34 to 0.55 the figure stands (nine pushes)
-)
-_CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
+# [s] from the start of a push to the transition: with 0.34 to 0.55 the figure stays up (nine pushes)
+_PUSH_LEAD_TIME = 0.36
+_CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.

@@ -42,9 +42,9 @@ from sim.world.world import FigureKind
 # [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
 # it.
 REACH = 1.8
-# Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
+# Distance from the curve, in tube radii, at which the hand aims to press; the seeking spring pulls it in by a third.
 OUTSIDE = 2.2
-EASE = 1.0  # [s] in which the bent curve comes up to its pace: a body in mid-step cannot go on at full speed at once
+EASE = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
 _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 
 

@@ -1,6 +1,6 @@
 r"""Energy tank of a run: the power and energy that its field may inject.
 
-The tank is dimensioned so that a run as intended never empties it, and a wrong or late law does.
+The tank is dimensioned such that a normal run never empties it, while a wrong or late law does.
 
 .. math:: P = \tfrac14 b_d |\dot\varphi|^2_{max}
 

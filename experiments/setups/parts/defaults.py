@@ -13,12 +13,12 @@ from experiments.config.run_config import RunConfig
 # Rivers of a map from a file lie side by side. A larger τ = b_d/k_r draws a hand over from one to the other more
 # slowly; otherwise the figure would have to reach the other clip's speed at once.
 _RIVER_GAINS, _FILE_RIVER_GAINS = {"stiffness": 150.0, "damping": 16.0}, {"stiffness": 50.0, "damping": 20.0}
-# About a circle an edit that is undone takes the hand along in a tenth of a second, not in a fortieth. On a map from a
+# About a circle, an undone edit carries the hand along in a tenth of a second, not in a fortieth. On a map from a
 # file the seeking spring is as soft as the rivers there: the figure follows every movement of the hand, and
 # neighbouring curves hold different motions.
 _TUBE_GAINS, _FILE_TUBE_GAINS = {"seek": 150.0, "tube_damping": 14.0}, {"seek": 50.0, "tube_damping": 20.0}
-# On a map from a file a hand that is pushed is among other clips, and flights bear no change of pace as well. On a
-# composite a push is to change the upper body alone: its legs bear no other pace either.
+# On a map from a file a push takes the hand among other clips, and flights tolerate no change of pace as well. On a
+# composite a push should change the upper body alone: its legs tolerate no other pace either.
 _CURVE_FLOW, _PARALLEL_FLOW = {"flow": "curve"}, {"flow": "parallel"}
 
 _ModeDefaults = Mapping[type, Mapping[str, float | str]]

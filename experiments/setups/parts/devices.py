@@ -61,7 +61,7 @@ def device_of(settings: Settings, world: World, seconds: float | None) -> Device
 
 
 def recorded_as(settings: Settings, device: DeviceState) -> dict[str, str]:
-    """What a recording keeps of a replayed hand: where it is from, and its hash; empty for another device."""
+    """Texts that a recording stores about a replayed hand: its source and its hash; empty for another device."""
     if isinstance(settings.device, Replay) and isinstance(device, ReplayedHand):
         return {"replayed": settings.device.run, "hand_sha256": _digest(device.rows)}
     return {}

@@ -17,9 +17,8 @@ from sim.users.person.wishes import ENGAGED, PLACE, Wishes
 
 POSES = 128  # poses along a motion: some 3 degrees of a lap apart
 _DIFFERENCE_STEP = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
-_DAMPING_RATIO = (
-    0.15  # damping of the inverse over the largest singular value: weaker effects are felt rather than seen
-)
+# Damping of the inverse over the largest singular value: weaker effects are felt rather than seen.
+_DAMPING_RATIO = 0.15
 
 
 def with_eyes(servo: Servo, wishes: Wishes, curve: Array) -> Servo:

@@ -18,7 +18,7 @@ from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 
 _FRAME_RATE = 120.0  # [1/s] frame rate of the animation whose flights are judged
-_MAX_SPEED = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
+_MAX_SPEED = 10.0  # [m/s] bound where there is no other: no hand is faster
 
 
 def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:

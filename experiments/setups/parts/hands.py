@@ -30,26 +30,21 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
-SLOWEST = 0.0235  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
+NEAR = 3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
+SLOWEST = 0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 TRACED = 0.01  # [s] between samples of a path that the hand traces
 
 _CROSSING_PHASE = 0.5  # share of the lap at which the wave rises through the level river
-_PUSH_LEAD_TIME, _PUSH_DURATION = (
-    0.05,
-    0.3,
-)  # [s] before the crossing at which a push across begins, and [s] that it lasts
+# [s] from the start of a push to the crossing, and its duration
+_LEAD_TIME, _PUSH_DURATION = 0.05, 0.3
 _REFERENCE_SPEED = 0.0749  # [m/s] of the default rivers, at which these and `RIVER_PUSH` were measured
-_MAX_SCALED_SPEED = 0.2  # [m/s]: in faster rivers a push is as in these, for a harder one throws the hand out of all
-_SLOW_FORCE_EXPONENT = (
-    0.2  # power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind
-)
+_MAX_SCALED_SPEED = 0.2  # [m/s] in faster rivers a push is the same as at this speed: a harder one throws the hand out
+# Power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind.
+_SLOW_FORCE_EXPONENT = 0.2
 _START_SPREAD = 1e-3  # [m] standard deviation of the start position
-_MIN_START_SPEED, _MAX_START_PHASE = (
-    1e-3,
-    0.05,
-)  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
+# [m/s] least speed that turns an offset into a phase; largest phase as a share of a lap
+_MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
 
 
 class Beginning(NamedTuple):
@@ -230,9 +225,7 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     if pace < SLOWEST:
         return ()
     speed_ratio = min(pace, _MAX_SCALED_SPEED) / _REFERENCE_SPEED
-    x, y, z = (
-        float(value) for value in curve.point(curve.start + _CROSSING_PHASE * lap - _PUSH_LEAD_TIME / speed_ratio)
-    )
+    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING_PHASE * lap - _LEAD_TIME / speed_ratio))
     duration, force = (
         _PUSH_DURATION / speed_ratio,
         speed_ratio ** (1.0 if speed_ratio > 1.0 else _SLOW_FORCE_EXPONENT) * RIVER_PUSH,

@@ -26,10 +26,9 @@ from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import lap_of
 from sim.world.world import FigureKind
 
-_PHASE_COUNT = 256  # samples of a lap that tell which feet stand: of a lap of a second, one in 4 ms
-_MAX_CYCLE_GAP = np.deg2rad(
-    15.0
-)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
+_PHASE_COUNT = 256  # samples of the stance over a lap: one in 4 ms for a lap of a second
+# Difference of the end poses above which a clip is not a cycle: CMU 02_01's lap has 5°, its whole clip 35°.
+_MAX_CYCLE_GAP = np.deg2rad(15.0)
 _MIN_SWING_TIME = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 
 
@@ -83,8 +82,8 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
     A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise. A figure of another stature
-    moves in proportion, with strides of its size.
+    stance feet held (`Capture`); so is a clip with flights for which no other form without flights exists. A figure of
+    another stature moves in proportion, with strides of its size.
 
     Raises
     ------

@@ -19,12 +19,11 @@ from models.phantom.kinematics import jacobian, vector_to_device_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.world import phantom_angles
 
-# Step to either side for the finite difference of joint rates [s]: half or twice moves a friction of 2 mN by 2e-8 N
-# at most.
+# Step to either side for the finite difference of joint rates [s]: half or twice this value changes a friction of 2 mN
+# by 2e-8 N at most.
 _TIME_STEP = 1e-3
-_MAX_LENGTHENING = (
-    0.5  # largest relative lengthening of the path: beyond, the spring is too soft to keep the tip on the curve
-)
+# Largest relative lengthening of the path: beyond, the spring is too soft to keep the tip on the curve.
+_MAX_LENGTHENING = 0.5
 
 
 def friction_along(curve: Trajectory, phases: Array) -> Array:

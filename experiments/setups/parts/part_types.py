@@ -152,7 +152,7 @@ class MapParts(Generic[Map]):
         return replace(self, remarks=remarks + self.remarks)
 
     def refine(self, physical: bool) -> Self:
-        """The same parts with the improved map, and what is said of it for a physical figure; needs compiled code."""
+        """The same parts with the improved map and, for a physical figure, remarks on it; needs compiled code."""
         if self.refined is None:
             return self
         made, figure_remarks = self.refined()
