@@ -54,7 +54,7 @@ def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]],
     Raises
     ------
     SimError
-        If the file cannot be read, is damaged, of another kind or version, or its content is not what it should be.
+        If the file cannot be read, is damaged, of another kind or version, or its content is invalid.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:

@@ -199,7 +199,7 @@ class RobotArm:
     Raises
     ------
     ParameterError
-        If a number is not positive, or, when it is run, the arm does not reach what it is led to.
+        If a number is not positive, or, at the start of a run, if the arm does not reach where it is led.
     SimError
         If the Phantom does not reach the curve.
     """

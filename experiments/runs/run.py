@@ -68,7 +68,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     started : float
         `time.perf_counter` when the program began.
     view : bool
-        Show the run in a browser while it goes on, at the pace of the wall clock.
+        Show the run in a browser while it is simulated, in real time.
 
     Raises
     ------

@@ -121,8 +121,8 @@ class Run:
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
                 (folder / CONFIG).write_text(to_json(session.config), encoding="utf-8")
-            said = asdict(summary) | {"lines": summary.lines()}
-            (folder / SUMMARY).write_text(json_text(said) + "\n", encoding="utf-8")
+            content = asdict(summary) | {"lines": summary.lines()}
+            (folder / SUMMARY).write_text(json_text(content) + "\n", encoding="utf-8")
             run = Run(folder, summary, session)
             run.report()
         return run

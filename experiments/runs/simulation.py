@@ -273,7 +273,7 @@ class Simulation:
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 
     def __iter__(self) -> Iterator[Tick]:
-        """Step tick by tick, without end, or until a replayed hand's: ``for tick in sim``."""
+        """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         left = ticks_of(session.servo.device)

@@ -154,7 +154,7 @@ def crossing_passages() -> str:
             passages = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
             unpaired = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
             away = 1e3 * float(np.max(np.abs(passages[0].p - unpaired.p)))
-            cells = " | ".join(verdict(passage_made) for passage_made in passages)
+            cells = " | ".join(verdict(one) for one in passages)
             lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
     return "\n".join(lines)
 

@@ -77,19 +77,19 @@ def crossing(degrees: float) -> Crossing:
     smooth = HigherOrder(pair, ADMISSION * SPEED, SIGMA["smooth"] * SPEED)
     discrete = HigherOrder(pair, *scale, "discrete")
     # River 1 exerts no force on a hand that follows it at its own speed: all force comes from river 2.
-    way = np.linspace(-0.03, 0.03, 121)
+    places = np.linspace(-0.03, 0.03, 121)
     alone = _felt_forces(HigherOrder(second, *scale, "discrete"), np.zeros(1))
-    a, b, c = (_felt_forces(field, way) for field in (pair, smooth, discrete))
-    at = len(way) // 2
+    a, b, c = (_felt_forces(field, places) for field in (pair, smooth, discrete))
+    at = len(places) // 2
     return Crossing(degrees, a[at], b[at], c[at], alone[0], a.max(), b.max(), c.max())
 
 
-def _felt_forces(field: Law, way: Array) -> Array:
+def _felt_forces(field: Law, places: Array) -> Array:
     """Force [N] on a hand that moves along x with the river's speed, at places x [m], one after the other."""
     program = field.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
     forces: list[float] = []
-    for x in way:
+    for x in places:
         hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
         forces.append(float(np.linalg.norm(wrench[:3])))

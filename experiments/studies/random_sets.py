@@ -53,7 +53,7 @@ JUDGING = (
 
 SECONDS = 20.0  # [s] of a run
 MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
-LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a hand is hardly pushed over
+LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
 _STRIDE = 5  # every fifth frame of the animation is measured: 100 a second
 
 
@@ -102,8 +102,8 @@ def _rest_clip(clip: Clip) -> Clip:
 def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure.
 
-    On rivers, a longer one is divided into laps of 6 s at most. On a lifted map the hand follows the first clip's
-    curve, at that clip's pace.
+    On rivers, a longer lap is divided into laps of 6 s at most. On a lifted map the hand follows the curve of the first
+    clip, at that clip's pace.
     """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]

@@ -29,7 +29,7 @@ _RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
 def stated_residuals(page: str) -> dict[str, tuple[float, float]]:
     """Commands in the rows of a page, with the lowest and highest residual [%] that each row states."""
     found = ((shlex.join(shlex.split(line)), _RESIDUAL.search(measured)) for line, measured in _ROW.findall(page))
-    return {line: (float(says[1]), float(says[2] or says[1])) for line, says in found if says is not None}
+    return {line: (float(stated[1]), float(stated[2] or stated[1])) for line, stated in found if stated is not None}
 
 
 def measured(line: str, folder: Path, core: str) -> tuple[float, bool]:

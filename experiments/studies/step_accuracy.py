@@ -132,9 +132,9 @@ def off_path(p: Array, other: Array) -> Array:
     Array
         Shape (n, 3) [m]; the whole difference where the other path stands still.
     """
-    way, apart = np.gradient(other, axis=0), p - other
-    speed = np.linalg.norm(way, axis=1, keepdims=True)
-    along = np.divide(way, speed, out=np.zeros_like(way), where=speed > 0.0)
+    tangent, apart = np.gradient(other, axis=0), p - other
+    speed = np.linalg.norm(tangent, axis=1, keepdims=True)
+    along = np.divide(tangent, speed, out=np.zeros_like(tangent), where=speed > 0.0)
     return apart - np.sum(apart * along, axis=1, keepdims=True) * along
 
 

@@ -148,13 +148,13 @@ def onset(acceleration: Array, seconds: float, friction: float) -> float:
 
 def trial(motion: BodyMotion, example: Mapping[str, Any], friction: float) -> TurnTrial:
     """Test the claim of a counterexample of the verdict ``turns`` in MuJoCo."""
-    way = motion.com[example["start"] : example["end"] + 1]
-    seconds, acceleration = (len(way) - 1) / motion.fps, np.asarray(example["acceleration"])
+    path = motion.com[example["start"] : example["end"] + 1]
+    seconds, acceleration = (len(path) - 1) / motion.fps, np.asarray(example["acceleration"])
     return TurnTrial(
         rate=example["rate"],
         onset=onset(acceleration, seconds, friction),
         bound=example["distance"],
-        miss=follow(way, motion.fps, np.asarray(example["velocity"]), friction).miss,
+        miss=follow(path, motion.fps, np.asarray(example["velocity"]), friction).miss,
         miss_of_mean=parabola(acceleration, seconds, friction, 1.0).miss,
     )
 

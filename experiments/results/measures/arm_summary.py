@@ -12,7 +12,7 @@ _START_TIME = 1.0  # [s] in which the arm, initially at rest, catches up with th
 
 @dataclass(frozen=True)
 class ArmSummary:
-    """Measures of a robot arm; the first second is left out of what is tracked.
+    """Measures of a robot arm; those of tracking leave out the first second.
 
     Attributes
     ----------

@@ -94,11 +94,11 @@ def twin_figure(recording: Recording) -> Figure:
 def servo_figure(recording: Recording) -> Figure:
     """Complementary distribution of computing time and lateness of the ticks."""
     figure, (axes,) = _panels(1)
-    for name, color, says in (("compute", FIELD, "computing"), ("lateness", AXES[1], "late")):
+    for name, color, label in (("compute", FIELD, "computing"), ("lateness", AXES[1], "late")):
         values = np.sort(np.maximum(1e-6, recording.channel("ticks", name)[:]))
         share = 1.0 - np.arange(len(values)) / len(values)
         ranks = np.unique(np.geomspace(1, len(values), 500).astype(int))
-        axes.loglog(1e6 * values[-ranks], share[-ranks], color=color, label=says)
+        axes.loglog(1e6 * values[-ranks], share[-ranks], color=color, label=label)
     period = 1e6 / recording.rates["ticks"]
     axes.axvline(period, color="#222a38", lw=0.8, ls=(0, (4, 3)), label="a period")
     axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="share of ticks")
@@ -110,11 +110,11 @@ def link_figure(recording: Recording) -> Figure:
     """Quality of the link: round trip, staleness and jitter; readings lost and refused, deadlines missed."""
     figure, (times, counts) = _panels(2)
     t = _thinned_rows(recording, "t")
-    for name, color, says in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
+    for name, color, label in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
                               ("jitter", AXES[0], "jitter")):  # fmt: skip
         values = 1e6 * _thinned_rows(recording, name)
         if np.isfinite(values).any():
-            times.plot(t, values, color=color, lw=0.8, label=says)
+            times.plot(t, values, color=color, lw=0.8, label=label)
     times.set(title="how the device answers", ylabel="[µs]", yscale="log")
     for name, color in (("lost", FIELD), ("refused", AXES[1]), ("missed", "#9aa3b2")):
         counts.plot(

@@ -42,7 +42,7 @@ def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
 
 def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:
     """The map by which the tool of an arm follows the stylus in front of it, its displacements scaled [1]."""
-    near, far = (way / scale for way in _TOOL_RANGE)
+    near, far = (distance / scale for distance in _TOOL_RANGE)
     return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, (near, far), _TURN_RANGE, float(_ARM_ANGLE))
 
 

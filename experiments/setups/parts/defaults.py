@@ -48,12 +48,12 @@ def resolved(config: RunConfig) -> RunConfig:
 
 
 def river_gains(mode: Rivers) -> tuple[float, float]:
-    """k_r [N/m] and b_d [N s/m] of rivers; what is not set has the default about a circle."""
+    """k_r [N/m] and b_d [N s/m] of rivers; gains that are not set have their defaults about a circle."""
     return mode.stiffness or _RIVER_GAINS["stiffness"], mode.damping or _RIVER_GAINS["damping"]
 
 
 def tube_gains(mode: Stretch | StretchThenFollow) -> tuple[float, float]:
-    """k_f [N/m] and damping [N s/m] of a tube; what is not set has the default about a circle."""
+    """k_f [N/m] and damping [N s/m] of a tube; gains that are not set have their defaults about a circle."""
     return (
         _TUBE_GAINS["seek"] if mode.seek is None else mode.seek,
         _TUBE_GAINS["tube_damping"] if mode.tube_damping is None else mode.tube_damping,

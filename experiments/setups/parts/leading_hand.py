@@ -22,8 +22,8 @@ def s_curve() -> Trajectory:
     headings = np.concatenate([turn, turn[-2::-1]])
     steps = radius * (turn[1] - turn[0])
     middle = 0.5 * (headings[1:] + headings[:-1])
-    ways = np.stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))], axis=1) * steps
-    points = np.array([_START_X, 0.0, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
+    steps_taken = np.stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))], axis=1) * steps
+    points = np.array([_START_X, 0.0, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps_taken, axis=0)])
     return Trajectory(steps * np.arange(len(points)), points)
 
 

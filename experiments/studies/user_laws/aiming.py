@@ -79,11 +79,11 @@ def _first_ends(trace: Trace) -> Array:
             continue
         sign = 1.0 if k % 2 == 0 else -1.0
         move = (trace.t >= start) & (trace.t < end + AFTER)
-        way, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
+        position, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
         fastest = int(np.argmax(speed))
         stopped = np.flatnonzero(speed[fastest:] <= 0.0)
         if len(stopped):
-            ends.append(float(way[fastest + stopped[0]]))
+            ends.append(float(position[fastest + stopped[0]]))
     return np.array(ends)
 
 
