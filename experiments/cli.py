@@ -45,8 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
 
 
-def _counted_only(warning: str) -> None:
-    """Do nothing at a warning of MuJoCo's, which counts it."""
+def _ignore_warning(warning: str) -> None:
+    """Ignore a warning of MuJoCo, which keeps count of its warnings itself."""
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -59,10 +59,10 @@ def _run(arguments: Sequence[str] | None) -> int:
         command = parsed(words)
         if signal.getsignal(signal.SIGINT) is startup.stop_early:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        import mujoco  # the words of the commands are told without it
+        import mujoco  # imported late: help and error messages do not need it
 
-        # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a summary has their counts.
-        mujoco.set_mju_user_warning(_counted_only)
+        # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a run's summary counts them.
+        mujoco.set_mju_user_warning(_ignore_warning)
         return command()
     except BrokenPipeError:
         raise
@@ -70,30 +70,30 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf: {in_options(error)}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"hvf: {_by_the_system(error)}", file=sys.stderr)
+        print(f"hvf: {_system_error_message(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"hvf: stopped; {_kept(command)}", file=sys.stderr)
+        print(f"hvf: stopped; {_interruption_message(command)}", file=sys.stderr)
         return 130
 
 
-def _by_the_system(error: OSError) -> str:
+def _system_error_message(error: OSError) -> str:
     """Message for an error of the operating system; an error of a full disk does not name its file."""
     if error.errno == errno.ENOSPC:
         return "the disk is full; expected room on it, or another --out"
     return f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else str(error)
 
 
-def _kept(command: Any) -> str:
-    """What an interrupted command leaves on disk, and how to go on, in words."""
+def _interruption_message(command: Any) -> str:
+    """Message on what an interrupted command has left on disk, and how to continue."""
     from experiments.hardware.run_options import RunHardware  # imported late: they load MuJoCo and numba
     from experiments.results.folder import RECORDING
 
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
-    recorded = command.which if isinstance(command, command_class("hardware")) else command
-    if isinstance(recorded, command_class("arm") | RunHardware) and (recorded.out / RECORDING).exists():
-        return f"what was recorded until then is in {recorded.out}: hvf report {recorded.out} writes its page"
+    recorder = command.which if isinstance(command, command_class("hardware")) else command
+    if isinstance(recorder, command_class("arm") | RunHardware) and (recorder.out / RECORDING).exists():
+        return f"what was recorded until then is in {recorder.out}: hvf report {recorder.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"
@@ -110,34 +110,34 @@ def choice_of(names: Sequence[str]) -> Any:
 
 
 def parsed(words: Sequence[str]) -> Any:
-    """The command that was typed.
+    """The command that these words of the command line ask for.
 
     Raises
     ------
     ParameterError
-        If it was mistyped; tyro's boxed message is shortened to one line.
+        If they are wrong; tyro's boxed message is shortened to one line.
     """
     _refuse_empty(words)
-    words = _with_axes(words)
-    said = io.StringIO()
-    named = words[0] if words and words[0] in commands.NAMES else None
-    # The other commands' options are not even imported.
-    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if named is None else (
-        f"hvf {named}", words[1:], command_class(named)
+    words = _join_axis_values(words)
+    errors = io.StringIO()
+    command = words[0] if words and words[0] in commands.NAMES else None
+    # If a command is named, the options of the others are not imported.
+    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if command is None else (
+        f"hvf {command}", words[1:], command_class(command)
     )  # fmt: skip
     try:
-        with contextlib.redirect_stderr(said):
-            return tyro.cli(choice, prog=prog, args=rest, description=None if named else _DESCRIPTION, config=_STYLE)
+        with contextlib.redirect_stderr(errors):
+            return tyro.cli(choice, prog=prog, args=rest, description=None if command else _DESCRIPTION, config=_STYLE)
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
-        # Where a configuration part refused a value, its own message is the better one.
+        # If a part of the configuration refused a value, its own message is clearer than tyro's.
         cause: BaseException | None = ended
         while cause is not None:
             if isinstance(cause, ParameterError):
                 raise cause from None
             cause = cause.__cause__ or cause.__context__
-        raise ParameterError(_one_line(said.getvalue(), words)) from None
+        raise ParameterError(_shorten_message(errors.getvalue(), words)) from None
 
 
 def _refuse_empty(words: Sequence[str]) -> None:
@@ -146,13 +146,13 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
             raise ParameterError(f"nothing is given behind {option}; expected a value")
-    for word, behind in itertools.pairwise([*words, "--"]):
-        if word == "--clips" and behind.startswith("--"):  # tyro takes it for the default ones
+    for word, following in itertools.pairwise([*words, "--"]):
+        if word == "--clips" and following.startswith("--"):  # tyro would take the default clips
             raise ParameterError("nothing is given behind --clips; expected one or more names")
 
 
-def _with_axes(words: Sequence[str]) -> list[str]:
-    """The words with ``--up -Y`` as one: argparse takes an axis with a minus for an option, and misses the value."""
+def _join_axis_values(words: Sequence[str]) -> list[str]:
+    """Join ``--up -Y`` to one word: argparse would take an axis with a minus sign for another option."""
     joined: list[str] = []
     for word in words:
         if re.fullmatch("-[XYZ]", word) and joined and re.fullmatch(r"--[\w-]+", joined[-1]):
@@ -162,40 +162,40 @@ def _with_axes(words: Sequence[str]) -> list[str]:
     return joined
 
 
-def _one_line(said: str, words: Sequence[str]) -> str:
+def _shorten_message(message: str, words: Sequence[str]) -> str:
     """Text of tyro's first box in one line: option, value, what is expected; and where to read more."""
-    lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in said.splitlines()][1:])  # without the title
-    first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(said.split())
+    lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in message.splitlines()][1:])  # without the title
+    first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(message.split())
     first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ")
-    for pattern, expected in _MISTAKES:
-        found = re.search(pattern, first)
-        if found is not None:
-            value = found["value"]
+    for pattern, expected in _VALUE_ERRORS:
+        match = re.search(pattern, first)
+        if match is not None:
+            value = match["value"]
             option = words[words.index(value) - 1] if value in words[1:] else "an option"
             choices = sorted(set(re.findall(r"'([^']*)'", first.split("Expected")[-1])) - {"None"})
             first = f"{option} is {value!r}; expected {expected or ', '.join(choices)}"
             break
-    named = words[0] if words and words[0] in commands.NAMES else "COMMAND"
+    command = words[0] if words and words[0] in commands.NAMES else "COMMAND"
     rewordings = (
         (r"PATH (.+?)\. \(required\)", r"PATH (\1),"),
         (r"^Missing value for argument '(-\S+)'.*", r"nothing is given behind \1; expected a value"),
-        (r"^Missing value for argument '.*", f"missing from hvf {named}: PATH, or an option is mistyped"),
+        (r"^Missing value for argument '.*", f"missing from hvf {command}: PATH, or an option is mistyped"),
     )
     for pattern, better in rewordings:
         first = re.sub(pattern, better, first).rstrip(",")
-    return f"{first[0].lower()}{first[1:]}; hvf {named} --help lists what there is"
+    return f"{first[0].lower()}{first[1:]}; hvf {command} --help lists what there is"
 
 
 def _is_rule(line: str) -> bool:
     return bool(line) and set(line) <= set("─-")
 
 
-_MISTAKES = (
+_VALUE_ERRORS = (
     (r"could not convert string to float: '(?P<value>[^']*)'", "a number"),
     (r"invalid literal for int\(\) with base 10: '(?P<value>[^']*)'", "a whole number"),
     (r"invalid choice '(?P<value>[^']*)'", ""),
 )
-"""Tyro's messages on a wrong value, and what is expected; empty where tyro lists the choices itself."""
+"""Patterns of tyro's messages on a wrong value, and what is expected; empty where tyro lists the choices itself."""
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The commands of ``hvf``: ``hvf NAME`` is the class of ``NAME.py``, whose fields are its options.
 
-They are light: what a command does is imported when it is called.
+These modules import little: what a command does is imported when it is called.
 """
 
 NAMES = (

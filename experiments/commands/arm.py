@@ -8,7 +8,7 @@ from experiments.config.words import Options, config_of_options
 from experiments.console.output import Json, say
 from experiments.console.startup import STARTED
 
-_RUN = {"map": "robot-arm", "user": "push", "seconds": 12.0}
+_DEFAULTS = {"map": "robot-arm", "user": "push", "seconds": 12.0}
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Command:
         """Run."""
         from experiments.runs.run import run
 
-        otherwise = _RUN if not self.options.replay else {name: _RUN[name] for name in ("map", "seconds")}
+        otherwise = _DEFAULTS if not self.options.replay else {name: _DEFAULTS[name] for name in ("map", "seconds")}
         config = config_of_options(self.options, otherwise)
         if config.body != "robot":
             raise ParameterError(f"the map {config.map.kind} moves a figure; expected --map robot-arm, or hvf run")

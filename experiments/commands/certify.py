@@ -1,4 +1,4 @@
-"""``hvf certify``: what is certain of a field, a run, a map or a clip."""
+"""``hvf certify``: certificates of a field, a run, a map or a clip."""
 
 import sys
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 ASKED = "asked.json"
-"""What a certificate was asked for with, beside it."""
+"""File beside a certificate, with the options of the command that made it."""
 
 
-def _refuse(names: Sequence[str], beside: str, owner: str) -> None:
+def _refuse_options(names: Sequence[str], beside: str, owner: str) -> None:
     if names:
         option = "--" + names[0].replace("_", "-")
         raise ParameterError(f"{option} has no meaning with {beside}; it belongs to {owner}")
@@ -65,12 +65,12 @@ class Command:
 
     def __call__(self) -> int:
         """Certify, or verify."""
-        self._refuse_idle()
+        self._refuse_unused()
         if self.verify is None:
-            certificate = self._made()
+            certificate = self._reuse_or_make()
         else:
             try:
-                certificate = self._meant(self.verify)._checked(self.verify)
+                certificate = self._original_command(self.verify)._verify_against_inputs(self.verify)
             except ChangedInputs as error:
                 print(f"hvf: {error}", file=sys.stderr)
                 return 1
@@ -80,8 +80,8 @@ class Command:
         say(certificate.to_json(), self.json, lines)
         return 0
 
-    def _refuse_idle(self) -> None:
-        """Refuse what changes nothing beside a clip, a run, nobody's hand, or a field without clips."""
+    def _refuse_unused(self) -> None:
+        """Refuse options that have no effect on a clip, a run, a stylus without a hand, or a field without clips."""
         from experiments.setups.certified_law import of_clips
 
         words = [*given_words(self.options)]
@@ -90,24 +90,24 @@ class Command:
         if self.clip is not None:
             if self.run is not None:
                 raise ParameterError(f"{self.run} has no meaning with --clip {self.clip}; certify one, then the other")
-            _refuse([*words, *own, *hand], f"--clip {self.clip}", "a field")
+            _refuse_options([*words, *own, *hand], f"--clip {self.clip}", "a field")
         if self.run is not None:
-            _refuse(words, f"a run, whose field is as recorded in {self.run}", "a field without a run")
+            _refuse_options(words, f"a run, whose field is as recorded in {self.run}", "a field without a run")
         if self.no_hand:
-            _refuse(hand, "--no-hand", "a hand on the stylus")
+            _refuse_options(hand, "--no-hand", "a hand on the stylus")
         if self.clip is None and self.run is None and not of_clips(config_of_options(self.options)):
             judging = fields(self.tolerance)
             judged = [f"tolerance.{f.name}" for f in judging if getattr(self.tolerance, f.name) != f.default]
-            _refuse([*judged, *["friction"] * (self.friction != Judging.friction)], "a field alone", "clips")
+            _refuse_options([*judged, *["friction"] * (self.friction != Judging.friction)], "a field alone", "clips")
 
-    def _hands(self) -> HandRange:
+    def _hand_range(self) -> HandRange:
         return NO_HANDS if self.no_hand else self.hand
 
     def _judging(self) -> Judging:
         return Judging(self.tolerance, self.friction)
 
-    def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
-        """The field, and the clips that are certified with it; gains alone have none."""
+    def _config_and_clips(self) -> tuple[RunConfig, tuple[Clip, ...]]:
+        """Configuration of the field, and the clips that are certified with it; none where only gains matter."""
         from experiments.setups.certified_law import of_clips
 
         config = config_of_options(self.options)
@@ -117,14 +117,14 @@ class Command:
 
         return run_and_clips(self.run, config)
 
-    def _made(self) -> Certificate:
+    def _reuse_or_make(self) -> Certificate:
         from experiments.certify.certify import CERTIFICATE, certify_clip_into, certify_into
 
         default = "runs/certificate" if self.clip is None else f"runs/certificate-{Path(self.clip).stem}"
         folder = self.out or Path(default)
         if (folder / CERTIFICATE).exists() and not self.overwrite:
             try:
-                return self._checked(folder / CERTIFICATE)
+                return self._verify_against_inputs(folder / CERTIFICATE)
             except ChangedInputs:
                 raise SimError(
                     f"{folder}: holds a certificate of something else; choose another --out, or --overwrite it"
@@ -133,25 +133,25 @@ class Command:
             if self.clip is not None:
                 certificate = certify_clip_into(self.clip, folder, self._judging())
             else:
-                config, clips = self._what()
+                config, clips = self._config_and_clips()
                 certificate = certify_into(
-                    config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging()
+                    config, folder, self.delay, self._hand_range(), self.hand_push, clips, self._judging()
                 )
-        asked = replace(self, out=None, overwrite=False, json=False)
-        (folder / ASKED).write_bytes(TypeAdapter(Command).dump_json(asked, indent=2, exclude_defaults=True))
+        options = replace(self, out=None, overwrite=False, json=False)
+        (folder / ASKED).write_bytes(TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True))
         return certificate
 
-    def _meant(self, file: Path) -> "Command":
-        """The command as it was when a certificate was made, where nothing else is asked for."""
-        beside = file.parent / ASKED
-        if replace(self, verify=None, json=False) != Command() or not beside.exists():
+    def _original_command(self, file: Path) -> "Command":
+        """The command that made a certificate, unless this command has options of its own."""
+        options_file = file.parent / ASKED
+        if replace(self, verify=None, json=False) != Command() or not options_file.exists():
             return self
         try:
-            return from_json(Command, beside.read_bytes(), str(beside))
+            return from_json(Command, options_file.read_bytes(), str(options_file))
         except OSError as error:
-            raise ParameterError(f"{beside}: cannot be read ({error.strerror})") from None
+            raise ParameterError(f"{options_file}: cannot be read ({error.strerror})") from None
 
-    def _checked(self, file: Path) -> Certificate:
+    def _verify_against_inputs(self, file: Path) -> Certificate:
         from experiments.certify.certified_field import certificate_inputs
         from experiments.files.certificate_files import clip_inputs, verify_certificate
 
@@ -160,6 +160,6 @@ class Command:
 
             inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
         else:
-            config, clips = self._what()
-            inputs = certificate_inputs(config, self.delay, self._hands(), self.hand_push, clips, self._judging())
+            config, clips = self._config_and_clips()
+            inputs = certificate_inputs(config, self.delay, self._hand_range(), self.hand_push, clips, self._judging())
         return verify_certificate(file, inputs)

@@ -1,4 +1,4 @@
-"""``hvf clips``: the clips that are there."""
+"""``hvf clips``: list of the embedded clips."""
 
 from dataclasses import dataclass
 

@@ -29,7 +29,7 @@ class Command:
     json: Json = False
 
     def __call__(self) -> int:
-        """Convert, and say what the file was taken for."""
+        """Convert the file, and report how it was read."""
         from experiments.export.gltf import write_gltf
         from models.mocap.library import convert
         from models.mocap.readers.own_bvh import write_bvh

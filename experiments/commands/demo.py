@@ -1,4 +1,4 @@
-"""``hvf demo``: a run that shows what there is."""
+"""``hvf demo``: a run that shows the main features."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -46,13 +46,13 @@ class Doctor:
     """Print the findings as JSON."""
 
     def __call__(self) -> int:
-        """Look, measure and say."""
+        """Measure, and print the findings."""
         from experiments.hardware.doctor import findings, measured_lateness
         from experiments.hardware.link import measured_link
         from sim.devices.hardware_list import found_devices, open_device
 
         devices = found_devices()
-        looked, late = findings(devices), measured_lateness(self.seconds)
+        checks, lateness = findings(devices), measured_lateness(self.seconds)
         link = identity = None
         if self.device is not None:
             driver = open_device(self.device)
@@ -61,21 +61,22 @@ class Doctor:
             finally:
                 driver.close()
         if self.json:
-            told = {
-                "devices": [asdict(device) for device in devices], "findings": [asdict(finding) for finding in looked],
-                "lateness": late._asdict(), "device": identity and identity._asdict(), "link": link and link._asdict(),
+            output = {
+                "devices": [asdict(device) for device in devices], "findings": [asdict(finding) for finding in checks],
+                "lateness": lateness._asdict(), "device": identity and identity._asdict(),
+                "link": link and link._asdict(),
             }  # fmt: skip
-            print(json_text(told))
+            print(json_text(output))
             return 0
         for device in devices:
             print(f"device   {device.name or '-'}: {device.where()}")
             print(f"{'':9}{device.maker_and_product()}: {device.note}")
-        for finding in looked:
+        for finding in checks:
             print("\n".join(finding.lines()))
         print(
-            f"timing   a loop of 1 kHz, {late.loops} times: late by {late.p50 * 1e6:.0f} µs (p50), "
-            f"{late.p99 * 1e6:.0f} (p99), {late.p999 * 1e6:.0f} (p99.9), {late.worst * 1e6:.0f} at worst; "
-            f"{late.missed} deadlines missed"
+            f"timing   a loop of 1 kHz, {lateness.loops} times: late by {lateness.p50 * 1e6:.0f} µs (p50), "
+            f"{lateness.p99 * 1e6:.0f} (p99), {lateness.p999 * 1e6:.0f} (p99.9), {lateness.worst * 1e6:.0f} at worst; "
+            f"{lateness.missed} deadlines missed"
         )
         if identity is not None and link is not None:
             watchdog = "" if identity.watchdog or not identity.forces else "; no watchdog of its own"
@@ -135,5 +136,5 @@ class Command:
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
 
     def __call__(self) -> int:
-        """Do it."""
+        """Run the subcommand."""
         return self.which()

@@ -33,7 +33,7 @@ class Command:
     json: Json = False
 
     def __call__(self) -> int:
-        """Lift, and say what came of it."""
+        """Lift the clips, and report on the map."""
         from experiments.lifting.lift_file import lift_into
 
         with working("lifting", len(self.clips)):

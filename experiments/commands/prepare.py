@@ -37,7 +37,7 @@ class Command:
     json: Json = False
 
     def __call__(self) -> int:
-        """Prepare, and say how well-formed it is."""
+        """Prepare the file, and report how well-formed the clip is."""
         from experiments.preparation.command import prepare_file
         from experiments.preparation.prepared_file import summary
         from models.mocap.retargeting.hints import Hints
@@ -45,11 +45,11 @@ class Command:
         with working("preparing"):
             hints = Hints(self.up, self.rest_frame, self.roles, self.frame_rate)
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
-        told = {
+        output = {
             "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,
             "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
         report = outcome.made.report
         lines = [*(report.notes() if report else ()), summary(outcome)]
-        say({"lines": lines, **told}, self.json)
+        say({"lines": lines, **output}, self.json)
         return 0

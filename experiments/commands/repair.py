@@ -22,7 +22,7 @@ class Command:
     json: Json = False
 
     def __call__(self) -> int:
-        """Repair, and say what was changed."""
+        """Repair the motion, and report what was changed."""
         from experiments.flights.repair import repair_file
 
         with working("repairing"):

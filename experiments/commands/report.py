@@ -1,4 +1,4 @@
-"""``hvf report``: page and figures of a run, drawn again; of a run that was stopped, all that it would have left."""
+"""``hvf report``: page and figures of a run, drawn again; an interrupted run is completed first."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +25,6 @@ class Command:
         with working("drawing the report"):
             lines = finish(self.folder)
         page = str(self.folder / REPORT)
-        told = [*lines, f"Written: {page}; open it in a browser."]
-        say({"lines": lines, "report": page}, self.json, told)
+        lines_and_page = [*lines, f"Written: {page}; open it in a browser."]
+        say({"lines": lines, "report": page}, self.json, lines_and_page)
         return 0

@@ -1,4 +1,4 @@
-"""``hvf reproduce``: a run again, compared bit for bit."""
+"""``hvf reproduce``: a recorded run repeated and compared bit for bit."""
 
 from dataclasses import dataclass
 from pathlib import Path

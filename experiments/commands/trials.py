@@ -25,7 +25,7 @@ class Command(Where):
     json: Json = False
 
     def __call__(self) -> int:
-        """Run, and say what was found; exit code 1 if trials failed."""
+        """Run the study, and report its results; exit code 1 if trials failed."""
         from experiments.trials.study import REPORT, Study
 
         study = Study.load(self.study).with_users(self.users, self.seed)

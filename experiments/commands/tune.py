@@ -23,7 +23,7 @@ class Command(Where):
     json: Json = False
 
     def __call__(self) -> int:
-        """Tune, and say what was chosen."""
+        """Tune, and report the chosen values."""
         from dataclasses import replace
 
         from experiments.trials.design.errors import StudyError

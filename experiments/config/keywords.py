@@ -1,7 +1,7 @@
-"""Messages in the words of Python: what they call an option of the command line is there a keyword argument.
+"""Error messages for Python callers: options of the command line become keyword arguments.
 
-They are written with options. What is called from Python puts them into keywords (`in_keywords`); the command line,
-which may be what calls, prints what was written (`in_options`).
+Messages are written with options. Functions that are called from Python translate them to keywords (`in_keywords`); the
+command line, which may call the same functions, prints the original message (`in_options`).
 """
 
 import re
@@ -14,19 +14,19 @@ from models.errors import ModelError
 from sim.errors import SimError
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_OPTION = re.compile(
+_OPTION_PATTERN = re.compile(
     r"`[^`]*`"  # a whole command stays as it is typed
     r"|(?<![\w-])--(?P<chosen>mode|map|user|person|figure) (?P<kind>[a-z][a-z-]{2,})"
     r"|(?<![\w-])--(?P<name>[a-z]+(?:[-.][a-z0-9]+)*)(?: (?P<number>-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.]*\d))?"
 )
 
 
-_OPTIONS = "options"  # attribute of an error: its message as it was written, with options
+_ORIGINAL_MESSAGE = "options"  # attribute of an error: its message as written, with options
 
 
 def in_options(error: Exception) -> str:
-    """Message of an error as the command line says it, also where `in_keywords` has put it into keywords."""
-    return vars(error).get(_OPTIONS, str(error))
+    """Message of an error in terms of options, even if `in_keywords` has translated it to keywords."""
+    return vars(error).get(_ORIGINAL_MESSAGE, str(error))
 
 
 def keywords(text: str, **others: str) -> str:
@@ -37,7 +37,7 @@ def keywords(text: str, **others: str) -> str:
     text : str
         Message that names options.
     **others : str
-        Keywords of another name, by that of the option.
+        Keywords whose names differ from those of the options, by option.
     """
 
     def keyword(found: re.Match[str]) -> str:
@@ -48,22 +48,22 @@ def keywords(text: str, **others: str) -> str:
         name = found["name"].replace("-", "_")
         return others.get(name, name) + (f"={found['number']}" if found["number"] else "")
 
-    return _OPTION.sub(keyword, text)
+    return _OPTION_PATTERN.sub(keyword, text)
 
 
 def in_keywords(**others: str) -> Callable[[_F], _F]:
     """Decorator of a function that is called from Python: its errors name keywords; see `keywords`."""
 
-    def decorated(function: _F) -> _F:
+    def decorate(function: _F) -> _F:
         @wraps(function)
-        def called(*arguments: Any, **given: Any) -> Any:
+        def wrapper(*arguments: Any, **given: Any) -> Any:
             try:
                 return function(*arguments, **given)
             except (ControllerError, ModelError, SimError) as error:
-                vars(error).setdefault(_OPTIONS, str(error))
+                vars(error).setdefault(_ORIGINAL_MESSAGE, str(error))
                 error.args = (keywords(str(error), **others),)
                 raise
 
-        return cast(_F, called)
+        return cast(_F, wrapper)
 
-    return decorated
+    return decorate

@@ -97,11 +97,11 @@ class RiverClips:
 
 
 class _WithoutClips:
-    """What maps have that name no clips."""
+    """Base of maps that name no clips."""
 
     @property
     def clips(self) -> tuple[str, ...]:
-        """None by name: a file has its own, and an arm plays none."""
+        """Empty: a file has clips of its own, and an arm plays none."""
         return ()
 
     @property

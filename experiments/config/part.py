@@ -1,6 +1,6 @@
-"""What parts of a configuration are made of: frozen dataclasses, checked when they are made, by pydantic.
+"""Parts of a configuration: frozen dataclasses that pydantic validates when they are made.
 
-A part is given by keyword. One that is wrong raises `ParameterError`: the keyword, its value, what would be right.
+A part takes keyword arguments. A wrong one raises `ParameterError`, with the keyword, its value and what is expected.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from sim.errors import SimError
 
 _Part = TypeVar("_Part")
 MOST = 1e15
-"""No number of a part is larger, in SI units: its square, and that of a difference, is still a number."""
+"""Upper bound of the numbers of a part, in SI units: its square, and that of a difference, is still finite."""
 INFINITE = "Infinity"
-"""How JSON, which has no infinite number, spells one: pydantic's word."""
+"""How pydantic writes an infinite number in JSON, which has none."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="strings", arbitrary_types_allowed=True)
 
 
 def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
     """Number of a part that is `least` or more, at most `most`, by default finite; `unit` is for messages.
 
-    Without a default it stands in the annotation, where the command line is to find the default itself.
+    Without a default it is used in an annotation, and the field has an ordinary default that the command line reads.
     """
     limit = None if infinite else most
     return Field(default=default, ge=least, le=limit, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
 def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
-    """Whole number of a part from `least` on, by default within what a file's 64 bits hold."""
+    """Whole number of a part that is `least` or more and less than `below`, by default within the 64 bits of a file."""
     return Field(default=default, ge=least, lt=below)
 
 
@@ -62,7 +62,7 @@ def part(cls: type[_Part]) -> type[_Part]:
         try:
             init(self, **dict(zip(places, arguments, strict=False)), **values)
         except ValidationError as error:
-            own = error.errors()[0].get("ctx", {}).get("error")  # what the part itself raised
+            own = error.errors()[0].get("ctx", {}).get("error")  # raised by the part itself
             raise (own if isinstance(own, ParameterError) else ParameterError(one_line(error, made))) from None
 
     made.__init__ = __init__
@@ -70,16 +70,16 @@ def part(cls: type[_Part]) -> type[_Part]:
 
 
 def _schema(cls: type, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-    """Pydantic's schema of a part, in which neither text nor a truth value stands for a number, nor these for a bool.
+    """Pydantic's schema of a part, without conversion of text or bool to a number, or of these to bool.
 
     Pydantic's own strict mode is not used: it also refuses lists for tuples, and NumPy's whole numbers.
     """
-    return _uncoerced(handler.resolve_ref_schema(handler(source)), handler)
+    return _without_coercion(handler.resolve_ref_schema(handler(source)), handler)
 
 
-def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
+def _without_coercion(schema: Any, handler: GetCoreSchemaHandler) -> Any:
     if isinstance(schema, list):
-        return [_uncoerced(inner, handler) for inner in cast(list[Any], schema)]
+        return [_without_coercion(inner, handler) for inner in cast(list[Any], schema)]
     if not isinstance(schema, dict):
         return schema
     inner = cast(dict[str, Any], schema)
@@ -89,13 +89,13 @@ def _uncoerced(schema: Any, handler: GetCoreSchemaHandler) -> Any:
         if hasattr(inner["cls"], "__get_pydantic_core_schema__"):
             return schema
         del inner["ref"]  # a dataclass that is no part, such as a push
-    check = _number if kind in ("float", "int") else _truth if kind == "bool" else None
+    check = _check_number if kind in ("float", "int") else _check_bool if kind == "bool" else None
     if check is not None:
         return core_schema.no_info_before_validator_function(check, cast(CoreSchema, inner))
-    return {key: _uncoerced(value, handler) for key, value in inner.items()}
+    return {key: _without_coercion(value, handler) for key, value in inner.items()}
 
 
-def _number(value: object) -> object:
+def _check_number(value: object) -> object:
     if isinstance(value, str) and value == INFINITE:
         return np.inf
     if isinstance(value, str | bytes | bool | np.bool_):
@@ -103,7 +103,7 @@ def _number(value: object) -> object:
     return value
 
 
-def _truth(value: object) -> object:
+def _check_bool(value: object) -> object:
     if not isinstance(value, bool | np.bool_):
         raise PydanticCustomError("truth", "expected true or false")
     return value
@@ -163,7 +163,7 @@ _EXPECTED = {
     "string_too_short": "text that is not empty", "tuple_type": "a list", "dict_type": "values by name",
     "dataclass_type": "values by name, or {class_name}",
 }  # fmt: skip
-"""What is expected where pydantic's own word is of its schema."""
+"""What is expected, where pydantic's own message names types of its schema."""
 
 
 def one_line(error: ValidationError, cls: type) -> str:
@@ -172,20 +172,20 @@ def one_line(error: ValidationError, cls: type) -> str:
     place, kind, context = first["loc"], first["type"], first.get("ctx", {})
     names = [str(name) for name in place if not isinstance(name, int)]
     option = "--" + names[-1].replace("_", "-") if names else cls.__name__
-    unit = _unit(cls, place)
+    unit = _unit_text(cls, place)
     finite = ", and finite"
     if kind in ("greater_than_equal", "greater_than", "finite_number"):
         least = context.get("ge", context.get("gt"))
-        field = _field(cls, place)
+        field = _field_at(cls, place)
         if least is None and field is not None:
             least = next((getattr(m, a) for m in field.metadata for a in ("ge", "gt") if hasattr(m, a)), None)
-        opens = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
-        bound = f"more than {least:g}{unit}" if opens else f"{least:g}{unit} or more"
+        exclusive = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
+        bound = f"more than {least:g}{unit}" if exclusive else f"{least:g}{unit} or more"
         infinite = field is not None and any(getattr(m, "allow_inf_nan", None) is True for m in field.metadata)
         return f"{option} is {float(first['input']):g}; expected {bound}{'' if infinite else finite}"
     if kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_positional_argument"):
-        within = _within(cls, place[:-1])
-        known = ", ".join(field.name for field in fields(cast(Any, within)))
+        part_type = _part_at(cls, place[:-1])
+        known = ", ".join(field.name for field in fields(cast(Any, part_type)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
     if kind == "less_than_equal":
         return f"{option} is {float(first['input']):g}; expected at most {context['le']:g}{unit}"
@@ -197,7 +197,7 @@ def one_line(error: ValidationError, cls: type) -> str:
         return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
-    if kind == "value_error":  # what parts say of each other, and actions and persons of themselves
+    if kind == "value_error":  # raised by parts, actions and persons themselves
         return in_options(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
@@ -207,32 +207,32 @@ def one_line(error: ValidationError, cls: type) -> str:
     return f"{where or cls.__name__} is {first['input']!r}; {first['msg'][0].lower()}{first['msg'][1:]}"
 
 
-def _field(cls: type, place: Sequence[str | int]) -> Any:
+def _field_at(cls: type, place: Sequence[str | int]) -> Any:
     """Pydantic's field at a place of a part; None where there is none."""
     for depth in reversed(range(len(place))):
-        table = getattr(_within(cls, place[:depth]), "__pydantic_fields__", {})
+        table = getattr(_part_at(cls, place[:depth]), "__pydantic_fields__", {})
         if place[depth] in table:
             return table[place[depth]]
     return None
 
 
-def _within(cls: type, place: Sequence[str | int]) -> type:
-    """The part that is at a place of another."""
+def _part_at(cls: type, place: Sequence[str | int]) -> type:
+    """The part at a place within another part."""
     for name in place:
-        if get_origin(cls) is dict:  # of parts by name
+        if get_origin(cls) is dict:  # maps names to parts
             cls = get_args(cls)[1]
             continue
         table = getattr(cls, "__pydantic_fields__", {})
         if name in table:
             cls = table[name].annotation
-        # In a union the kind of the member, or its name, stands in the place.
+        # In a union, the place holds the kind of the member, or its name.
         cls = next((m for m in get_args(cls) if name in (getattr(m, "kind", None), getattr(m, "__name__", ""))), cls)
         members = [m for m in get_args(cls) if m is not type(None)]
         cls = members[0] if len(members) == 1 else cls
     return cls
 
 
-def _unit(cls: type, place: Sequence[str | int]) -> str:
-    field = _field(cls, place)
+def _unit_text(cls: type, place: Sequence[str | int]) -> str:
+    field = _field_at(cls, place)
     unit = (field.json_schema_extra or {}).get("unit", "") if field is not None else ""
     return f" {unit}" if unit else ""

@@ -1,4 +1,4 @@
-"""The configuration of a run: pure data, that goes to and from one JSON file and lies beside the results."""
+"""The configuration of a run: pure data, stored as one JSON file beside the results."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,7 +20,7 @@ from sim.users.person.person import Person
 from sim.world.world import BodyKind, FigureKind
 
 PERSONAL = ("exaggerate", "cut", "change", "resist", "lost")
-"""What only a person does, who sees and feels."""
+"""What only a person can do, since it takes sight and touch."""
 
 
 @part
@@ -71,28 +71,29 @@ class User:
 
     @property
     def traces(self) -> bool:
-        """Whether the hand moves along a way of its own."""
+        """Whether the hand moves along a path of its own."""
         return self.does == "trace" or self.does in PERSONAL
 
 
-_ANIMATED, _RESIDUAL = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
-_SIZE: dict[BodyKind, tuple[str, ...]] = {
+_ANIMATION_OPTIONS, _RESIDUAL_OPTIONS = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
+_MEANINGLESS_SIZES: dict[BodyKind, tuple[str, ...]] = {
     "physical": (), "kinematic": ("mass",), "none": ("stature", "mass"), "robot": ("stature", "mass")
 }  # fmt: skip
 MEANINGLESS: dict[BodyKind, tuple[str, ...]] = {
-    "physical": (), "kinematic": _RESIDUAL, "none": (*_ANIMATED, *_RESIDUAL), "robot": ("blend", *_RESIDUAL)
+    "physical": (), "kinematic": _RESIDUAL_OPTIONS, "none": (*_ANIMATION_OPTIONS, *_RESIDUAL_OPTIONS),
+    "robot": ("blend", *_RESIDUAL_OPTIONS)
 }  # fmt: skip
-"""Numbers of a figure that have no meaning for what follows the hand, whatever is played."""
+"""Numbers of a figure that have no meaning for a kind of body, whatever is played."""
 
 
 def meaningless(body: str, leads: bool) -> tuple[str, ...]:
-    """Numbers of a figure that have no meaning for what follows the hand; a figure that is led always has its size."""
-    one = cast(BodyKind, body)
-    return MEANINGLESS.get(one, ()) + (() if leads else _SIZE.get(one, ()))
+    """Numbers of a figure that have no meaning for a kind of body; the size of a led figure always has one."""
+    kind = cast(BodyKind, body)
+    return MEANINGLESS.get(kind, ()) + (() if leads else _MEANINGLESS_SIZES.get(kind, ()))
 
 
 def no_meaning(name: str, value: object, body: str) -> ParameterError:
-    """The error that a number of a figure has no meaning for what follows the hand, and for which figure it has."""
+    """The error that a number of a figure has no meaning for a kind of body; it names the figures that have it."""
     others = [other for other in get_args(FigureKind) if name not in meaningless(other, leads=False)]
     chosen = "a robot arm" if body == "robot" else f"--figure {body}"
     return ParameterError(
@@ -102,10 +103,10 @@ def no_meaning(name: str, value: object, body: str) -> ParameterError:
 
 @part
 class Figure:
-    """The figure that plays the animation; its numbers have a meaning as far as its kind has what they are about.
+    """The figure that plays the animation; its kind determines which of its numbers have a meaning.
 
-    A kinematic figure has no mass and no residual; where there is none, nothing has a size, is filtered or updated. The
-    numbers of a figure that is led always include its size, by which the floor is scaled.
+    A kinematic figure has no mass and no residual. Without a figure there is no size, no filter and no update. A led
+    figure always has its size, by which the floor is scaled.
 
     Parameters
     ----------
@@ -142,12 +143,12 @@ class Figure:
 
     @in_keywords(figure="kind")
     def check(self, leads: bool, body: BodyKind) -> None:
-        """Refuse what has no meaning for what follows the hand, where a figure is led or is not.
+        """Refuse numbers that have no meaning for a kind of body, led or not.
 
         Raises
         ------
         ParameterError
-            The number, and the kinds of figure that have it.
+            If there is one; the message names the kinds of figure that have it.
         """
         if body == "robot" and self.kind != "physical":
             raise ParameterError(f"a robot arm takes the figure's place; leave out --figure {self.kind}")
@@ -157,21 +158,21 @@ class Figure:
                 raise no_meaning(name, f"{value:g}", body)
 
     def become(self, kind: FigureKind, leads: bool) -> "Figure":
-        """The same figure as another kind; what has no meaning for that is left at its default."""
+        """The same figure as another kind; numbers that have no meaning for that kind get their defaults."""
         return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless(kind, leads)})
 
     @model_serializer(mode="wrap")
-    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What a file holds: nothing that has no meaning for the kind."""
-        return self._meant(cast(dict[str, Any], plain(self)))
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Content of a file: only numbers that have a meaning for the kind."""
+        return self._meaningful_values(cast(dict[str, Any], plain(self)))
 
-    def _meant(self, held: Mapping[str, Any]) -> dict[str, Any]:
-        """Those of the numbers that have a meaning; the size is one of a figure that is led, where it was given."""
+    def _meaningful_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Those of the numbers that have a meaning, and others that were given, such as the size of a led figure."""
         idle = meaningless(self.kind, leads=False)
-        return {name: value for name, value in held.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
+        return {name: value for name, value in values.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
 
     def __repr__(self) -> str:
-        meant = self._meant({name: getattr(self, name) for name in FIGURE_DEFAULTS})
+        meant = self._meaningful_values({name: getattr(self, name) for name in FIGURE_DEFAULTS})
         return f"Figure({', '.join(f'{name}={value!r}' for name, value in meant.items())})"
 
 
@@ -236,7 +237,7 @@ def phantom_of(device: Phantom | Replay) -> Phantom:
 
 
 LONGEST_PERIOD = 0.01
-"""Longest servo period [s]: half of a slower rate lies near the 40 Hz above which a loop's oscillation is measured."""
+"""Longest servo period [s]: half the rate of a slower servo nears the 40 Hz above which oscillation is measured."""
 
 
 @part
@@ -270,7 +271,7 @@ def check_seed(device: Device, seed: int) -> None:
 
 @part
 class RunConfig:
-    """A run: all that decides what happens.
+    """A run: everything that determines what happens.
 
     Parameters
     ----------
@@ -279,7 +280,7 @@ class RunConfig:
     map : Cylindrical, Composite, RiverClips, MapFile, RobotArm or Led
         Haptic map, with its clips and its curve.
     user, figure, device, clock
-        See there.
+        The simulated hand, the figure, the device and the rates.
     seconds : float
         Simulated time [s].
     seed : int
@@ -328,13 +329,13 @@ class RunConfig:
 
     @property
     def scene(self) -> SceneConfig:
-        """Of the world: the figure's size and the rates."""
+        """Configuration of the world: the figure's size and the rates."""
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
     @model_serializer(mode="wrap")
-    def _stored(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What a file holds: nothing of a figure in whose place there is a robot arm."""
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Content of a file: without numbers of the figure that have no meaning for a robot arm in its place."""
         held = cast(dict[str, Any], plain(self))
         if self.body == "robot":
             idle = ("kind", *meaningless("robot", leads=False))

@@ -1,7 +1,7 @@
-"""A run in words: the flat options of the command line, made from the parts of a configuration and sorted into them.
+"""Flat options of a run, as on the command line: made from the parts of a configuration, and sorted into them.
 
-Each field of a part is an option of the same name. An option that is given and does not belong to the parts that are
-chosen is refused by name: nothing is ignored.
+Each field of a part is an option of the same name. A given option that does not belong to the chosen parts is refused
+by name: nothing is ignored.
 """
 
 import types
@@ -35,11 +35,11 @@ from experiments.config.run_config import (
 from sim.users.person.population import PERSONAS, persona
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
-"""Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
+"""Optional parts of a mode: an option of its name switches one on, or any of its numbers where those default to 0."""
 _SWITCHES = ("governor", "walls")
-_USERS = ("relaxed", "trace", "push", "turn", *PERSONAL)
-_NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
-_HAND = {"user", "person", "pushes", "turns", "grabs"}
+_USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSONAL)
+_NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
+_HAND_OPTIONS = {"user", "person", "pushes", "turns", "grabs"}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Word:
 
 
 def parameters(cls: type) -> dict[str, str]:
-    """What the parameters of a part mean, by name, from its docstring."""
+    """Descriptions of the parameters of a part, by name, from its docstring."""
     described = docstring_parser.parse(cls.__doc__ or "")
     found: dict[str, str] = {}
     for parameter in described.params:
@@ -65,34 +65,34 @@ def _vocabulary() -> dict[str, Word]:
     """All options by name."""
     words: dict[str, Word] = {}
     for cls in (*MODES, *ADDED.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
-        hints, help_of = get_type_hints(cls), parameters(cls)
+        hints, help_texts = get_type_hints(cls), parameters(cls)
         for option in fields(cast(Any, cls)):
-            if option.name in _NOT_WORDS:
+            if option.name in _NON_OPTIONS:
                 continue
             default = cast(Any, cls).__pydantic_fields__[option.name].default
-            said = help_of.get(option.name, "")
+            help_text = help_texts.get(option.name, "")
             known = words.get(option.name)
             if known is None:
-                shown = f" Default: {_shown(default)}." if default not in (None, "", False) else ""
-                words[option.name] = Word(plain(hints[option.name]), said + shown, (cls,))
+                default_text = f" Default: {_default_text(default)}." if default not in (None, "", False) else ""
+                words[option.name] = Word(plain(hints[option.name]), help_text + default_text, (cls,))
             else:
                 words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
     return words
 
 
-def _shown(default: object) -> str:
+def _default_text(default: object) -> str:
     return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
 
 
 def plain(hint: Any) -> Any:
-    """The type of a word that need not be given."""
+    """The type of an option that may be left out."""
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(inner for inner in get_args(hint) if inner is not type(None))
     return hint if hint is bool or get_origin(hint) is tuple else hint | None
 
 
 def _metavar(kind: Any) -> str | None:
-    """What stands for a value in the help: a type or the choices, without the None of what need not be given."""
+    """Placeholder of a value in the help: a type or the choices, without None."""
     inner = [k for k in get_args(kind) if k is not type(None)] if type(None) in get_args(kind) else []
     if not inner:
         return None
@@ -106,7 +106,7 @@ VOCABULARY = _vocabulary()
 def run_config(
     mode: str = "follow", map: str = "", user: str = "", figure: str = "physical", replay: str = "", **words: object
 ) -> RunConfig:
-    """A run in words, as the command line takes them.
+    """Configuration of a run from options, as on the command line.
 
     Parameters
     ----------
@@ -126,12 +126,12 @@ def run_config(
     Raises
     ------
     ParameterError
-        If there is no such mode, map or word, a word does not belong to what is chosen, or a number is out of its
-        interval.
+        If there is no such mode, map or option, an option does not belong to the chosen parts, or a number is out of
+        its interval.
     """
     given = dict(words)
-    _check_kinds(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
-    mode_cls = _named("mode", mode, MODES)
+    _check_option_types(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
+    mode_cls = _part_of_kind("mode", mode, MODES)
     if mode == "lead":
         wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
         if wrong:
@@ -145,30 +145,30 @@ def run_config(
         map_cls = MapFile
         given["file"] = map
     else:
-        map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
-    if mode != "lead" and user and user not in _USERS:
-        raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
+        map_cls = _part_of_kind("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
+    if mode != "lead" and user and user not in _USER_KINDS:
+        raise ParameterError(f"no user {user!r}; there are {', '.join(_USER_KINDS)}")
     if figure not in get_args(FigureKind):
         raise ParameterError(f"--figure is {figure!r}; expected {', '.join(get_args(FigureKind))}")
-    _refuse_idle(given, mode, "robot" if map_cls is RobotArm else figure, replay)
+    _refuse_meaningless(given, mode, "robot" if map_cls is RobotArm else figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
-    taken = _Words(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
-    mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
-    around = {"around": Circle(**taken.of(Circle))} if "around" in _names(map_cls) else {}
+    options = _GivenOptions(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
+    mode_part = mode_cls(**options.added(mode_cls), **options.of(mode_cls))
+    around = {"around": Circle(**options.of(Circle))} if "around" in _field_names(map_cls) else {}
     config = RunConfig(
         mode=mode_part,  # pyright: ignore[reportArgumentType]
-        map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
-        user=User(does=user or "relaxed", **_with_person(taken.of(User))),  # pyright: ignore[reportArgumentType]
-        figure=Figure(kind=figure, **taken.of(Figure)),  # pyright: ignore[reportArgumentType]
-        device=Replay(replay) if replay else Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
-        **taken.of(RunConfig, ("seconds", "seed")),
+        map=map_cls(**options.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
+        user=User(does=user or "relaxed", **_resolve_person(options.of(User))),  # pyright: ignore[reportArgumentType]
+        figure=Figure(kind=figure, **options.of(Figure)),  # pyright: ignore[reportArgumentType]
+        device=Replay(replay) if replay else Phantom(**options.of(Phantom)), clock=Clock(**options.of(Clock)),
+        **options.of(RunConfig, ("seconds", "seed")),
     )  # fmt: skip
-    taken.check_empty()
+    options.check_empty()
     return config
 
 
-def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
-    """Refuse names that are no text, switches that are neither on nor off, and what only stands inside a part."""
+def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object]) -> None:
+    """Refuse names that are not text, switches that are not bool, and fields that are not options."""
     for name, value in chosen.items():
         if not isinstance(value, str):
             raise ParameterError(f"--{name} is {value!r}; expected a name")
@@ -176,11 +176,11 @@ def _check_kinds(words: Mapping[str, object], chosen: Mapping[str, object]) -> N
         if not isinstance(words.get(name, False), bool):
             raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
     for name in sorted({"around", "does", "file", "orientation", "run"} & words.keys()):
-        raise _unknown(f"--{name}")
+        raise _unknown_option(f"--{name}")
 
 
-def _refuse_idle(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
-    """Refuse words that change nothing beside what is chosen, also if their value is the default."""
+def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
+    """Refuse options that have no effect on the chosen parts, even if their value is the default."""
     for name in meaningless(body, mode == "lead"):
         if name in given:
             raise no_meaning(name, given[name], body)
@@ -190,75 +190,75 @@ def _refuse_idle(given: Mapping[str, object], mode: str, body: str, replay: str)
         raise ParameterError(NO_DRAG)
 
 
-def _unknown(option: str) -> ParameterError:
+def _unknown_option(option: str) -> ParameterError:
     return ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
 
 
-def _with_person(words: dict[str, Any]) -> dict[str, Any]:
-    """Words of a user, with a person who is given by name."""
+def _resolve_person(words: dict[str, Any]) -> dict[str, Any]:
+    """Options of a user, with the person in place of a person's name."""
     named = words.get("person")
     return words | {"person": persona(named)} if isinstance(named, str) else words
 
 
-def _named(what: str, name: str, parts: tuple[type, ...]) -> Any:
-    kinds = _kinds(parts)
+def _part_of_kind(what: str, name: str, parts: tuple[type, ...]) -> Any:
+    kinds = _parts_by_kind(parts)
     if name not in kinds:
         known = ", ".join(kinds)
         raise ParameterError(f"no {what} {name!r}; there are {known}" + (", or give a file (.npz)" * (what == "map")))
     return kinds[name]
 
 
-def _kinds(parts: tuple[type, ...]) -> dict[str, type]:
+def _parts_by_kind(parts: tuple[type, ...]) -> dict[str, type]:
     return {cast(Any, cls).__pydantic_fields__["kind"].default: cls for cls in parts}
 
 
-def _names(cls: type) -> set[str]:
+def _field_names(cls: type) -> set[str]:
     return {option.name for option in fields(cast(Any, cls))} - {"kind"}
 
 
-class _Words:
-    """Words that are given, as they are taken by the parts they belong to."""
+class _GivenOptions:
+    """Given options, from which each part takes those that belong to it."""
 
     def __init__(self, given: dict[str, object], chosen: str):
         self._given, self._chosen = given, chosen
 
     def of(self, cls: type, names: Iterable[str] = ()) -> dict[str, Any]:
-        """Take those of a part, or of some of its names."""
-        return {name: self._given.pop(name) for name in sorted(names or _names(cls)) if name in self._given}
+        """Take the options of a part, or those of the given names."""
+        return {name: self._given.pop(name) for name in sorted(names or _field_names(cls)) if name in self._given}
 
     def added(self, mode: type) -> dict[str, Any]:
-        """Take the parts that are added to a mode."""
+        """Take the optional parts of a mode."""
         found: dict[str, Any] = {}
         for name, cls in ADDED.items():
-            if name not in _names(mode):
+            if name not in _field_names(mode):
                 continue
             switched = bool(self._given.pop(name, False))
-            if switched or (name not in _SWITCHES and _names(cls) & self._given.keys()):
+            if switched or (name not in _SWITCHES and _field_names(cls) & self._given.keys()):
                 found[name] = cast(Any, cls)(**self.of(cls))
         return found
 
     def check_empty(self) -> None:
-        """Refuse what no part has taken."""
-        left = {name: value for name, value in self._given.items() if value is not False}
-        if not left:
+        """Refuse options that no part has taken."""
+        remaining = {name: value for name, value in self._given.items() if value is not False}
+        if not remaining:
             return
-        name = next(iter(left))
-        owners = [_kind(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
+        name = next(iter(remaining))
+        owners = [_choice_option(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
         if name in ADDED:
-            owners = [_kind(cls) for cls in MODES if name in _names(cls)]
+            owners = [_choice_option(cls) for cls in MODES if name in _field_names(cls)]
         option = "--" + name.replace("_", "-")
         if not owners:
-            raise _unknown(option)
+            raise _unknown_option(option)
         raise ParameterError(f"{option} has no meaning with {self._chosen}; it belongs to {', '.join(owners)}")
 
 
-def _kind(cls: type) -> str:
+def _choice_option(cls: type) -> str:
     """How a part is chosen on the command line."""
     added = next((name for name, part in ADDED.items() if part is cls), None)
     if added in _SWITCHES:
         return f"--{added}"
     if added is not None:
-        return ", ".join(_kind(mode) for mode in MODES if added in _names(mode))
+        return ", ".join(_choice_option(mode) for mode in MODES if added in _field_names(mode))
     kind = cast(Any, cls).__pydantic_fields__.get("kind")
     what = "--map" if cls in MAPS else "--mode"
     if cls is MapFile:
@@ -271,7 +271,7 @@ def _kind(cls: type) -> str:
 
 
 def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
-    """Field of a dataclass of options: its name, its type with what the help shows of it, and its default."""
+    """Field of a dataclass of options: its name, its type with its help, and its default."""
     shown = tyro.conf.arg(help=text, help_behavior_hint="", metavar=_metavar(kind))
     return name, Annotated[kind, shown], field(default=default)
 
@@ -283,9 +283,9 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     """Fields of the options' dataclass."""
     top = parameters(RunConfig)
     yield option("config", Path | None, CONFIG_HELP, None)
-    yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
+    yield option("mode", str, "Field of force: " + ", ".join(_parts_by_kind(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, robot-arm, or a map's file (.npz).", "")
-    yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")
+    yield option("user", str, "The simulated hand: " + ", ".join(_USER_KINDS) + "; the last five of a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("replay", str, "Folder of a run whose hand is replayed: it moves as recorded, whatever the force.", "")
@@ -298,20 +298,20 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
 
 
 RunOptions = make_dataclass("RunOptions", list(_options()), frozen=True)
-"""The options of a run as the command line takes them; all but those of its parts are left out."""
+"""The options of a run on the command line; one that is not given is None, False or empty."""
 Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="run")]  # pyright: ignore
-"""The same for a command that has them among its own."""
+"""`RunOptions` as a field of a command that has options of its own too."""
 
 
 def given_words(options: object) -> dict[str, Any]:
     """Options that are given, by name."""
     given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
-    # A zero is given, although it equals False.
+    # A zero counts as given, although it equals False.
     return {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
 
 
 def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingProxyType({})) -> RunConfig:
-    """The configuration that options ask for; those that are given change the one of ``--config``, or else `otherwise`.
+    """The configuration that options ask for: given options change that of ``--config``, or else those of `otherwise`.
 
     Raises
     ------
@@ -324,34 +324,34 @@ def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingPro
 
 
 def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
-    """A configuration with some of its words changed; a mode or a map of another kind begins with its own defaults.
+    """A configuration with some options changed; a mode or a map of another kind starts from its own defaults.
 
     Raises
     ------
     ParameterError
         As `run_config`.
     """
-    kept, left = words_of(config), set[str]()
+    unchanged, dropped = words_of(config), set[str]()
     mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
     leads = (mode == "lead") != config.leads
     if mode != config.mode.kind:
-        left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
+        dropped |= _field_names(type(config.mode)).union(ADDED, *(_field_names(cls) for cls in ADDED.values()))
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
-        left |= _names(type(config.map)) | _names(Circle) | {"map"}
+        dropped |= _field_names(type(config.map)) | _field_names(Circle) | {"map"}
     if leads:
-        left |= {"user", "pushes", "turns", "grabs"}
+        dropped |= {"user", "pushes", "turns", "grabs"}
     if words.get("replay"):
-        left |= _HAND | _names(Phantom) | {"seed"}
-    if mode == "rivers" and gates(str(words.get("crossing", kept.get("crossing")))):
-        left.add("governor_drag")
+        dropped |= _HAND_OPTIONS | _field_names(Phantom) | {"seed"}
+    if mode == "rivers" and gates(str(words.get("crossing", unchanged.get("crossing")))):
+        dropped.add("governor_drag")
     body = "robot" if map == RobotArm.kind else str(words.get("figure", config.figure.kind))
-    left |= set(meaningless(body, mode == "lead"))
-    kept = {name: value for name, value in kept.items() if name not in left}
-    return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
+    dropped |= set(meaningless(body, mode == "lead"))
+    unchanged = {name: value for name, value in unchanged.items() if name not in dropped}
+    return run_config(**(unchanged | dict(words)))  # pyright: ignore[reportArgumentType]
 
 
 def words_of(config: RunConfig) -> dict[str, object]:
-    """A configuration in words: the inverse of `run_config`."""
+    """The options of a configuration: the inverse of `run_config`."""
     words: dict[str, object] = {
         "seconds": config.seconds,
         "seed": config.seed,
@@ -361,11 +361,15 @@ def words_of(config: RunConfig) -> dict[str, object]:
     if not config.leads:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
-        words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", "run", *ADDED, "around"}}
+        words |= {
+            name: getattr(part, name) for name in _field_names(type(part)) - {"does", "file", "run", *ADDED, "around"}
+        }
     for name, cls in ADDED.items():
         part = getattr(config.mode, name, None)
         if part is not None:
-            words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
+            words |= {word: getattr(part, word) for word in _field_names(cls)} | (
+                {name: True} if name in _SWITCHES else {}
+            )
     idle = set(meaningless(config.body, config.leads))
     if isinstance(config.mode, Rivers) and gates(config.mode.crossing):
         idle.add("governor_drag")

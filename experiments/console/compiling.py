@@ -19,8 +19,8 @@ def compile_once(console: Console, units: Sequence[Unit]) -> None:
         return
     console.print("Compiling what this run needs; it is kept until that changes.")
     columns = (TextColumn("compiling"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
-    told = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[names]}"))
-    with Progress(*columns, *told, console=console) as progress:
+    time_columns = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[names]}"))
+    with Progress(*columns, *time_columns, console=console) as progress:
         task = progress.add_task("", total=len(waiting), names=_names(waiting))
 
         def done(unit: Unit) -> None:

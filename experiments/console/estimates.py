@@ -13,13 +13,14 @@ from sim.recording.recorder import DISK_RESERVE, Group
 
 SIMULATING = "a simulated second"
 """Name under which the wall-clock time per simulated second is stored."""
-_LEAST = 400.0  # bytes per tick that every run records: measurements, forces, motor commands
-_LONG, _LARGE = 60.0, 1e9  # [s] of real time and [bytes] from which a run announces what it will take
+_MIN_BYTES_PER_TICK = 400.0  # bytes per tick that every run records: measurements, forces, motor commands
+# [s] of real time and [bytes] from which a run announces what it will take
+_MIN_ANNOUNCED_TIME, _MIN_ANNOUNCED_SIZE = 60.0, 1e9
 
 
 def check_length(out: Path, seconds: float, servo_period: float) -> None:
     """Refuse a run whose recording cannot fit on the disk, however little it records, before anything is made."""
-    _check(out, seconds, _LEAST / servo_period)
+    _check_disk_space(out, seconds, _MIN_BYTES_PER_TICK / servo_period)
 
 
 def foreseen(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | None:
@@ -31,39 +32,42 @@ def foreseen(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | No
         If its recording does not fit on the disk.
     """
     rate = sum(8.0 * g.rate * sum(int(np.prod(shape)) for shape in g.channels.values()) for g in groups.values())
-    _check(out, seconds, rate)
+    _check_disk_space(out, seconds, rate)
     a_second, size = expected_seconds(SIMULATING), seconds * rate
-    takes = None if a_second is None else a_second * seconds
-    if size < _LARGE and (takes or 0.0) < _LONG:
+    real_time = None if a_second is None else a_second * seconds
+    if size < _MIN_ANNOUNCED_SIZE and (real_time or 0.0) < _MIN_ANNOUNCED_TIME:
         return None
-    time = "" if takes is None else f"about {_duration(takes)} at the pace of the last run, and "
-    return f"{seconds:g} s of simulated time take {time}{_size(size)} of disk; {_size(_free(out))} are free"
+    time = "" if real_time is None else f"about {_duration_text(real_time)} at the pace of the last run, and "
+    return (
+        f"{seconds:g} s of simulated time take {time}{_size_text(size)} of disk; "
+        f"{_size_text(_free_bytes(out))} are free"
+    )
 
 
-def _check(out: Path, seconds: float, rate: float) -> None:
-    size, free = seconds * rate, _free(out)
+def _check_disk_space(out: Path, seconds: float, rate: float) -> None:
+    size, free = seconds * rate, _free_bytes(out)
     if size + DISK_RESERVE > free:
         raise ParameterError(
-            f"--seconds is {seconds:g}: a recording of {_size(size)} or more, and {_size(free)} are free where {out} "
-            f"is; expected less than {max(0.0, free - DISK_RESERVE) / rate:.3g} s"
+            f"--seconds is {seconds:g}: a recording of {_size_text(size)} or more, and {_size_text(free)} are free "
+            f"where {out} is; expected less than {max(0.0, free - DISK_RESERVE) / rate:.3g} s"
         )
 
 
-def _free(out: Path) -> float:
+def _free_bytes(out: Path) -> float:
     """Free bytes on the file system where a folder is or will be; infinite where it has no size, such as ``/proc``."""
     there = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.exists())
     total, _, free = shutil.disk_usage(there)
     return float(free) if total else math.inf
 
 
-def _size(size: float) -> str:
+def _size_text(size: float) -> str:
     for unit, factor in (("TB", 1e12), ("GB", 1e9)):
         if size >= factor:
             return f"{size / factor:.3g} {unit}"
     return f"{size / 1e6:.3g} MB"
 
 
-def _duration(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     for unit, factor in (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * factor:
             return f"{seconds / factor:.0f} {unit}"

@@ -13,10 +13,10 @@ from rich.text import Text
 
 from sim.compilation.unit_cache import cache_folder
 
-_WORTH_KEEPING = 2.0  # [s]; shorter durations are not stored
+_MIN_STORED_DURATION = 2.0  # [s]; shorter durations are not stored
 
 
-class _Left(ProgressColumn):
+class _RemainingTimeColumn(ProgressColumn):
     """Column of the elapsed time and the expected remaining time."""
 
     def __init__(self, expected: float | None):
@@ -50,12 +50,12 @@ def working(what: str, share: float = 1.0) -> Generator[None]:
     """
     console, began = Console(stderr=True), time.perf_counter()
     seconds = expected_seconds(what)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), _Left(seconds and share * seconds))
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), _RemainingTimeColumn(seconds and share * seconds))
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         bar.add_task(what, total=None)
         yield
     taken = time.perf_counter() - began
-    if taken > _WORTH_KEEPING:
+    if taken > _MIN_STORED_DURATION:
         keep_seconds(what, taken / share)
 
 
@@ -70,29 +70,31 @@ def simulating(console: Console, seconds: float) -> Generator[Callable[[float], 
 
 def expected_seconds(what: str) -> float | None:
     """Duration per unit of some work the last time on this machine [s]; None if it is not known."""
-    return _kept().get(what)
+    return _stored_durations().get(what)
 
 
-def _file() -> Path:
+def _durations_file() -> Path:
     return cache_folder() / "durations.json"
 
 
-def _kept() -> dict[str, float]:
-    """Stored durations [s] by name; empty if the file is missing or unreadable, as they are only a help."""
+def _stored_durations() -> dict[str, float]:
+    """Stored durations [s] by name; empty if the file is missing or unreadable, as they only serve estimates."""
     try:
-        kept = json.loads(_file().read_text(encoding="utf-8"))
+        stored = json.loads(_durations_file().read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    if not isinstance(kept, dict):
+    if not isinstance(stored, dict):
         return {}
-    items = cast(dict[str, object], kept).items()
+    items = cast(dict[str, object], stored).items()
     return {name: float(value) for name, value in items if isinstance(value, int | float) and value > 0.0}
 
 
 def keep_seconds(what: str, seconds: float) -> None:
     """Store the duration of one unit of some work [s]; a file that cannot be written is ignored."""
     try:
-        _file().parent.mkdir(parents=True, exist_ok=True)
-        _file().write_text(json.dumps(_kept() | {what: float(f"{seconds:.3g}")}), encoding="utf-8")
+        _durations_file().parent.mkdir(parents=True, exist_ok=True)
+        _durations_file().write_text(
+            json.dumps(_stored_durations() | {what: float(f"{seconds:.3g}")}), encoding="utf-8"
+        )
     except OSError:
         return

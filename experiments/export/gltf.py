@@ -17,10 +17,10 @@ from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.motion.clip import Clip
 from sim.viewer.shapes import body_shapes, coarser
 
-_TO_FILE = [1, 2, 0]
+_AXIS_ORDER = [1, 2, 0]
 _FLOAT, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT = 5126, 5121, 5123, 5125
-_VERTICES, _INDICES = 34962, 34963  # targets of buffer views
-_CELL = 0.003  # [m] size of the finest detail that is kept: half the vertices, without a visible difference
+_VERTEX_TARGET, _INDEX_TARGET = 34962, 34963  # targets of buffer views
+_DETAIL_SIZE = 0.003  # [m] size of the finest detail that is kept: half the vertices, without a visible difference
 
 
 class _Buffer:
@@ -90,20 +90,20 @@ def write_gltf(clip: Clip, path: Path) -> None:
 
 def _add_skeleton(library: Any, document: Any, model: mujoco.MjModel, clip: Clip) -> Array:
     """Add nodes of the joints in the clip's first pose, and of the skin; returns rest positions (18, 3) [m]."""
-    places = np.zeros((len(SEGMENTS), 3))
+    positions = np.zeros((len(SEGMENTS), 3))
     for index, segment in enumerate(SEGMENTS):
         offset = np.asarray(model.body(segment.body).pos) if index else rest_pose()[:3]
-        places[index] = offset + (places[segment.parent] if index else 0.0)
+        positions[index] = offset + (positions[segment.parent] if index else 0.0)
         start = clip.poses[0, :3] if index == 0 else offset
         document.nodes.append(
             library.Node(
-                name=segment.joint, translation=start[_TO_FILE].tolist(),
+                name=segment.joint, translation=start[_AXIS_ORDER].tolist(),
                 rotation=_rotations(clip.poses[:1], index)[0].tolist(),
                 children=[k for k, other in enumerate(SEGMENTS) if other.parent == index],
             )
         )  # fmt: skip
     document.nodes.append(library.Node(name="figure", mesh=0, skin=0))
-    return places
+    return positions
 
 
 def _rotations(poses: Array, index: int) -> Array:
@@ -115,23 +115,23 @@ def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjMode
     """Add a mesh of the visible shapes of the figure at rest; each vertex is bound to one joint."""
     bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
     by_color: dict[tuple[float, ...], list[tuple[int, Array, IntArray]]] = {}
-    for shape in coarser(body_shapes(model, ""), _CELL):
+    for shape in coarser(body_shapes(model, ""), _DETAIL_SIZE):
         by_color.setdefault(shape.rgba, []).append((bodies[shape.body], shape.vertices, shape.faces))
     primitives: list[Any] = []
     for color, shapes in by_color.items():
         first = np.cumsum([0] + [len(vertices) for _, vertices, _ in shapes])
-        points = np.concatenate([vertices + rest[joint] for joint, vertices, _ in shapes])[:, _TO_FILE]
+        points = np.concatenate([vertices + rest[joint] for joint, vertices, _ in shapes])[:, _AXIS_ORDER]
         joints = np.zeros((len(points), 4))
         joints[:, 0] = np.concatenate([np.full(len(vertices), joint) for joint, vertices, _ in shapes])
         weights = np.tile([255, 0, 0, 0], (len(points), 1))
         faces = np.concatenate([faces + start for (_, _, faces), start in zip(shapes, first[:-1], strict=True)])
         attributes = library.Attributes(
-            POSITION=buffer.add(points, "VEC3", _FLOAT, _VERTICES),
-            JOINTS_0=buffer.add(joints, "VEC4", _UNSIGNED_BYTE, _VERTICES),
-            WEIGHTS_0=buffer.add(weights, "VEC4", _UNSIGNED_BYTE, _VERTICES, shares=True),
+            POSITION=buffer.add(points, "VEC3", _FLOAT, _VERTEX_TARGET),
+            JOINTS_0=buffer.add(joints, "VEC4", _UNSIGNED_BYTE, _VERTEX_TARGET),
+            WEIGHTS_0=buffer.add(weights, "VEC4", _UNSIGNED_BYTE, _VERTEX_TARGET, shares=True),
         )
-        whole = _UNSIGNED_SHORT if len(points) < 0xFFFF else _UNSIGNED_INT
-        indices = buffer.add(faces.ravel(), "SCALAR", whole, _INDICES)
+        index_type = _UNSIGNED_SHORT if len(points) < 0xFFFF else _UNSIGNED_INT
+        indices = buffer.add(faces.ravel(), "SCALAR", index_type, _INDEX_TARGET)
         linear = [share**2.2 for share in color[:3]]  # glTF's colours are linear
         document.materials.append(
             library.Material(
@@ -145,7 +145,7 @@ def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjMode
         )
     document.meshes.append(library.Mesh(name="figure", primitives=primitives))
     inverse = np.tile(np.eye(4), (len(rest), 1, 1))
-    inverse[:, :3, 3] = -rest[:, _TO_FILE]
+    inverse[:, :3, 3] = -rest[:, _AXIS_ORDER]
     columns = inverse.transpose(0, 2, 1).reshape(len(rest), 16)
     document.skins.append(
         library.Skin(
@@ -164,7 +164,7 @@ def _add_motion(library: Any, document: Any, buffer: _Buffer, clip: Clip) -> Non
         target = library.AnimationChannelTarget(node=node, path=what)
         channels.append(library.AnimationChannel(sampler=len(samplers) - 1, target=target))
 
-    animate(0, "translation", clip.poses[:, _TO_FILE], "VEC3")
+    animate(0, "translation", clip.poses[:, _AXIS_ORDER], "VEC3")
     for index in range(len(SEGMENTS)):
         animate(index, "rotation", _rotations(clip.poses, index), "VEC4")
     document.animations.append(library.Animation(name=clip.name, samplers=samplers, channels=channels))

@@ -14,7 +14,7 @@ from experiments.files.whole_file import whole_file
 from sim.errors import SimError
 
 VERSION = 1
-_MAKERS = {"map": "hvf lift", "field": "save_field"}
+_WRITERS = {"map": "hvf lift", "field": "save_field"}
 Content = TypeVar("Content")
 
 
@@ -40,21 +40,21 @@ def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
 
 
 def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]], Content]], what: str) -> Content:
-    """What a file holds that `write_archive` wrote, made again from its arrays.
+    """Content of a file that `write_archive` wrote, rebuilt from its arrays.
 
     Parameters
     ----------
     path : Path
         The file.
     kinds : mapping of str to callable
-        Kinds of content that are accepted, and what makes them from arrays.
+        Accepted kinds of content, and the functions that rebuild them from arrays.
     what : str
         Their common name in messages.
 
     Raises
     ------
     SimError
-        If the file cannot be read, is damaged, of another kind or version, or its content is not what it should be.
+        If the file cannot be read, is damaged, of another kind or version, or its content is invalid.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
@@ -63,7 +63,7 @@ def load_archive(path: Path, kinds: Mapping[str, Callable[[Mapping[str, Array]],
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a {what}") from None
     except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        raise SimError(f"{path}: is no file of a {what}, or damaged; expected what {_MAKERS[what]} writes") from None
+        raise SimError(f"{path}: is no file of a {what}, or damaged; expected what {_WRITERS[what]} writes") from None
     if version != VERSION:
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
     if kind not in kinds:

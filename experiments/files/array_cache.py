@@ -37,9 +37,9 @@ def kept_array(
     find : callable
         Computes the result.
     """
-    path = _path(folder, name, made_of)
-    if (kept := _read(path, shape)) is not None:
-        return kept
+    path = _cache_file(folder, name, made_of)
+    if (cached := _read(path, shape)) is not None:
+        return cached
     found = np.ascontiguousarray(find(), dtype=np.float64)
     with suppress(OSError):
         _write(path, _digest([found.ravel()]) + found.tobytes())
@@ -48,13 +48,13 @@ def kept_array(
 
 def is_kept(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
     """Whether `kept_array` would return a cached array."""
-    return _read(_path(folder, name, made_of), shape) is not None
+    return _read(_cache_file(folder, name, made_of), shape) is not None
 
 
-_SIZE = hashlib.sha256().digest_size
+_DIGEST_SIZE = hashlib.sha256().digest_size
 
 
-def _path(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
+def _cache_file(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
     return folder / f"{name}-{_digest(made_of).hex()}.kept"
 
 
@@ -63,11 +63,11 @@ def _read(path: Path, shape: tuple[int, ...]) -> Array | None:
         content = path.read_bytes()
     except OSError:
         return None
-    rows, rest = divmod(len(content) - _SIZE, 8 * int(np.prod(shape[1:])))
+    rows, rest = divmod(len(content) - _DIGEST_SIZE, 8 * int(np.prod(shape[1:])))
     if rest or rows < 0 or shape[0] not in (-1, rows):
         return None
-    kept = np.frombuffer(content[_SIZE:])
-    return kept.reshape(shape).copy() if _digest([kept]) == content[:_SIZE] else None
+    values = np.frombuffer(content[_DIGEST_SIZE:])
+    return values.reshape(shape).copy() if _digest([values]) == content[:_DIGEST_SIZE] else None
 
 
 def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:

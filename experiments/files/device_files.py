@@ -19,14 +19,14 @@ from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified
 from sim.world.linkage import Linkage, Triple
 
-_TRIPLES = ("coulomb", "viscous", "inertia")
-_FORMAT = "hvf-device-1"
-_LENGTHS = dict.fromkeys((*_TRIPLES, "offset"), 3) | {"delay": 1, "weight": 2}
-_KNOWN = ("format", *_LENGTHS, "calibration", "windows", "unexplained", "recordings")
-_MOST = 1e3
+_JOINT_QUANTITIES = ("coulomb", "viscous", "inertia")
+_FORMAT_NAME = "hvf-device-1"
+_VALUE_COUNTS = dict.fromkeys((*_JOINT_QUANTITIES, "offset"), 3) | {"delay": 1, "weight": 2}
+_KNOWN_KEYS = ("format", *_VALUE_COUNTS, "calibration", "windows", "unexplained", "recordings")
+_MAX_PARAMETER = 1e3
 """Bound that no parameter can reach, in any of the units [N m], [N m s/rad], [kg m²], [s], [rad]."""
-_TORQUE = max(PREMIUM_1_5.peak_torque)
-"""Friction and weight that no motor can overcome [N m]: with them nothing moves."""
+_MAX_TORQUE = max(PREMIUM_1_5.peak_torque)
+"""Bound of friction and weight [N m]: the motors cannot overcome more."""
 
 
 class Calibration(NamedTuple):
@@ -70,15 +70,15 @@ def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[
     def entry(names: Sequence[str]) -> dict[str, object]:
         return {"value": [values[name] for name in names], "margin": [margins[name] for name in names]}
 
-    taken_off = linkage_from(base).offset
+    subtracted = linkage_from(base).offset
     first = cast(dict[str, list[float | None]], base.get("offset", {})).get("margin", [None])[0]
     return {
         **base,
-        "format": _FORMAT,
-        **{quantity: entry([f"{quantity}{i}" for i in (1, 2, 3)]) for quantity in _TRIPLES},
+        "format": _FORMAT_NAME,
+        **{quantity: entry([f"{quantity}{i}" for i in (1, 2, 3)]) for quantity in _JOINT_QUANTITIES},
         "delay": entry(["delay"]),
         "offset": {
-            "value": [taken_off[0], taken_off[1] + values["offset2"], taken_off[2] + values["offset3"]],
+            "value": [subtracted[0], subtracted[1] + values["offset2"], subtracted[2] + values["offset3"]],
             "margin": [first, margins["offset2"], margins["offset3"]],
         },
         "weight": entry(["weight2", "weight3"]),
@@ -92,7 +92,7 @@ def calibrated_json(
     """Content of a device file with encoder offsets and their margins [rad], shape (3,) each; the rest is `base`."""
     return {
         **base,
-        "format": _FORMAT,
+        "format": _FORMAT_NAME,
         "offset": {"value": list(offset), "margin": list(margin)},
         "calibration": Calibration(identity.name, identity.serial, identity.power_up)._asdict(),
     }
@@ -114,9 +114,9 @@ def read_device_file(path: Path) -> dict[str, Any]:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        if content["format"] != _FORMAT:
+        if content["format"] != _FORMAT_NAME:
             raise KeyError(f"format {content['format']!r}")
-        _check(content)
+        _check_content(content)
         linkage_from(content)
         calibration_from(content)
     except OSError as error:
@@ -128,14 +128,14 @@ def read_device_file(path: Path) -> dict[str, Any]:
     return cast(dict[str, Any], content)
 
 
-def _check(content: Mapping[str, Any]) -> None:
-    """Refuse what does not belong into a device file, and numbers that no device has."""
-    _check_known(content, _KNOWN, "")
-    _check_known(content.get("calibration", {}), Calibration._fields, "calibration.")
-    for name, length in _LENGTHS.items():
+def _check_content(content: Mapping[str, Any]) -> None:
+    """Refuse unknown keys, and numbers that no device can have."""
+    _check_keys(content, _KNOWN_KEYS, "")
+    _check_keys(content.get("calibration", {}), Calibration._fields, "calibration.")
+    for name, length in _VALUE_COUNTS.items():
         entry = content.get(name, {})
-        _check_known(entry, ("value", "margin"), f"{name}.")
-        bound = _TORQUE if name in ("coulomb", "weight") else _MOST
+        _check_keys(entry, ("value", "margin"), f"{name}.")
+        bound = _MAX_TORQUE if name in ("coulomb", "weight") else _MAX_PARAMETER
         for which, least, most in (("value", -bound, bound), ("margin", 0.0, float("inf"))):
             numbers = entry.get(which, [None] * length)
             if len(numbers) != length:
@@ -145,7 +145,7 @@ def _check(content: Mapping[str, Any]) -> None:
                     raise ValueError(f"{name}.{which} {number} is not from {least:.3g} to {most:.3g}")
 
 
-def _check_known(given: Mapping[str, Any], known: Sequence[str], within: str) -> None:
+def _check_keys(given: Mapping[str, Any], known: Sequence[str], within: str) -> None:
     for name in given:
         if name not in known:
             raise ValueError(f"{within}{name} is not known, only {', '.join(known)}")
@@ -180,8 +180,8 @@ def linkage_from(content: Mapping[str, Any]) -> Linkage:
 
 def calibration_from(content: Mapping[str, Any]) -> Calibration | None:
     """Calibration in the content of a device file; None if it has none."""
-    told = content.get("calibration")
-    return Calibration(str(told["name"]), str(told["serial"]), int(told["power_up"])) if told else None
+    found = content.get("calibration")
+    return Calibration(str(found["name"]), str(found["serial"]), int(found["power_up"])) if found else None
 
 
 def content_of(device: Phantom | Replay) -> dict[str, Any]:

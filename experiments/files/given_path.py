@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 
 
 def given_path(name: str, value: str | Path) -> Path:
-    """The path that an argument says; empty text, which would be the working directory, is refused.
+    """The path in an argument; empty text, which would mean the working directory, is refused.
 
     Raises
     ------

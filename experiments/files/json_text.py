@@ -16,9 +16,9 @@ def json_text(value: object) -> str:
     A dataclass or named tuple becomes an object of its fields; the outermost one also gets its ``lines``, if it has a
     method of that name.
     """
-    plain, said = _plain(value), getattr(value, "lines", None)
-    if callable(said) and isinstance(plain, dict):
-        plain = cast(dict[str, object], plain) | {"lines": list(cast(Callable[[], Any], said)())}
+    plain, lines = _plain(value), getattr(value, "lines", None)
+    if callable(lines) and isinstance(plain, dict):
+        plain = cast(dict[str, object], plain) | {"lines": list(cast(Callable[[], Any], lines)())}
     return json.dumps(plain, indent=2, allow_nan=False)
 
 
@@ -31,7 +31,7 @@ def _plain(value: object) -> object:
         return str(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in cast(Mapping[object, object], value).items()}
-    names = _names(value)
+    names = _field_names(value)
     if names:
         return {name: _plain(getattr(value, name)) for name in names}
     if isinstance(value, list | tuple):
@@ -39,7 +39,7 @@ def _plain(value: object) -> object:
     return value
 
 
-def _names(value: object) -> list[str]:
+def _field_names(value: object) -> list[str]:
     """Fields of a dataclass or a named tuple."""
     if is_dataclass(value) and not isinstance(value, type):
         return [field.name for field in fields(value)]

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files: a file is complete, or it does not exist."""
 
 import os
 import secrets
@@ -19,7 +19,7 @@ def whole_file(path: Path) -> Generator[BinaryIO]:
     OSError
         If it cannot be written.
     """
-    target = path.resolve()  # a link stays one
+    target = path.resolve()  # a symbolic link stays a link
     draft = target.with_name(f"{target.name}.{secrets.token_hex(4)}")
     try:
         with draft.open("xb") as file:

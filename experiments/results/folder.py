@@ -23,7 +23,7 @@ from sim.world.world import BodyKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
-_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE)
+_RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE)
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
@@ -42,7 +42,7 @@ def check_holds(out: Path, overwrite: bool) -> None:
         return
     if (out / RECORDING).exists():
         raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
-    if taken := [name for name in (*_FILES, FIGURES) if (out / name).exists()]:
+    if taken := [name for name in (*_RUN_FILES, FIGURES) if (out / name).exists()]:
         raise SimError(f"{out}: holds {', '.join(taken)} without a run; choose another --out, or --overwrite them")
 
 
@@ -75,7 +75,7 @@ def clear_folder(out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     if (out / RECORDING).exists():
         shutil.rmtree(out / FIGURES, ignore_errors=True)
-    for name in _FILES:
+    for name in _RUN_FILES:
         (out / name).unlink(missing_ok=True)
 
 

@@ -5,11 +5,11 @@ from experiments.config.run_config import RunConfig, User
 from experiments.setups.parts.hands import lap_pushes
 
 _LAP = Circle().lap
-_RELAXED = 2.2 * _LAP  # two laps: the device's friction makes them a little longer than the curve's own
-_FORCE = 4.0  # [N]; more than the motors can give continuously, but the pushes are short
+_RELAXED_TIME = 2.2 * _LAP  # two laps: the device's friction makes them a little longer than the curve's own
+_PUSH_FORCE = 4.0  # [N]; more than the motors can give continuously, but the pushes are short
 
 
 def demo_config() -> RunConfig:
     """Two laps with a relaxed hand, then a lap in which the hand pushes outwards and then inwards."""
-    pushes = lap_pushes(_RELAXED, _LAP, _FORCE)
-    return RunConfig(user=User(does="push", pushes=pushes), seconds=_RELAXED + 1.2 * _LAP)
+    pushes = lap_pushes(_RELAXED_TIME, _LAP, _PUSH_FORCE)
+    return RunConfig(user=User(does="push", pushes=pushes), seconds=_RELAXED_TIME + 1.2 * _LAP)

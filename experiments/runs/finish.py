@@ -27,10 +27,10 @@ def finish(folder: Path) -> list[str]:
         If there is no recording, or the run is still in progress.
     """
     with Recording(folder / RECORDING) as recording:
-        of_a_configuration = "mode" in recording.config and "live" not in recording.texts
-        stopped = not recording.complete and not (folder / SUMMARY).exists()
+        is_configured = "mode" in recording.config and "live" not in recording.texts
+        interrupted = not recording.complete and not (folder / SUMMARY).exists()
     with claimed(folder):
-        if stopped and of_a_configuration:
+        if interrupted and is_configured:
             _complete(folder)
         write_report_of(folder)
     with Recording(folder / RECORDING) as recording:

@@ -42,7 +42,7 @@ class BodyMap(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class _AboutCurve:
-    """What maps about a curve are made of; see `Cylindrical`."""
+    """Base of maps about a curve; see `Cylindrical`."""
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
@@ -157,21 +157,21 @@ class Lifted:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the clips, and so of the curves."""
-        return self._made[0].names
+        return self._map_and_clips[0].names
 
     @property
     def around(self) -> Trajectory:
         """The curve on which the run begins, timed by its clip: φ of a field that plays it."""
-        made, _ = self._made
+        made, _ = self._map_and_clips
         return made.curve(curve_number(made, self.curve))
 
     @property
     def clips(self) -> tuple[Clip, ...]:
         """The clips of the map."""
-        return self._made[1]
+        return self._map_and_clips[1]
 
     @cached_property
-    def _made(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
+    def _map_and_clips(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
         made, clips = load_figure_map(Path(self.file))
         if not isinstance(made, LiftedMap):
             raise SimError(f"{self.file}: its map is {type(made).__name__}; expected one that hvf.lift wrote")
@@ -180,7 +180,7 @@ class Lifted:
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
-        return for_size_of(world.body, lambda _: lifted_parts(*self._made, part))
+        return for_size_of(world.body, lambda _: lifted_parts(*self._map_and_clips, part))
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,7 +199,7 @@ class RobotArm:
     Raises
     ------
     ParameterError
-        If a number is not positive, or, when it is run, the arm does not reach what it is led to.
+        If a number is not positive, or, at the start of a run, if the arm does not reach where it is led.
     SimError
         If the Phantom does not reach the curve.
     """

@@ -27,7 +27,7 @@ class _Comparison:
 
     def __init__(self, recording: Recording, channels: Channels):
         self._recording, self._channels = recording, channels
-        self._rows = {"ticks": 0, "frames": 0}
+        self._row_counts = {"ticks": 0, "frames": 0}
         self.differences: dict[str, str] = {}
 
     def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
@@ -35,15 +35,15 @@ class _Comparison:
             self._compare(group, blocks)
 
     def _compare(self, group: str, blocks: Mapping[str, Array]) -> None:
-        first, n = self._rows[group], len(blocks["t"])
+        first, n = self._row_counts[group], len(blocks["t"])
         for name, block in blocks.items():
             recorded = self._recording.channel(group, name)[first : first + n]
-            mine = block[: len(recorded)]
-            same = np.equal(recorded, mine) | (np.isnan(recorded) & np.isnan(mine))
+            computed = block[: len(recorded)]
+            same = np.equal(recorded, computed) | (np.isnan(recorded) & np.isnan(computed))
             if group not in self.differences and not np.all(same):
                 row = int(np.argmin(np.all(same.reshape(len(same), -1), axis=1)))
                 self.differences[group] = f"{name} differs first at {group[:-1]} {first + row}"
-        self._rows[group] += n
+        self._row_counts[group] += n
 
 
 def check_files(config: RunConfig, recording: Recording) -> None:
@@ -112,7 +112,7 @@ def reproduce(folder: Path) -> Reproduced:
             raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
         if of_device(recording):
             raise SimError(f"{folder}: is of a device, which moves differently each time; expected a simulated run")
-        remarks = _others(recording.versions)
+        remarks = _environment_remarks(recording.versions)
         config = config_of(recording)
         check_files(config, recording)
         session = wire(config, clips_of(recording))
@@ -129,16 +129,16 @@ def reproduce(folder: Path) -> Reproduced:
     return Reproduced(not comparison.differences, recorded_ticks, comparison.differences, remarks)
 
 
-def _others(versions: Mapping[str, str]) -> tuple[str, ...]:
+def _environment_remarks(versions: Mapping[str, str]) -> tuple[str, ...]:
     """Packages and processor that differ from those of a recording, in words."""
-    said: list[str] = []
+    remarks: list[str] = []
     for package, recorded in versions.items():
         if package == "processor":
             here = get_host_cpu_name()
             if here != recorded:
-                said.append(
+                remarks.append(
                     f"recorded on a processor {recorded}, this is {here}: libraries round otherwise, expect differences"
                 )
         elif package != "python" and version(package) != recorded:
-            said.append(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
-    return tuple(said)
+            remarks.append(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+    return tuple(remarks)

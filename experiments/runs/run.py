@@ -68,7 +68,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     started : float
         `time.perf_counter` when the program began.
     view : bool
-        Show the run in a browser while it goes on, at the pace of the wall clock.
+        Show the run in a browser while it is simulated, in real time.
 
     Raises
     ------
@@ -81,15 +81,15 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     session = wire(config, ready=lambda units: compile_once(console, units))
     for remark in session.remarks:
         console.print(remark, highlight=False)
-    whole = cast(RunConfig, session.config)
-    takes = foreseen(out, whole.seconds, groups(session.servo))
-    if takes is not None:
-        console.print(takes, highlight=False)
+    full_config = cast(RunConfig, session.config)
+    cost_message = foreseen(out, full_config.seconds, groups(session.servo))
+    if cost_message is not None:
+        console.print(cost_message, highlight=False)
     with claimed(out):
         check_holds(out, overwrite)
         clear_folder(out)
-        (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
-        summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
+        (out / CONFIG).write_text(to_json(full_config), encoding="utf-8")
+        summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
         from experiments.results.pages.report_of import write_report_of  # matplotlib and viser: after the first tick
@@ -132,7 +132,7 @@ def record(
     with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
-        session.haptic_map.check()  # before it is asked again for the measures, outside the tick
+        session.haptic_map.check()  # before the measures evaluate it again, outside a tick
         summary = measured(out, session, speed)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     return summary
@@ -160,7 +160,7 @@ def _simulate(
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
     loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
-    rest = first * (round(seconds / first) - 1)  # whole updates of the figure: as many as in one call
+    rest = first * (round(seconds / first) - 1)  # a whole number of figure updates, as many as in a single call
     with session.naming_laws():
         loop.run(first)
     session.haptic_map.check()
@@ -181,7 +181,7 @@ def _simulate(
 
 
 def _live_page(session: Session) -> Page:
-    from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
+    from sim.viewer.live_page import LivePage  # importing viser takes a third of a second, and is rarely needed
 
     static = session.static()
     radius = float(np.asarray(static["tube_radius"]))

@@ -40,7 +40,7 @@ from sim.recording.recording import Recording
 
 
 def check_record(record: str | Path | None, overwrite: bool) -> None:
-    """Refuse values of another kind of what `Run.of` takes, before anything is compiled."""
+    """Refuse arguments of `Run.of` that have a wrong type, before anything is compiled."""
     if record is not None:
         given_path("record", record)
     of_kind("overwrite", overwrite, bool)
@@ -56,7 +56,7 @@ class Channels(Mapping[str, Array]):
     """Channels of a run at one rate, by name: ``run.ticks["force"]``, shape (n, ...)."""
 
     def __init__(self, run: "Run", group: str):
-        self._run, self._group = run, group  # the run, since a temporary folder is deleted with it
+        self._run, self._group = run, group  # keeps the run, as a temporary folder is deleted with it
 
     def __getitem__(self, name: str) -> Array:
         with Recording(self._run.folder / RECORDING) as recording:
@@ -88,7 +88,7 @@ class Run:
     summary : RunSummary
         Measures as numbers; `str` of a run gives them in words.
     remarks : tuple of str
-        What was said before the run: what its clips and its map are not fit for, what was chosen instead. `str` has
+        Remarks before the run: what its clips and its map are not suited for, and what was chosen instead. `str` has
         them first.
     """
 
@@ -121,15 +121,15 @@ class Run:
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
                 (folder / CONFIG).write_text(to_json(session.config), encoding="utf-8")
-            said = asdict(summary) | {"lines": summary.lines()}
-            (folder / SUMMARY).write_text(json_text(said) + "\n", encoding="utf-8")
+            content = asdict(summary) | {"lines": summary.lines()}
+            (folder / SUMMARY).write_text(json_text(content) + "\n", encoding="utf-8")
             run = Run(folder, summary, session)
             run.report()
         return run
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was said before the run."""
+        """Remarks before the run."""
         return tuple(map(keywords, self._session.remarks))
 
     @property
@@ -192,8 +192,8 @@ class Run:
 
     def __repr__(self) -> str:
         alone = self.summary.path.deviation_rms_mm
-        told = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
-        return f"<run of {self.ticks['t'][-1]:.1f} s{told}>"
+        deviation = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
+        return f"<run of {self.ticks['t'][-1]:.1f} s{deviation}>"
 
     def _repr_html_(self) -> str:
         """The replay, in a notebook."""

@@ -1,4 +1,4 @@
-"""A run in words from Python: everything that ``hvf run`` can do, with the result in memory."""
+"""Runs from options in Python: everything that ``hvf run`` can do, with the result in memory."""
 
 import tempfile
 from pathlib import Path
@@ -22,7 +22,7 @@ from experiments.setups.wiring import wire
 def run(
     config: str | Path | None = None, *, record: str | Path | None = None, overwrite: bool = False, **words: Any
 ) -> Run:
-    """Run what words say, as ``hvf run`` does: any mode, map, hand and figure, from clips by name or motion files.
+    """Run what options ask for, as ``hvf run`` does: any mode, map, hand and figure, clips by name or motion files.
 
     ``hvf.run(mode="lead", clips=["walk"], seconds=5.0)`` is ``hvf run --mode lead --clips walk --seconds 5``. User-
     defined laws, maps and hands need a `hvf.Simulation`.
@@ -30,7 +30,7 @@ def run(
     Parameters
     ----------
     config : path, optional
-        A configuration in a JSON file, such as that of a recorded run; the words change it.
+        A configuration in a JSON file, such as that of a recorded run; the other options change it.
     record : path, optional
         Folder to write recording, configuration, summary, animations, figures and page into; by default a temporary
         one.
@@ -44,7 +44,7 @@ def run(
     Raises
     ------
     ModelError, ControllerError, SimError
-        If there is no such word, it does not belong to what is chosen, a number is out of its interval, a file cannot
+        If an option is unknown or does not belong to the chosen parts, a number is out of its interval, a file cannot
         be read, or the folder cannot be written or holds a run.
     """
     if "out" in words:
@@ -54,9 +54,9 @@ def run(
     given: dict[str, Any] = {
         name: tuple(cast(list[object], value)) if isinstance(value, list) else value for name, value in words.items()
     }
-    whole = run_config(**given) if file is None else changed(load_config(file), given)
-    check_length(Path(record or tempfile.gettempdir()), whole.seconds, whole.clock.servo_period)
+    run_settings = run_config(**given) if file is None else changed(load_config(file), given)
+    check_length(Path(record or tempfile.gettempdir()), run_settings.seconds, run_settings.clock.servo_period)
     console = Console(stderr=True)
-    session = wire(whole, ready=lambda units: compile_once(console, units))
+    session = wire(run_settings, ready=lambda units: compile_once(console, units))
     resolved = cast(RunConfig, session.config)
     return Run.of(session, to_dict(resolved), resolved.seconds, record, overwrite)

@@ -1,4 +1,4 @@
-"""Parts of a simulation as a prompt shows them: what is not its default, clips and functions by name."""
+"""Short text of the parts of a simulation, for a prompt: values that are not defaults, clips and functions by name."""
 
 import reprlib
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,8 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
 from models.mocap.motion.clip import Clip
 
-_MOST = 4  # values of a part or of a sequence that are shown: those of a simulation then fit into some 200 characters
+# Values of a part or of a sequence that are shown: those of a simulation then fit into some 200 characters.
+_MAX_SHOWN = 4
 
 
 def name_of(law: Law) -> str:
@@ -21,7 +22,7 @@ def name_of(law: Law) -> str:
 
 
 def short_text(part: object) -> str:
-    """A part as ``Name(what is not its default)``, without memory addresses."""
+    """A part as ``Name(field=value)`` with the fields that differ from their defaults, without memory addresses."""
     if isinstance(part, Clip):
         return repr(part.name)
     if isinstance(part, Trajectory):
@@ -31,9 +32,9 @@ def short_text(part: object) -> str:
     if isinstance(part, FunctionLaw):
         return part.name
     if is_dataclass(part) and not isinstance(part, type):
-        return f"{type(part).__name__}({_joined(_changed(part))})"
+        return f"{type(part).__name__}({_join_short(_changed_fields(part))})"
     if isinstance(part, Sequence) and not isinstance(part, str | bytes):
-        return f"[{_joined(map(short_text, cast(Sequence[object], part)))}]"
+        return f"[{_join_short(map(short_text, cast(Sequence[object], part)))}]"
     if isinstance(part, float):
         return f"{part:g}"
     named = getattr(part, "__name__", None)
@@ -42,7 +43,7 @@ def short_text(part: object) -> str:
     return f"<{type(part).__name__}>" if type(part).__repr__ is object.__repr__ else reprlib.repr(part)
 
 
-def _changed(part: Any) -> Iterable[str]:
+def _changed_fields(part: Any) -> Iterable[str]:
     """Fields of a part that are shown and differ from their defaults."""
     for field in fields(part):
         value = getattr(part, field.name)
@@ -57,6 +58,6 @@ def _is_default(field: Field[Any], value: object) -> bool:
     return value is default or (type(value) is type(default) and bool(value == default))
 
 
-def _joined(texts: Iterable[str]) -> str:
+def _join_short(texts: Iterable[str]) -> str:
     several = list(texts)
-    return ", ".join(several[:_MOST] + ["…"] * (len(several) > _MOST))
+    return ", ".join(several[:_MAX_SHOWN] + ["…"] * (len(several) > _MAX_SHOWN))

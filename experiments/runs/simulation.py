@@ -46,7 +46,7 @@ from sim.users.participant import Participant
 from sim.users.person.person import Person
 from sim.world.world import BodyKind, World
 
-_MINUTE = 60.0  # [s]
+_DEFAULT_DURATION = 60.0  # [s]
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,7 +81,7 @@ class User:
 
     @property
     def acts(self) -> bool:
-        """Whether the hand does anything of itself, or is a person's."""
+        """Whether the hand acts on its own, or is a person's."""
         does = (self.pushes, self.turns, self.grabs, self.traces, self.person, self.intent)
         return any(part is not None and part != () and part != [] for part in does)
 
@@ -221,7 +221,7 @@ class Simulation:
         if seconds is not None and not 0.0 < seconds < np.inf:
             raise ParameterError(f"seconds is {seconds:g}; expected more than 0 s, and finite")
         world, console = World(self.scene, self.body), Console(stderr=True)
-        device, span = device_of(self, world, seconds), seconds or _MINUTE
+        device, span = device_of(self, world, seconds), seconds or _DEFAULT_DURATION
         given = self.haptic_map
         maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
         return assemble(
@@ -273,7 +273,7 @@ class Simulation:
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 
     def __iter__(self) -> Iterator[Tick]:
-        """Step tick by tick, without end, or until a replayed hand's: ``for tick in sim``."""
+        """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         left = ticks_of(session.servo.device)
@@ -300,7 +300,7 @@ class Simulation:
         }
 
 
-_KINDS: dict[str, tuple[tuple[type, ...], str]] = {
+_PART_TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "field": ((Law,), "a law of force, such as hvf.Follow(curve, k_r=300, b_d=8), or a function under @hvf.law"),
     "user": ((User,), "hvf.User(…)"),
     "device": ((Phantom, Replay), "hvf.Phantom(…) or hvf.Replay(run)"),
@@ -312,12 +312,12 @@ _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
 
 
 def _check_kinds(sim: Simulation) -> None:
-    """Refuse parts of another kind by name, with what would be right."""
-    for name, (kinds, expected) in _KINDS.items():
+    """Refuse parts of a wrong type, with the part's name and what is expected."""
+    for name, (kinds, expected) in _PART_TYPES.items():
         if not isinstance(getattr(sim, name), kinds) or isinstance(getattr(sim, name), bool):
             raise ParameterError(f"{name} is {getattr(sim, name)!r}; expected {expected}")
     given = sim.haptic_map
     if isinstance(given, type) or not (isinstance(given, HapticMap) or hasattr(given, "parts")):
         raise ParameterError(f"haptic_map is {given!r}; expected a map, such as hvf.Cylindrical(clips, around=curve)")
     if not 0 <= sim.seed < 2**63:
-        raise ParameterError(f"seed is {sim.seed!r}; expected {_KINDS['seed'][1]}")
+        raise ParameterError(f"seed is {sim.seed!r}; expected {_PART_TYPES['seed'][1]}")

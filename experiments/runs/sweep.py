@@ -18,8 +18,8 @@ from experiments.runs.short_text import name_of
 from experiments.runs.simulation import Simulation
 from experiments.setups.wiring import check_seconds
 
-_LIMITED = "limited"  # the operation `Law.limited`
-_BOUNDS = {"force": "N", "torque": "N m"}  # its numbers, in order
+_LIMIT_NAME = "limited"  # the operation `Law.limited`
+_LIMIT_UNITS = {"force": "N", "torque": "N m"}  # units of its bounds, in order
 
 
 class Swept(NamedTuple):
@@ -78,10 +78,10 @@ def sweep(
     simulations = [with_values(sim, chosen) for chosen in combinations]
     for simulation in simulations:
         check_seconds(simulation, seconds)
-    return _swept(combinations, simulations, seconds, threads)
+    return _run_combinations(combinations, simulations, seconds, threads)
 
 
-def _swept(
+def _run_combinations(
     combinations: Sequence[dict[str, Any]], simulations: Sequence[Simulation], seconds: float, threads: int
 ) -> Iterator[Swept]:
     def run(simulation: Simulation) -> Run:
@@ -97,18 +97,18 @@ def _swept(
 def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
     """The same simulation with parameters set, by path as in `sweep`."""
     for path, value in chosen.items():
-        sim = cast(Simulation, _set(sim, path.split("."), value, path))
+        sim = cast(Simulation, _with_parameter(sim, path.split("."), value, path))
     return sim
 
 
-def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
+def _with_parameter(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     """The same part with one parameter set, which may be nested."""
-    if isinstance(part, Program) and names[0] == _LIMITED:
-        return _with_bound(part, names, value, path)
+    if isinstance(part, Program) and names[0] == _LIMIT_NAME:
+        return _with_limit(part, names, value, path)
     if isinstance(part, Program):
-        law = _owner(part, names, path)
+        law = _owning_law(part, names, path)
         rest = names if len(names) == 1 or name_of(law) != names[0] else names[1:]
-        return part.with_law(law, cast(Law, _set(law, rest, value, path)))
+        return part.with_law(law, cast(Law, _with_parameter(law, rest, value, path)))
     if isinstance(part, FunctionLaw) and len(names) == 1:
         return part(**{names[0]: value})
     if not is_dataclass(part) or isinstance(part, type) or names[0] not in {f.name for f in fields(part)}:
@@ -117,38 +117,38 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
             raise ParameterError(f"{path}: {whole} is a {type(part).__name__}; expected whole values of {whole}")
         known = ", ".join(f.name for f in fields(part))
         raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {known}")
-    new = value if len(names) == 1 else _set(getattr(part, names[0]), names[1:], value, path)
+    new = value if len(names) == 1 else _with_parameter(getattr(part, names[0]), names[1:], value, path)
     return replaced(part, **{names[0]: new})
 
 
-def _with_bound(program: Program, names: Sequence[str], value: Any, path: str) -> Program:
-    """The same field with a bound of its one limit set."""
+def _with_limit(program: Program, names: Sequence[str], value: Any, path: str) -> Program:
+    """The same field with one bound of its only limit set."""
     limits = [row[OP_PARAMETERS] for row in program.ops.tolist() if row[OP_CODE] == Join.LIMIT]
-    if len(names) != 2 or names[1] not in _BOUNDS or len(limits) != 1:
-        expected = " or ".join(f"{_LIMITED}.{bound}" for bound in _BOUNDS)
+    if len(names) != 2 or names[1] not in _LIMIT_UNITS or len(limits) != 1:
+        expected = " or ".join(f"{_LIMIT_NAME}.{bound}" for bound in _LIMIT_UNITS)
         raise ParameterError(
             f"{path}: the field is limited {len(limits)} times; expected {expected} of one that is once"
         )
-    params, place = program.params.copy(), list(_BOUNDS).index(names[1])
-    params[limits[0] + place] = checked(path, value, _BOUNDS[names[1]], infinite=True)
+    params, place = program.params.copy(), list(_LIMIT_UNITS).index(names[1])
+    params[limits[0] + place] = checked(path, value, _LIMIT_UNITS[names[1]], infinite=True)
     return replaced(program, params=params)
 
 
-def _owner(program: Program, names: Sequence[str], path: str) -> Law:
+def _owning_law(program: Program, names: Sequence[str], path: str) -> Law:
     """The one law of a composed field to which a path refers."""
     wanted = names[0]
     found = [
         law for law in program.laws
-        if (name_of(law) == wanted if len(names) > 1 else _has(law, wanted))
+        if (name_of(law) == wanted if len(names) > 1 else _has_parameter(law, wanted))
     ]  # fmt: skip
     if len(found) != 1:
         laws = ", ".join(name_of(law) for law in program.laws)
-        bounds = f", or {_LIMITED}" if (program.ops[:, OP_CODE] == Join.LIMIT).any() else ""
+        bounds = f", or {_LIMIT_NAME}" if (program.ops[:, OP_CODE] == Join.LIMIT).any() else ""
         raise ParameterError(
             f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}{bounds}"
         )
     return found[0]
 
 
-def _has(law: Law, number: str) -> bool:
+def _has_parameter(law: Law, number: str) -> bool:
     return number in law.parameters if isinstance(law, FunctionLaw) else hasattr(law, number)

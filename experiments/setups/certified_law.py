@@ -1,6 +1,6 @@
 """Laws of force and gains of a run in the form that certificates take, by mode.
 
-Imports only configurations, since certificates import it.
+Imports nothing but configurations, since certificates import it.
 """
 
 from collections.abc import Callable
@@ -34,16 +34,16 @@ class CertifiedLaw(NamedTuple):
 
 Laws = dict[str, CertifiedLaw]
 """Laws by the suffix of their verdicts' names; the law of the run's start has the suffix ""."""
-_ANY = float("inf")
+_UNBOUNDED = float("inf")
 
 
 def certified_laws(config: RunConfig) -> Laws:
     """The laws that a run uses."""
-    return _LAWS[config.mode.kind](resolved(config).mode)
+    return _LAWS_BY_MODE[config.mode.kind](resolved(config).mode)
 
 
 def leading_gains(config: RunConfig) -> tuple[float, float]:
-    """Stiffness [N/m] and damping [N s/m] for which a run's course is timed; 0 where it does not lead along its curve.
+    """Stiffness [N/m] and damping [N s/m] for which a run's course is timed; 0 if it does not lead along its curve.
 
     The stiffness is 0 also with a parallel flow, where a hand that runs outside a bend keeps the curve's pace.
     """
@@ -67,7 +67,7 @@ def of_clips(config: RunConfig) -> bool:
 
 
 def left_out(config: RunConfig) -> tuple[str, ...]:
-    """Names of what a run executes besides its certified laws and no certificate covers."""
+    """Names of the parts of a run that act besides its certified laws, and that no certificate covers."""
     mode = config.mode
     names: list[str] = []
     if getattr(mode, "walls", None) is not None:
@@ -77,41 +77,41 @@ def left_out(config: RunConfig) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _follow(mode: Follow | StretchThenFollow) -> Laws:
+def _follow_laws(mode: Follow | StretchThenFollow) -> Laws:
     law = "parallel" if isinstance(mode, Follow) and mode.flow == "parallel" else "follow"
     return {"": CertifiedLaw(law, mode.stiffness, mode.damping, mode.tube)}
 
 
-def _bunny(mode: Bunny) -> Laws:
+def _bunny_laws(mode: Bunny) -> Laws:
     """Near a bunny that pulls along the curve, the field is that of FOLLOW to first order."""
     along = mode.bunny_attraction == "along"
     k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
-    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _ANY if along else width)}
+    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _UNBOUNDED if along else width)}
 
 
-def _rivers(mode: Rivers) -> Laws:
+def _river_laws(mode: Rivers) -> Laws:
     return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
 
 
-def _stretch(mode: Stretch | StretchThenFollow) -> Laws:
+def _stretch_laws(mode: Stretch | StretchThenFollow) -> Laws:
     """Tubes seek with the switch open, and hold with it closed."""
     seek, damping = tube_gains(mode)
     return {
-        "": CertifiedLaw("seek", seek, damping, _ANY),
-        "_held": CertifiedLaw("hold", mode.rubber, damping, _ANY),
+        "": CertifiedLaw("seek", seek, damping, _UNBOUNDED),
+        "_held": CertifiedLaw("hold", mode.rubber, damping, _UNBOUNDED),
     }
 
 
-def _stretch_then_follow(mode: StretchThenFollow) -> Laws:
-    """As `_stretch`, and FOLLOW on the curve as it was before bending."""
-    return _stretch(mode) | {"_then": _follow(mode)[""]}
+def _stretch_then_follow_laws(mode: StretchThenFollow) -> Laws:
+    """As `_stretch_laws`, and FOLLOW on the curve as it was before bending."""
+    return _stretch_laws(mode) | {"_then": _follow_laws(mode)[""]}
 
 
-def _lead(mode: Lead) -> Laws:
-    return {"": CertifiedLaw("leading", mode.leash, mode.damping, _ANY)}
+def _lead_laws(mode: Lead) -> Laws:
+    return {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)}
 
 
-_LAWS: dict[str, Callable[..., Laws]] = {
-    "follow": _follow, "bunny": _bunny, "rivers": _rivers, "stretch": _stretch,
-    "stretch-then-follow": _stretch_then_follow, "lead": _lead,
+_LAWS_BY_MODE: dict[str, Callable[..., Laws]] = {
+    "follow": _follow_laws, "bunny": _bunny_laws, "rivers": _river_laws, "stretch": _stretch_laws,
+    "stretch-then-follow": _stretch_then_follow_laws, "lead": _lead_laws,
 }  # fmt: skip

@@ -19,7 +19,7 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
     It is called with rows in the order of time, `stride` figure updates apart.
     """
     if session.parts.maps.plays_rivers:
-        return _clips_of_rivers(session, stride)
+        return _river_animation(session, stride)
     haptic_map = session.haptic_map
     memory = haptic_map.compiled().memory
     if session.parts.walking is not None:
@@ -31,8 +31,8 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
     return poses_at
 
 
-def _clips_of_rivers(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
-    """Likewise where each river plays a clip of its own, with the transitions between clips that the figure had."""
+def _river_animation(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
+    """The same where each river plays its own clip, with the transitions between clips that the figure made."""
     period = stride * session.servo.figure_ticks * session.servo.plant.period
     compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.body
     reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))

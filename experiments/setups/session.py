@@ -74,14 +74,14 @@ class Session:
         return {"ask": ask, "ask_seconds": own.every}
 
     @property
-    def _played(self) -> str:
+    def _clip_names(self) -> str:
         """Names of the clips, or else the type of the map."""
         alone = "a robot arm" if self.world.kind == "robot" else type(self.haptic_map).__name__
         return ", ".join(clip.name for clip in self.clips) or alone
 
     @contextmanager
     def naming_laws(self) -> Generator[None]:
-        """For the ticks: name the compiled law of one's own that raises at the hand of an error, if one does."""
+        """Context of ticks: after an error, the user-defined law that raises at the current hand state is named."""
         try:
             yield
         except Exception:
@@ -111,7 +111,7 @@ class Session:
             "com_height": standing_com(scene.stature, scene.mass),
             "scene": np.array([scene.stature, scene.mass, scene.servo_period, scene.physics_step]),
             "figure": self.world.kind,
-            "title": f"{notes.title} over {self._played}",
+            "title": f"{notes.title} over {self._clip_names}",
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),

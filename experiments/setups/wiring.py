@@ -116,15 +116,15 @@ def assemble(
     draft = parts_of(maps)
     for curve in draft.program.curves:
         reached(curve)
-    ready(_units(draft, _servo(draft, world, device)))
+    ready(_required_units(draft, _make_servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if anything follows it.
     refined = maps if world.kind == "none" else maps.refine(world.kind == "physical")
     parts = draft if refined is maps else parts_of(refined)
-    servo = _servo(parts, world, device).linked(parts.program)
+    servo = _make_servo(parts, world, device).linked(parts.program)
     if parts.user.wishes is not None and world.has_figure and parts.walking is None:
         phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
         servo = with_eyes(servo, parts.user.wishes, parts.maps.curve.point(phases))
-    _begin(parts, servo, world)
+    _set_start_state(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks)
 
 
@@ -154,14 +154,14 @@ def check_seconds(settings: Settings, seconds: float) -> None:
         raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
 
 
-def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
+def _required_units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     """Compilation units that a run needs."""
     lowers = parts.bends and parts.config.body != "robot"
     more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((lower_start_unit(),) if lowers else ())
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
-def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
+def _make_servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     """The servo of a run, not yet linked to the addresses of its kernels, so that nothing need be compiled."""
     config, program = parts.config, parts.program
     compiled, walker = parts.maps.whole_map.compiled(), None
@@ -185,30 +185,30 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     )  # fmt: skip
 
 
-def _begin(parts: Parts, servo: Servo, world: World) -> None:
+def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
     """Set stylus and body to the start state of the run."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
-    begin, orientation = _first(parts, servo)
-    stylus = begin.velocity if moves else None
+    start, orientation = _start_state(parts, servo)
+    stylus_velocity = start.velocity if moves else None
     if world.kind == "none":
-        world.reset(begin.point, rest_pose(), orientation, stylus)
+        world.reset(start.point, rest_pose(), orientation, stylus_velocity)
     else:
-        stylus_pose = np.concatenate([begin.point, UPRIGHT if orientation is None else orientation])
+        stylus_pose = np.concatenate([start.point, UPRIGHT if orientation is None else orientation])
         argument = (stylus_pose if parts.walking is None else servo.argument)[None]
         poses = np.empty((1, whole_map.nq))
         poses_along(reference.stages, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends and world.has_figure:
             lower_start(packed_legs(world.body), poses[0], parts.maps.size)
-        figure = map_derivative(whole_map, argument[0])[:, :3] @ begin.velocity if moves else None
-        world.reset(begin.point, poses[0], orientation, stylus, figure)
+        figure_velocity = map_derivative(whole_map, argument[0])[:, :3] @ start.velocity if moves else None
+        world.reset(start.point, poses[0], orientation, stylus_velocity, figure_velocity)
         if moves:
-            begin_in_motion(reference, np.array(begin))
+            begin_in_motion(reference, np.array(start))
     if moves:
         measure_in_motion(servo.device)
 
 
-def _first(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
-    """How the stylus begins, and its orientation; without one the gimbal's joints are at zero."""
+def _start_state(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
+    """Start state of the stylus, and its orientation; if that is None, the gimbal's joints are at zero."""
     hand = known_start(servo.device)
     if hand is not None:
         w, x, y, z = (float(number) for number in hand.q)

@@ -59,7 +59,7 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         trial = draw_trial(rng)
         k_r = float(rng.uniform(0.05, 0.9)) * predicted(trial)
         hand = trial.hand
-        hands = HandRange(*(_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
+        hands = HandRange(*(_interval_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
         lap = LAP_SECONDS / LAP * np.asarray(trial.curve.times)
         curve = Trajectory(lap, trial.curve.positions, periodic=True)
         river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
@@ -71,7 +71,7 @@ def draw_certified(rng: np.random.Generator) -> Certified:
             return Certified(river, trial.curve, hands, float(str(verdict.figures["radius_bound"])))
 
 
-def _about(number: float, rng: np.random.Generator) -> tuple[float, float]:
+def _interval_about(number: float, rng: np.random.Generator) -> tuple[float, float]:
     """A random interval about a number, of up to half the number to either side."""
     return float(number * rng.uniform(0.5, 1.0)), float(number * rng.uniform(1.0, 1.5))
 

@@ -28,12 +28,13 @@ from models.world.scene import SceneConfig
 from sim.reference.reference import make_reference, reference_along
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
-_TUBE = 0.015  # [m] radius
-_GLIDE, _AFTER = 0.3, 0.8  # [s] duration of the hand's change, and time measured from its beginning on
-_THROWN = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
-_FIRST, _SPREAD = 1.2, 3.0  # [s] earliest moment, and range of the moments
-_COUNT, _SEED = 200, 11  # of random moments
-_SLID = 0.03  # [m] largest foot skate that is no slide
+_TUBE_RADIUS = 0.015  # [m] radius
+# [s] duration of the hand's change, and time measured from its beginning on
+_CHANGE_DURATION, _MEASURED_TIME = 0.3, 0.8
+_THROW_DISPLACEMENT = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
+_FIRST_MOMENT, _MOMENT_RANGE = 1.2, 3.0  # [s] earliest moment, and range of the moments
+_TRIAL_COUNT, _SEED = 200, 11  # of random moments
+_MAX_SKATE = 0.03  # [m] foot skate above which a change counts as a slide
 
 
 class Change(NamedTuple):
@@ -73,18 +74,18 @@ def measured_change(poses: Array, period: float = PERIOD) -> Change:
 def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
     """The default rivers, one for each of three embedded clips, with the phases at which these can stand."""
     figure = figure_model()
-    rivers = river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, _TUBE).rivers
+    rivers = river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, _TUBE_RADIUS).rivers
     clips = [(clip.poses, clip.fps) for clip in load_clips(names, raw=True)[0]]
-    return with_rests(RiverClips([river.curve for river in rivers], clips, _TUBE, figure_legs(figure)), figure)
+    return with_rests(RiverClips([river.curve for river in rivers], clips, _TUBE_RADIUS, figure_legs(figure)), figure)
 
 
 def played_change(rivers: RiverClips, first: int, second: int | None, moment: float, period: float = PERIOD) -> Array:
     """Poses from the moment [s] at which the hand changes to the second river, or, if it is None, is thrown off."""
     figure = figure_model()
-    t = period * np.arange(round((moment + _AFTER) / period), dtype=np.float64)
-    s = smooth_steps((t - moment) / _GLIDE + (0.0 if second is None else 0.5))[:, None]
+    t = period * np.arange(round((moment + _MEASURED_TIME) / period), dtype=np.float64)
+    s = smooth_steps((t - moment) / _CHANGE_DURATION + (0.0 if second is None else 0.5))[:, None]
     there = rivers.curves[first].point(t % LAP)
-    away = _THROWN if second is None else rivers.curves[second].point(t % LAP) - there
+    away = _THROW_DISPLACEMENT if second is None else rivers.curves[second].point(t % LAP) - there
     traces = np.zeros((len(t), TRACE_SIZE))
     traces[:, TRACE_PHASE] = t % LAP
     # A run that does not begin on the first river changes to its own at once, long before the moment.
@@ -100,7 +101,7 @@ def drawn_changes(rivers: RiverClips, count: int, rng: np.random.Generator, stop
     changes = []
     for _ in range(count):
         first, second = rng.permutation(len(rivers.curves))[:2]
-        moment = _FIRST + _SPREAD * rng.random()
+        moment = _FIRST_MOMENT + _MOMENT_RANGE * rng.random()
         changes.append(measured_change(played_change(rivers, first, None if stops else second, moment)))
     return changes
 
@@ -109,11 +110,11 @@ def main(arguments: list[str]) -> None:
     """Print a row for changes of river, and one for stops."""
     rivers = rivers_that_play(tuple(arguments))
     for stops in (False, True):
-        found = np.array(drawn_changes(rivers, _COUNT, np.random.default_rng(_SEED), stops))
+        found = np.array(drawn_changes(rivers, _TRIAL_COUNT, np.random.default_rng(_SEED), stops))
         slide, height, depth, over, up, joint = found.max(axis=0)
         median, most = np.quantile(found[:, 5], [0.5, 0.9])
-        print(f"{_COUNT} {'stops' if stops else 'changes'}")
-        print(f"  slide {100 * slide:.1f} cm, {(found[:, 0] > _SLID).sum()} of them more than 3 cm")
+        print(f"{_TRIAL_COUNT} {'stops' if stops else 'changes'}")
+        print(f"  slide {100 * slide:.1f} cm, {(found[:, 0] > _MAX_SKATE).sum()} of them more than 3 cm")
         print(f"  in the air {100 * height:.1f} cm, below the floor {100 * depth:.1f} cm")
         print(f"  leaps of the root {over:.2f} m/s over the ground, {up:.2f} m/s up")
         print(f"  leaps of joints {joint:.0f} rad/s, median {median:.1f}, nine of ten at most {most:.1f}")

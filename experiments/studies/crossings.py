@@ -68,7 +68,7 @@ class Passage(NamedTuple):
 
 
 @njit
-def _pass(  # noqa: PLR0913 - a kernel takes the arrays of a loop one by one
+def _run_passage(  # noqa: PLR0913 - a kernel takes the arrays of a loop one by one
     plant: Plant, port: PhantomPort, hand: Hand, field: Compiled, memory: Array, limits: Array,
     limiter: Array, p: Array, force: Array, river: Array,
 ) -> None:  # fmt: skip
@@ -114,7 +114,7 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     limiter = ForceLimiter(scene.servo_period)
     n = round(seconds / scene.servo_period)
     p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    _pass(
+    _run_passage(
         plant, port, make_hand(Arm(pushes=pushes)), program.compiled(), program.fresh_memory(),
         limiter.limits(), limiter.fresh_memory(), p, force, river,
     )  # fmt: skip
@@ -139,7 +139,7 @@ def pushed_passage(second: River, form: Form, newtons: float, alone: bool = Fals
 
 
 def verdict(way: Passage) -> str:
-    """Which river had the hand at the end, and whether one let it go for longer than 20 ms."""
+    """Which river had the hand at the end, and for how long none had it, if that was 20 ms or more."""
     lost = float(np.sum(way.river < 0.0)) * 1e-3
     end = "out" if way.river[-1] < 0.0 else f"{int(way.river[-1]) + 1}"
     return end if lost < 0.02 else f"{end} ({lost:.2f} s)"
@@ -151,10 +151,10 @@ def crossing_passages() -> str:
     lines.append("|--:|---|--:|" + "--:|" * len(PUSHES))
     for degrees in ANGLES:
         for form in ("discrete", "smooth"):
-            ways = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
-            lone = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
-            away = 1e3 * float(np.max(np.abs(ways[0].p - lone.p)))
-            cells = " | ".join(verdict(way) for way in ways)
+            passages = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
+            unpaired = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
+            away = 1e3 * float(np.max(np.abs(passages[0].p - unpaired.p)))
+            cells = " | ".join(verdict(one) for one in passages)
             lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
     return "\n".join(lines)
 
@@ -183,8 +183,8 @@ def pushed_rivers() -> str:
     for stiffness, damping in GAINS:
         mode = Rivers(stiffness=stiffness, damping=damping)
         cells = [changed_over(mode, f) for f in HARDER]
-        told = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
-        lines.append(f"| {stiffness:g}, {damping:g} | {told} |")
+        row = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
+        lines.append(f"| {stiffness:g}, {damping:g} | {row} |")
     return "\n".join(lines)
 
 

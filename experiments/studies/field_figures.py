@@ -77,19 +77,19 @@ def crossing(degrees: float) -> Crossing:
     smooth = HigherOrder(pair, ADMISSION * SPEED, SIGMA["smooth"] * SPEED)
     discrete = HigherOrder(pair, *scale, "discrete")
     # River 1 exerts no force on a hand that follows it at its own speed: all force comes from river 2.
-    way = np.linspace(-0.03, 0.03, 121)
-    alone = _felt(HigherOrder(second, *scale, "discrete"), np.zeros(1))
-    a, b, c = (_felt(field, way) for field in (pair, smooth, discrete))
-    at = len(way) // 2
+    places = np.linspace(-0.03, 0.03, 121)
+    alone = _felt_forces(HigherOrder(second, *scale, "discrete"), np.zeros(1))
+    a, b, c = (_felt_forces(field, places) for field in (pair, smooth, discrete))
+    at = len(places) // 2
     return Crossing(degrees, a[at], b[at], c[at], alone[0], a.max(), b.max(), c.max())
 
 
-def _felt(field: Law, way: Array) -> Array:
+def _felt_forces(field: Law, places: Array) -> Array:
     """Force [N] on a hand that moves along x with the river's speed, at places x [m], one after the other."""
     program = field.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
     forces: list[float] = []
-    for x in way:
+    for x in places:
         hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
         forces.append(float(np.linalg.norm(wrench[:3])))
@@ -105,12 +105,12 @@ def crossing_table() -> str:
     ]
     for degrees in range(0, 181, STEP):
         row = crossing(float(degrees))
-        cells = (_newtons(force) for force in row[1:])
+        cells = (_force_text(force) for force in row[1:])
         lines.append(f"| {degrees}° | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def _newtons(force: float) -> str:
+def _force_text(force: float) -> str:
     # A force that is only rounding error is shown as zero.
     return f"{force:.4f}" if force >= 5e-5 else (f"{force:.0e}" if force > 1e-12 else "0")
 
@@ -138,7 +138,7 @@ def _axes(size: tuple[float, float]) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
-def _plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Array, Array]:
+def _draw_plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Array, Array]:
     """Curves with their tubes from above, in millimetres; returns the grid of a plot there."""
     for curve in curves:
         points = 1e3 * curve.point(np.linspace(curve.start, curve.end, 400))
@@ -154,7 +154,7 @@ def _plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Array, A
 def force_figure(field: Law, curves: list[Trajectory], epsilon: float, t: float) -> Figure:
     """Force of a field on a hand at rest in the plane z = 0, at time t [s]."""
     figure, ax = _axes((4.6, 4.4))
-    x, y = _plane(ax, curves, epsilon)
+    x, y = _draw_plane(ax, curves, epsilon)
     forces = np.array([field.wrench(HandState.at([a, b, 0.0], t=t)).force for a, b in zip(x.flat, y.flat, strict=True)])
     size = np.linalg.norm(forces, axis=1)
     felt = size > 1e-3 * size.max()
@@ -172,7 +172,7 @@ def edited_figure() -> Figure:
     bump = 0.02 * np.sin(0.5 * np.pi * np.clip(times - 1.0, 0.0, 2.0)) ** 2
     performed = performance(times, river.curve.point(times) * (1.0 + bump / 0.05)[:, None])
     figure, ax = _axes((4.6, 4.4))
-    _plane(ax, [river.curve], 0.0)
+    _draw_plane(ax, [river.curve], 0.0)
     for weight, colour in ((0.5, TUBE), (1.0, FIELD)):
         edited = Edited(river, (performed,), (weight,))
         course = 1e3 * integrate(edited.flow, performed.point(0.0), times).points

@@ -32,7 +32,7 @@ from sim.users.hand.arm import Arm
 
 SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials, with which the walker's motion is negligible
 EXCESS = 1e-4  # [m] distance of the stylus from the edge, on the side where the spring acts
-_SOFT = 1e-4  # [N/m] stiffness of an arm so soft, with a target so far away, that its force is constant
+_SOFT_STIFFNESS = 1e-4  # [N/m] stiffness of an arm so soft, with a target so far away, that its force is constant
 _GAIT = Gait(1.4, 1.25, np.array([2, 2]), 0.45)
 
 
@@ -63,7 +63,7 @@ class LeadingTrial(Trial):
         """A hand that balances the field's force with a constant force."""
         place = self.curve.point(self.phase)
         force = -np.asarray(self.field(k_r).wrench(HandState.at(place)).force)
-        return Arm(_SOFT, self.hand.damping, (place + force / _SOFT)[None])
+        return Arm(_SOFT_STIFFNESS, self.hand.damping, (place + force / _SOFT_STIFFNESS)[None])
 
     def field(self, k_l: float) -> Leading:
         """The executed law, with the figure placed such that the trial's position lies in the regime."""

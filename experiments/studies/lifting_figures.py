@@ -34,9 +34,9 @@ def comparison_table(lifted: MapQuality, hand_made: MapQuality) -> str:
     """Table of the quality of both maps, as Markdown."""
     rows = [
         ("least distance of two curves [mm]", *(f"{1e3 * q.separation:.1f}" for q in (hand_made, lifted))),
-        *_spreads("condition number of h_* along the curves", hand_made.conditioning, lifted.conditioning, 1.0),
-        *_spreads("the same half way between", hand_made.conditioning_between, lifted.conditioning_between, 1.0),
-        *_spreads("change of h_* [% of itself per mm]", hand_made.roughness, lifted.roughness, 100.0),
+        *_spread_row("condition number of h_* along the curves", hand_made.conditioning, lifted.conditioning, 1.0),
+        *_spread_row("the same half way between", hand_made.conditioning_between, lifted.conditioning_between, 1.0),
+        *_spread_row("change of h_* [% of itself per mm]", hand_made.roughness, lifted.roughness, 100.0),
     ]
     worst = [MotionMeasure.worst(list(q.between.values())) for q in (hand_made, lifted)]
     for name, field, unit in (
@@ -50,7 +50,7 @@ def comparison_table(lifted: MapQuality, hand_made: MapQuality) -> str:
     return "\n".join([*lines, *(f"| {name} | {a} | {b} |" for name, a, b in rows)])
 
 
-def _spreads(
+def _spread_row(
     name: str, first: tuple[float, float], second: tuple[float, float], unit: float
 ) -> list[tuple[str, str, str]]:
     cells = [" / ".join("∞" if np.isinf(v) else f"{unit * v:.3g}" for v in pair) for pair in (first, second)]

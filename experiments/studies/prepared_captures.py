@@ -34,11 +34,11 @@ def row(path: Path, made: Prepared) -> str:
     was, now = (well_formed(clip, clip_flights(clip)) for clip in (made.captured, made.clip))
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
-    most, directions, places = kept.extremes[0], *_from_file(path, made)
+    most, directions, places = kept.extremes[0], *_source_deviations(path, made)
     why = "" if after.stands else "motion" if not made.near or change.residual > FLYING / 2 else "figure"
     cells = (
-        _name(path),
-        _half(path),
+        _file_name(path),
+        _half_name(path),
         f"{made.looped.kind} {seconds:.2f} s" + (f", {made.paced.pace:.2f}×" if made.paced.pace != 1.0 else ""),
         f"{before}",
         f"{after}" + ("" if made.near else " *"),
@@ -46,12 +46,12 @@ def row(path: Path, made: Prepared) -> str:
         f"{100 * change.residual:.1f}",
         directions,
         places,
-        f"{_soles(was)} → {_soles(now)}",
+        f"{_soles_text(was)} → {_soles_text(now)}",
         f"{np.rad2deg(was.tilt):.0f} → {np.rad2deg(now.tilt):.1f}",
         f"{1000 * was.skate:.0f} → {1000 * now.skate:.1f}",
         f"{was.outliers} → {now.outliers}",
         f"{was.seam:.1f} → {now.seam:.1f}",
-        f"{_flights(was)} → {_flights(now)}",
+        f"{_flights_text(was)} → {_flights_text(now)}",
         f"{np.rad2deg(was.excess):.0f} → {np.rad2deg(max(now.excess, 0.0)):.0f}",
         f"{100 * was.strain:.0f} → {100 * now.strain:.0f} {now.joint}",
         f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
@@ -61,16 +61,16 @@ def row(path: Path, made: Prepared) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _name(path: Path) -> str:
+def _file_name(path: Path) -> str:
     return f"{path.parent.name}/{path.name}"
 
 
-def _half(path: Path) -> str:
-    name = _name(path)
+def _half_name(path: Path) -> str:
+    name = _file_name(path)
     return "tuning" if name in TUNING else "judging" if name in JUDGING else ""
 
 
-def _from_file(path: Path, made: Prepared) -> tuple[str, str]:
+def _source_deviations(path: Path, made: Prepared) -> tuple[str, str]:
     """Largest deviations of segments and joints from the file, as retargeted and as prepared."""
     both = deviations(path, made)
     if both is None:
@@ -82,11 +82,11 @@ def _from_file(path: Path, made: Prepared) -> tuple[str, str]:
     )
 
 
-def _flights(measures: WellFormed) -> str:
+def _flights_text(measures: WellFormed) -> str:
     return f"{measures.falling:.1f} ({measures.flights})" if measures.flights else "none"
 
 
-def _soles(measures: WellFormed) -> str:
+def _soles_text(measures: WellFormed) -> str:
     return f"{1000 * measures.lowest:.0f}…{1000 * measures.highest:.0f}"
 
 
@@ -98,7 +98,7 @@ def main(paths: list[str]) -> None:
         try:
             print(row(path, prepared(path)), flush=True)
         except ModelError as error:
-            print(f"| {_name(path)} | {_half(path)} | refused: {error} |{17 * ' |'}", flush=True)
+            print(f"| {_file_name(path)} | {_half_name(path)} | refused: {error} |{17 * ' |'}", flush=True)
 
 
 if __name__ == "__main__":

@@ -53,8 +53,8 @@ JUDGING = (
 
 SECONDS = 20.0  # [s] of a run
 MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
-LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a hand is hardly pushed over
-_EVERY = 5  # every fifth frame of the animation is measured: 100 a second
+LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
+_STRIDE = 5  # every fifth frame of the animation is measured: 100 a second
 
 
 class Captured(NamedTuple):
@@ -80,30 +80,30 @@ class Captured(NamedTuple):
 def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
     """Prepare a file and follow it alone."""
     try:
-        clip = _named(prepared_clips([Path(folder) / name])[0].clip, name)
+        clip = _with_name(prepared_clips([Path(folder) / name])[0].clip, name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
     residual, fell, *_ = followed(clip)
-    reason = "; ".join(not_blendable((clip, _other(clip))))
+    reason = "; ".join(not_blendable((clip, _rest_clip(clip))))
     if not reason and (fell is not None or residual > MOST_ALONE):
         reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
     return Captured(name, reason, residual, fell), clip
 
 
-def _named(clip: Clip, name: str) -> Clip:
+def _with_name(clip: Clip, name: str) -> Clip:
     return Clip(clip.poses, clip.fps, name)
 
 
-def _other(clip: Clip) -> Clip:
-    """Some other clip, with which it is tested whether a clip can be blended at all."""
+def _rest_clip(clip: Clip) -> Clip:
+    """A clip at rest, against which is tested whether a clip can be blended at all."""
     return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
 
 
 def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure.
 
-    On rivers, a longer one is divided into laps of 6 s at most. On a lifted map the hand follows the first clip's
-    curve, at that clip's pace.
+    On rivers, a longer lap is divided into laps of 6 s at most. On a lifted map the hand follows the curve of the first
+    clip, at that clip's pace.
     """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
@@ -142,7 +142,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
-        **animation_measures(frames["reference"][::_EVERY], rate / _EVERY), "cpu": time.process_time() - began,
+        **animation_measures(frames["reference"][::_STRIDE], rate / _STRIDE), "cpu": time.process_time() - began,
     }  # fmt: skip
 
 

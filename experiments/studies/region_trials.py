@@ -115,8 +115,8 @@ def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, out
         lines.append(f"| {times:g} | {n} | {left} | {astray} | {1e3 * outcomes[:, 0].max():.2f} |")
         print(lines[-1], flush=True)
     out.mkdir(parents=True, exist_ok=True)
-    told = f"{verdict.reason}\n\n" + "\n".join(lines) + "\n"
-    (out / "region.md").write_text(told, encoding="utf-8")
+    report = f"{verdict.reason}\n\n" + "\n".join(lines) + "\n"
+    (out / "region.md").write_text(report, encoding="utf-8")
 
 
 if __name__ == "__main__":

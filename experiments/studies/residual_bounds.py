@@ -66,14 +66,14 @@ def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: flo
         up = frames["down"] == UP
         fell += int(not up.all())
         stance = up & (frames["flight"] == 0.0)
-        size = np.array([_sizes(frames["residual"][:, :3]), _sizes(frames["residual"][:, 3:])]) / measure[:, None]
+        size = np.array([_norms(frames["residual"][:, :3]), _norms(frames["residual"][:, 3:])]) / measure[:, None]
         residuals.append(float(np.sqrt(np.mean(size[0, stance] ** 2))))
         most = np.maximum(most, size[:, up].max(axis=1))
     found = f"{100 * np.median(residuals):.1f} %, {100 * most[0]:.0f} % and {100 * most[1]:.0f} %"
     return f"{fell} of {len(NUDGES)}, {found}" if fell else found
 
 
-def _sizes(rows: Array) -> Array:
+def _norms(rows: Array) -> Array:
     sizes: Array = np.linalg.norm(rows, axis=1)
     return sizes
 

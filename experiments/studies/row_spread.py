@@ -29,18 +29,18 @@ _RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
 def stated_residuals(page: str) -> dict[str, tuple[float, float]]:
     """Commands in the rows of a page, with the lowest and highest residual [%] that each row states."""
     found = ((shlex.join(shlex.split(line)), _RESIDUAL.search(measured)) for line, measured in _ROW.findall(page))
-    return {line: (float(says[1]), float(says[2] or says[1])) for line, says in found if says is not None}
+    return {line: (float(stated[1]), float(stated[2] or stated[1])) for line, stated in found if stated is not None}
 
 
 def measured(line: str, folder: Path, core: str) -> tuple[float, bool]:
     """Run a command in a folder with a kernel; returns its residual [%], and whether its figure fell."""
     words = shlex.split(line)
-    _typed(words, folder, core)
+    _run_command(words, folder, core)
     summary = json.loads((folder / words[words.index("--out") + 1] / "summary.json").read_text(encoding="utf-8"))
     return 100.0 * summary["figure"]["residual_force_rms"], bool(summary["figure"]["falls"])
 
 
-def _typed(words: Sequence[str], folder: Path, core: str) -> None:
+def _run_command(words: Sequence[str], folder: Path, core: str) -> None:
     environment = {**os.environ, "PYTHONPATH": str(README.parent), **({"OPENBLAS_CORETYPE": core} if core else {})}
     command = [sys.executable, "-m", "experiments.cli", *words[1:], "--overwrite"]
     subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
@@ -55,7 +55,7 @@ def main(cores: Sequence[str]) -> None:
             folder.mkdir()
             for line, _ in _ROW.findall(page):
                 if line.startswith("hvf lift "):
-                    _typed(shlex.split(line), folder, core)
+                    _run_command(shlex.split(line), folder, core)
         print("| command | README says % | residual %, from and to | falls |\n|---|---|---|---|")
         for line, (low, high) in stated_residuals(page).items():
             runs = [

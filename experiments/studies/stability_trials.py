@@ -19,10 +19,10 @@ from controllers.certificates.loop.stability import slowest_mode
 from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
 
-_WORLDS_OWN = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+_WORLD_INTEGRATOR = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
 FINER = Conditions(substeps=128)
-OWN_FINE, OWN_COARSE = Conditions(64, _WORLDS_OWN), Conditions(8, _WORLDS_OWN)
+OWN_FINE, OWN_COARSE = Conditions(64, _WORLD_INTEGRATOR), Conditions(8, _WORLD_INTEGRATOR)
 COARSE = 1e-4  # [m] a few encoder counts: a smaller oscillation is mostly quantisation
 RUBBING, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
@@ -101,7 +101,7 @@ def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44,
         rows.append(run_trial(trial))
         row = rows[-1]
         print(
-            f"{number + 1}/{count}: predicted {row.predicted:.1f} N/m, {_percent(row.observed, row.predicted)}",
+            f"{number + 1}/{count}: predicted {row.predicted:.1f} N/m, {_error(row.observed, row.predicted)}",
             flush=True,
         )
     errors = np.array([abs(row.observed / row.predicted - 1.0) for row in rows])
@@ -110,13 +110,13 @@ def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44,
     out.mkdir(parents=True, exist_ok=True)
     numbers = [{k: v if np.isfinite(v) else None for k, v in asdict(row).items()} for row in rows]
     (out / "trials.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
-    told = table(rows) + (
-        f"\nThe worst, trial {worst + 1}: {_percent(rows[worst].observed, rows[worst].predicted)} at {FINE.substeps} "
-        f"physics steps a period, {_percent(again, rows[worst].predicted)} at {FINER.substeps}.\n"
+    report = table(rows) + (
+        f"\nThe worst, trial {worst + 1}: {_error(rows[worst].observed, rows[worst].predicted)} at {FINE.substeps} "
+        f"physics steps a period, {_error(again, rows[worst].predicted)} at {FINER.substeps}.\n"
     )
-    (out / "trials.md").write_text(told, encoding="utf-8")
+    (out / "trials.md").write_text(report, encoding="utf-8")
     trials_figure(rows).savefig(out / "trials.png", dpi=150)
-    print(told)
+    print(report)
 
 
 def table(rows: list[Row]) -> str:
@@ -130,10 +130,10 @@ def table(rows: list[Row]) -> str:
         lines.append(
             f"| {1e3 * r.period:.2f} | {round(r.delay / r.period)} T "
             f"| {r.mass:.2f}, {r.damping:.1f}, {r.stiffness:.0f} "
-            f"| {r.b_d:.2f} | {r.predicted:.0f} | {_percent(r.observed, r.predicted)} "
-            f"| {_percent(r.own_fine, r.predicted)} | {_percent(r.own_coarse, r.predicted)} | {1e3 * r.amplitude:.2f} "
-            f"| {_percent(r.friction_predicted, r.predicted)} | {_percent(r.friction_observed, r.friction_predicted)} "
-            f"| {_percent(r.rounded_observed, r.friction_predicted)} |"
+            f"| {r.b_d:.2f} | {r.predicted:.0f} | {_error(r.observed, r.predicted)} "
+            f"| {_error(r.own_fine, r.predicted)} | {_error(r.own_coarse, r.predicted)} | {1e3 * r.amplitude:.2f} "
+            f"| {_error(r.friction_predicted, r.predicted)} | {_error(r.friction_observed, r.friction_predicted)} "
+            f"| {_error(r.rounded_observed, r.friction_predicted)} |"
         )
     lines.append("")
     for name, found, expected in (
@@ -175,7 +175,7 @@ def trials_figure(rows: list[Row]) -> Figure:
     return figure
 
 
-def _percent(found: float, expected: float) -> str:
+def _error(found: float, expected: float) -> str:
     return f"{100.0 * (found / expected - 1.0):+.2f} %" if np.isfinite(found) else "none"
 
 

@@ -110,11 +110,11 @@ def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     path = 1e6 * _rms(off_path(coarse.p, fine.p))
     band = butter(2, BAND, fs=1.0 / coarse.period, output="sos")
     slow, finer = (np.asarray(sosfiltfilt(band, c.force, axis=0)) for c in (coarse, fine))
-    off = ", ".join(f"{np.rad2deg(_off(c.poses, c.reference)):.2f}" for c in (coarse, fine))
+    off = ", ".join(f"{np.rad2deg(_pose_error(c.poses, c.reference)):.2f}" for c in (coarse, fine))
     return (
         f"| {name} | {1e3 * step:g} | {path:.1f}, {apart:.1f} | "
         f"{100.0 * _rms(slow - finer) / _rms(finer):.2g}, {force:.0f} | {1e6 * coarse.gap:.2g} | "
-        f"{np.rad2deg(_off(coarse.poses, fine.poses)):.2f} | {off} | "
+        f"{np.rad2deg(_pose_error(coarse.poses, fine.poses)):.2f} | {off} | "
         f"{coarse.falls}, {fine.falls} |"
     )
 
@@ -132,13 +132,13 @@ def off_path(p: Array, other: Array) -> Array:
     Array
         Shape (n, 3) [m]; the whole difference where the other path stands still.
     """
-    way, apart = np.gradient(other, axis=0), p - other
-    speed = np.linalg.norm(way, axis=1, keepdims=True)
-    along = np.divide(way, speed, out=np.zeros_like(way), where=speed > 0.0)
+    tangent, apart = np.gradient(other, axis=0), p - other
+    speed = np.linalg.norm(tangent, axis=1, keepdims=True)
+    along = np.divide(tangent, speed, out=np.zeros_like(tangent), where=speed > 0.0)
     return apart - np.sum(apart * along, axis=1, keepdims=True) * along
 
 
-def _off(poses: Array, others: Array) -> float:
+def _pose_error(poses: Array, others: Array) -> float:
     """RMS over joints and time of the angle between poses of a figure, or between an arm's angles [rad]."""
     if poses.shape[1] != N_POSE:
         return float(np.sqrt(np.mean((poses - others) ** 2)))

@@ -70,8 +70,8 @@ class Crossing(NamedTuple):
         curve = self.field.bundle.rivers[0].curve
         x, y, z = (force * self.direction).tolist()
         push = Push((x, y, z), self.start, self.duration)
-        way = simulated_course(self.field, self.sampling, curve.point(0.2), curve.velocity(0.2), 1.2, push)
-        return failure(way.river[1:], self.sampling.period, 0, False) is None
+        course = simulated_course(self.field, self.sampling, curve.point(0.2), curve.velocity(0.2), 1.2, push)
+        return failure(course.river[1:], self.sampling.period, 0, False) is None
 
 
 def draw_crossing(rng: np.random.Generator) -> Crossing:

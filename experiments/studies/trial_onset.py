@@ -63,10 +63,10 @@ def observed(trial: Trial, guess: float, conditions: Conditions) -> float:
     def rate(log_k: float) -> float:
         return observed_growth(trial, float(np.exp(log_k)), conditions)
 
-    return _root(rate, guess)
+    return _sign_change(rate, guess)
 
 
-def _root(rate: Callable[[float], float], guess: float) -> float:
+def _sign_change(rate: Callable[[float], float], guess: float) -> float:
     """Gain near a guess at which a rate, given as a function of the gain's logarithm, changes its sign upwards."""
     for width in (1.1, 1.4, 2.0):
         low, high = float(np.log(guess / width)), float(np.log(guess * width))
@@ -88,12 +88,12 @@ def with_friction(trial: Trial, amplitude: float) -> Rubbing:
     Describing function: friction f_c on a joint that oscillates with rate amplitude Ω is equivalent to the damping
     4 f_c/(π Ω). Ω follows from the mode at the boundary; a few iterations converge.
     """
-    bare, device = trial.loop(), phantom_device()
-    loop, k_r = bare, predicted(trial)
+    frictionless, device = trial.loop(), phantom_device()
+    loop, k_r = frictionless, predicted(trial)
     for _ in range(12):
         rates = amplitude * np.abs(slowest_mode(loop, k_r, trial.b_d, 0, swings=True)[1][3:6])
         damping = 4.0 * np.array(device.coulomb) / (np.pi * np.maximum(rates, 1e-9))
-        linear = replace(bare.linear, inverse_rate=bare.linear.inverse_rate + np.diag(damping))
+        linear = replace(frictionless.linear, inverse_rate=frictionless.linear.inverse_rate + np.diag(damping))
         loop = SampledLoop(linear, trial.sampling)
         k_r = float(np.sqrt(k_r * min(critical_stiffness(loop, trial.b_d)[0], 4.0 * k_r)))
     return Rubbing(k_r, loop)
@@ -115,4 +115,4 @@ def observed_with_friction(trial: Trial, guess: Rubbing, amplitude: float, condi
         # The second oscillation may vanish, if the hand comes to rest on the curve.
         return float(np.log(max(np.linalg.norm(path[swing:]), 1e-12) / np.linalg.norm(path[:swing])))
 
-    return _root(rate, guess.k_r)
+    return _sign_change(rate, guess.k_r)

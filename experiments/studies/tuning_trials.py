@@ -35,7 +35,7 @@ def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned
 
 def lines(found: Sequence[Tuned]) -> list[str]:
     """Chosen values of each replication, and for each contender and objective the gains with their mean, in words."""
-    lines = [_chosen(one) for one in found]
+    lines = [_chosen_line(one) for one in found]
     for first in found[0].comparisons:
         name = (first.contender, first.objective)
         of = [c for one in found for c in one.comparisons if (c.contender, c.objective) == name]
@@ -60,7 +60,7 @@ def t_interval(values: Array) -> tuple[float, float]:
     return float(np.mean(values)) - half, float(np.mean(values)) + half
 
 
-def _chosen(one: Tuned) -> str:
+def _chosen_line(one: Tuned) -> str:
     best = next(c for c in one.candidates if c.state == "tried" and c.values == one.values)
     margin = "no margin" if best.margin is None else f"margin {best.margin:.3g}"
     values = ", ".join(f"{word} {value:.4g}" for word, value in one.values.items())

@@ -24,13 +24,13 @@ from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.motion.clip import Clip
 
-_STEP = 5e-5  # of the simulation [s]
-_FOOT = 1.0  # mass of the foot [kg], radius of its sole 0.1 m
-_STIFF = 60.0  # natural frequency of the mass about its path [rad/s], critically damped
-_LEAN = 2.0  # largest ratio of sideways to downward push of the leg, more than any friction holds
-_FOLLOWED = 5e-4  # largest distance at which a path counts as followed [m]
-_FASTER = 1.35  # multiple of the certified rate at which certified clips are played
-_SETTLING = 0.1  # [s] of rest before the motion, in which the contact settles
+_TIME_STEP = 5e-5  # of the simulation [s]
+_FOOT_MASS = 1.0  # mass of the foot [kg], radius of its sole 0.1 m
+_NATURAL_FREQUENCY = 60.0  # natural frequency of the mass about its path [rad/s], critically damped
+_MAX_LEG_LEAN = 2.0  # largest ratio of sideways to downward push of the leg, more than any friction holds
+_FOLLOWING_TOLERANCE = 5e-4  # largest distance at which a path counts as followed [m]
+_RATE_FACTOR = 1.35  # multiple of the certified rate at which certified clips are played
+_SETTLING_TIME = 0.1  # [s] of rest before the motion, in which the contact settles
 
 
 class Followed(NamedTuple):
@@ -48,19 +48,19 @@ class Followed(NamedTuple):
     slid: float
 
 
-def _body(friction: float) -> mujoco.MjModel:
+def _body_model(friction: float) -> mujoco.MjModel:
     axes = ("1 0 0", "0 1 0", "0 0 1")
     slides = ["".join(f'<joint name="{name}{k}" type="slide" axis="{axis}"/>' for k, axis in enumerate(axes))
               for name in ("foot", "leg")]  # fmt: skip
     motors = "".join(f'<motor joint="leg{k}"/>' for k in range(3))
     return mujoco.MjModel.from_xml_string(f"""
-        <mujoco><option timestep="{_STEP}" gravity="0 0 -{GRAVITY}" cone="elliptic" impratio="100"
+        <mujoco><option timestep="{_TIME_STEP}" gravity="0 0 -{GRAVITY}" cone="elliptic" impratio="100"
                         integrator="implicitfast"/>
         <default><geom friction="{friction} 0 0" solref="0.002 1" condim="3"/></default>
         <worldbody><geom type="plane" size="5 5 1"/>
-        <body pos="0 0 0.1">{slides[0]}<geom type="sphere" size="0.1" mass="{_FOOT}"/>
+        <body pos="0 0 0.1">{slides[0]}<geom type="sphere" size="0.1" mass="{_FOOT_MASS}"/>
         <body pos="0 0 0.9">{slides[1]}
-        <geom type="sphere" size="0.1" mass="{DEFAULT_MASS - _FOOT}" contype="0" conaffinity="0"/>
+        <geom type="sphere" size="0.1" mass="{DEFAULT_MASS - _FOOT_MASS}" contype="0" conaffinity="0"/>
         </body></body></worldbody><actuator>{motors}</actuator></mujoco>""")
 
 
@@ -78,36 +78,36 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
     friction : float
         μ between foot and floor.
     """
-    model = _body(friction)
+    model = _body_model(friction)
     data = mujoco.MjData(model)
     spline = CubicSpline(np.arange(len(way)) / fps, way - way[0])
     speed, acceleration = spline.derivative(1), spline.derivative(2)
 
     def push(error: Array, slower: Array, wanted: Array) -> None:
-        leg = DEFAULT_MASS * (wanted + _STIFF**2 * error + 2.0 * _STIFF * slower)
+        leg = DEFAULT_MASS * (wanted + _NATURAL_FREQUENCY**2 * error + 2.0 * _NATURAL_FREQUENCY * slower)
         leg[2] = max(leg[2] + DEFAULT_MASS * GRAVITY, 0.0)  # the leg does not pull its foot up
-        data.ctrl[:2] = leg[:2] * min(1.0, _LEAN * leg[2] / max(np.linalg.norm(leg[:2]), 1e-12))
+        data.ctrl[:2] = leg[:2] * min(1.0, _MAX_LEG_LEAN * leg[2] / max(np.linalg.norm(leg[:2]), 1e-12))
         data.ctrl[2] = leg[2]
         mujoco.mj_step(model, data)
 
-    while data.time < _SETTLING:
-        push(-_of_all(data.qpos), -_of_all(data.qvel), np.zeros(3))
-    data.time, stood, began = 0.0, data.qpos[:2].copy(), _of_all(data.qpos)
+    while data.time < _SETTLING_TIME:
+        push(-_centre_of_mass(data.qpos), -_centre_of_mass(data.qvel), np.zeros(3))
+    data.time, stood, began = 0.0, data.qpos[:2].copy(), _centre_of_mass(data.qpos)
     # The mass alone is set in motion, by as much as the centre of both needs.
-    data.qvel[3:] += (velocity - _of_all(data.qvel)) / _of_all(np.repeat([0.0, 1.0], 3))
+    data.qvel[3:] += (velocity - _centre_of_mass(data.qvel)) / _centre_of_mass(np.repeat([0.0, 1.0], 3))
     miss, slid = 0.0, 0.0
     for k in range(len(way)):
         while data.time < k / fps - 1e-9:
             t = data.time
-            push(began + spline(t) - _of_all(data.qpos), speed(t) - _of_all(data.qvel), acceleration(t))
-        miss = max(miss, float(np.linalg.norm(began + way[k] - way[0] - _of_all(data.qpos))))
+            push(began + spline(t) - _centre_of_mass(data.qpos), speed(t) - _centre_of_mass(data.qvel), acceleration(t))
+        miss = max(miss, float(np.linalg.norm(began + way[k] - way[0] - _centre_of_mass(data.qpos))))
         slid = max(slid, float(np.linalg.norm(data.qpos[:2] - stood)))
     return Followed(miss, slid)
 
 
-def _of_all(values: Array) -> Array:
+def _centre_of_mass(values: Array) -> Array:
     """Centre of mass of foot and mass: its position from joint positions, or its velocity from joint velocities."""
-    return values[:3] + values[3:] * (1.0 - _FOOT / DEFAULT_MASS)
+    return values[:3] + values[3:] * (1.0 - _FOOT_MASS / DEFAULT_MASS)
 
 
 class TurnTrial(NamedTuple):
@@ -141,20 +141,20 @@ def onset(acceleration: Array, seconds: float, friction: float) -> float:
     low, high = 0.3, 1.2
     while high - low > 1e-3 * low:
         middle = 0.5 * (low + high)
-        missed = parabola(acceleration, seconds, friction, middle).miss > _FOLLOWED
+        missed = parabola(acceleration, seconds, friction, middle).miss > _FOLLOWING_TOLERANCE
         low, high = (low, middle) if missed else (middle, high)
     return 0.5 * (low + high)
 
 
 def trial(motion: BodyMotion, example: Mapping[str, Any], friction: float) -> TurnTrial:
     """Test the claim of a counterexample of the verdict ``turns`` in MuJoCo."""
-    way = motion.com[example["start"] : example["end"] + 1]
-    seconds, acceleration = (len(way) - 1) / motion.fps, np.asarray(example["acceleration"])
+    path = motion.com[example["start"] : example["end"] + 1]
+    seconds, acceleration = (len(path) - 1) / motion.fps, np.asarray(example["acceleration"])
     return TurnTrial(
         rate=example["rate"],
         onset=onset(acceleration, seconds, friction),
         bound=example["distance"],
-        miss=follow(way, motion.fps, np.asarray(example["velocity"]), friction).miss,
+        miss=follow(path, motion.fps, np.asarray(example["velocity"]), friction).miss,
         miss_of_mean=parabola(acceleration, seconds, friction, 1.0).miss,
     )
 
@@ -166,7 +166,7 @@ def main(names: list[str]) -> None:
     clips, _ = load_clips(names, raw=True)
     for clip in clips:
         margin = clip_ballistics(clip).certificate.verdicts["turns"].margin or 0.0
-        pace = max(1.0, _FASTER * float(np.sqrt(1.0 + margin)))
+        pace = max(1.0, _RATE_FACTOR * float(np.sqrt(1.0 + margin)))
         played = clip_ballistics(Clip(clip.poses, pace * clip.fps, clip.name))
         verdict = played.certificate.verdicts["turns"]
         if verdict.verdict != "refuted":

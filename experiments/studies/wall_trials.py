@@ -20,7 +20,7 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.hand.actions import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
-_SECONDS = 6.0  # of a run
+_RUN_DURATION = 6.0  # of a run
 BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -57,7 +57,7 @@ class Meeting(NamedTuple):
 def meet(walls: bool) -> Meeting:
     """Let a hand push outwards, towards the clip with the wrong elbow, in the second half of a lap."""
     inside = embedded("squat_dance")
-    config = run_config(seconds=_SECONDS, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
+    config = run_config(seconds=_RUN_DURATION, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
     session = wire(config, (inside, impossible(inside)))
     frames: list[tuple[Array, Array, Array]] = []
 
@@ -67,7 +67,7 @@ def meet(walls: bool) -> Meeting:
         place = ticks.hand[: m * every : every, 1:3]
         frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess(block.reference[:m])))
 
-    Loop(session.servo, session.world, observe).run(_SECONDS)
+    Loop(session.servo, session.world, observe).run(_RUN_DURATION)
     return Meeting(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
 
 

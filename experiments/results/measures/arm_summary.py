@@ -7,12 +7,12 @@ import numpy as np
 from models.robot_arm.spec import ARM_JOINTS, arm_limits, arm_model
 from sim.recording.recording import Recording
 
-_STARTING = 1.0  # [s] in which the arm, at rest at first, catches up with a hand that the field takes along
+_START_TIME = 1.0  # [s] in which the arm, initially at rest, catches up with the hand
 
 
 @dataclass(frozen=True)
 class ArmSummary:
-    """Measures of a robot arm; the first second is left out of what is tracked.
+    """Measures of a robot arm; those of tracking leave out the first second.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class ArmSummary:
 def arm_summary(recording: Recording) -> ArmSummary:
     """Measure the robot arm of a recorded run."""
     arm, t = arm_model(), recording.channel("frames", "t")[:]
-    settled = t >= min(_STARTING, t[-1])
+    settled = t >= min(_START_TIME, t[-1])
     tool, led, joints, reference = (
         recording.channel("frames", name)[:][settled] for name in ("tool", "led", "joints", "reference")
     )

@@ -44,7 +44,7 @@ class FigureMeasure:
         self._stance, self._flight, self._airborne = (
             ResidualMeasure(self._weight, height, 1.0 / self._rate) for _ in range(3)
         )
-        self._seen, self._up, self._lost, self._saturated, self._ground = 0, 0, 0, 0.0, 0.0
+        self._frames, self._up, self._lost, self._saturated, self._ground = (0, 0, 0, 0.0, 0.0)
         self._was_up, self._falls = True, list[float]()
 
     def add(self, frames: Mapping[str, Array]) -> None:
@@ -52,15 +52,15 @@ class FigureMeasure:
         up = frames["down"] == UP
         falls = ~up & np.concatenate(([self._was_up], up[:-1]))
         self._falls += frames["t"][falls].tolist()
-        self._was_up, self._seen, self._up = bool(up[-1]), self._seen + len(up), self._up + int(np.sum(up))
-        flies, bears = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > SUPPORTS
+        self._was_up, self._frames, self._up = (bool(up[-1]), self._frames + len(up), self._up + int(np.sum(up)))
+        in_flight, supported = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > SUPPORTS
         residual = frames["residual"][up]
         self._joints.add(frames["joint_error"][up])
         self._root.add(frames["root_error"][up])
-        self._stance.add(residual[~flies])
-        self._flight.add(residual[flies])
-        self._airborne.add(residual[~bears])
-        self._lost += int(np.sum(~flies & ~bears))
+        self._stance.add(residual[~in_flight])
+        self._flight.add(residual[in_flight])
+        self._airborne.add(residual[~supported])
+        self._lost += int(np.sum(~in_flight & ~supported))
         self._saturated += float(np.sum(frames["saturated"][up]))
         self._ground += float(np.sum(frames["ground"][up][:, 2]))
 
@@ -70,7 +70,7 @@ class FigureMeasure:
         return FigureSummary(
             falls=tuple(self._falls),
             fell_at=self._falls[0] if self._falls else None,
-            seconds=self._seen / self._rate,
+            seconds=self._frames / self._rate,
             up_seconds=self._up / self._rate,
             joint_error_rms_deg=math.degrees(self._joints.root),
             root_error_rms_cm=100.0 * self._root.root,

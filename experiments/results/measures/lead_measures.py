@@ -16,8 +16,9 @@ from models.mocap.motion.quaternions import heading
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
 
-_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] weighted equally in the search for the nearest earlier pose
-_REMEMBERED = 6000  # poses kept of the way forwards, one per centimetre of the path
+# [m] and [rad] weighted equally in the search for the nearest earlier pose
+_DISTANCE_SCALE, _TURN_SCALE = 0.01, math.radians(2.0)
+_MAX_STORED_POSES = 6000  # poses of the outward path that are kept, one per centimetre
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class LeadSummary:
         Foot skate: largest distance that a point of the animation's soles slid while in contact; the same for the
         physical figure's soles, until its first fall.
     retrace_cm, retrace_deg : float or None
-        On the way back, largest distance and yaw difference of the animation's root from its path on the way forwards;
-        None if it never went back.
+        On the way back, largest distance and yaw difference of the animation's root from its outward path; None if it
+        never went back.
     physical_retrace_cm, physical_retrace_deg : float or None
         The same for the physical figure, until its first fall.
     """
@@ -87,7 +88,7 @@ def lead_summary(
         s = ticks["phase"][first * every : (first + len(t)) * every : every]
         if len(t) > 1:
             turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
-        force = max(force, _largest(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
+        force = max(force, _max_norm(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
         soles.add(reference)
         standing = t < (math.inf if fell_at is None else fell_at)
         shown.add(s, reference, farthest)
@@ -101,7 +102,7 @@ def lead_summary(
     )  # fmt: skip
 
 
-def _largest(vectors: Array) -> float:
+def _max_norm(vectors: Array) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
@@ -120,10 +121,10 @@ def turn_rates(gait: Gait, walkers: Array, s: Array, speed: Array) -> Array:
 
 
 class _Retrace:
-    """Distance of a figure that is led back from the path on which it came."""
+    """Deviation of a figure, while it is led back, from its own outward path."""
 
     def __init__(self) -> None:
-        self._way = np.empty((0, 4))
+        self._outward_path = np.empty((0, 4))
         self._distance, self._turn = -1.0, 0.0
 
     def add(self, s: Array, poses: Array, farthest: float) -> None:
@@ -133,16 +134,16 @@ class _Retrace:
         front = np.maximum.accumulate(np.concatenate(([farthest], s)))
         rows = np.stack([s, poses[:, 0], poses[:, 1], heading(poses[:, 3:7])], axis=1)
         new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
-        self._way = np.concatenate([self._way, rows[new]])[-_REMEMBERED:]
+        self._outward_path = np.concatenate([self._outward_path, rows[new]])[-_MAX_STORED_POSES:]
         for place, ahead in zip(rows, front[1:], strict=True):
-            # Near the turning point the filtered figure lags behind, and its way forwards is not yet recorded there.
+            # Near the turning point the filtered figure lags behind, and its outward path is not yet recorded there.
             if ahead - place[0] > 0.1:
                 self._compare(place)
 
     def _compare(self, place: Array) -> None:
-        near = self._way[np.abs(self._way[:, 0] - place[0]) < 0.3]
-        # Behind the start there is no way forwards to compare with.
-        if len(near) < 2 or place[0] < self._way[0, 0]:
+        near = self._outward_path[np.abs(self._outward_path[:, 0] - place[0]) < 0.3]
+        # Behind the start there is no outward path to compare with.
+        if len(near) < 2 or place[0] < self._outward_path[0, 0]:
             return
         start, step = near[:-1], np.diff(near, axis=0)
         step[:, 3] = np.remainder(step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
@@ -151,7 +152,7 @@ class _Retrace:
         apart = np.linalg.norm(start[:, 1:3] + share[:, None] * step[:, 1:3] - place[1:3], axis=1)
         turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
         # A swaying pelvis passes a place more than once or turns on the spot, so position and yaw decide together.
-        k = int(np.argmin(np.hypot(apart / _FAR, turn / _TURNED)))
+        k = int(np.argmin(np.hypot(apart / _DISTANCE_SCALE, turn / _TURN_SCALE)))
         self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
 
     def result(self) -> tuple[float | None, float | None]:

@@ -23,13 +23,15 @@ from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
 # At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; above the critical gain it does not stop.
-_SHAKEN = 0.25  # [s] of uninterrupted shaking from which it is reported
-_WINDOW = 0.02  # [s] over which the envelope of the motion is averaged
-_CORNER = 40.0  # [Hz] above voluntary motion; tremor (8 to 12 Hz) is attenuated to a tenth
-_LASTING = 50  # windows of shaking in a running median: too many for a push or a change of river to affect it
+_MIN_SHAKING_TIME = 0.25  # [s] of uninterrupted shaking from which it is reported
+_WINDOW_TIME = 0.02  # [s] over which the envelope of the motion is averaged
+_CORNER_FREQUENCY = 40.0  # [Hz] above voluntary motion; tremor (8 to 12 Hz) is attenuated to a tenth
+_MEDIAN_WINDOWS = 50  # windows of shaking in a running median: too many for a push or a change of river to affect it
 # σ of the Premium 1.5 in mid-workspace, where J is diagonal; along curves it is less than 1.25 times this.
-_ROUNDING = math.hypot(*np.multiply(PREMIUM_1_5.encoder_step, (PREMIUM_1_5.l1, PREMIUM_1_5.l1, PREMIUM_1_5.l2))) / 6.0
-_OWN = math.sqrt(2.0)  # r of a stylus that moves as much as the quantisation error of its reading
+_QUANTISATION_NOISE = (
+    math.hypot(*np.multiply(PREMIUM_1_5.encoder_step, (PREMIUM_1_5.l1, PREMIUM_1_5.l1, PREMIUM_1_5.l2))) / 6.0
+)
+_MIN_MOTION_RATIO = math.sqrt(2.0)  # r of a stylus that moves as much as the quantisation error of its reading
 
 
 @dataclass(frozen=True)
@@ -72,15 +74,17 @@ class OscillationSummary:
         if self.since is None:
             return []
         at = "" if self.frequency is None else f" at {self.frequency:.0f} Hz"
-        told = f"from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, by up to {self.force_max:.1f} N"
+        shaking = (
+            f"from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, by up to {self.force_max:.1f} N"
+        )
         if not self.oscillates:
             return [
-                f"Rounded encoders are felt {told}: the stylus does not shake; damping makes a force of the steps "
+                f"Rounded encoders are felt {shaking}: the stylus does not shake; damping makes a force of the steps "
                 "in its reading, less of it is quieter."
             ]
         grew = "" if self.growth is None else f", growing at up to {self.growth:.0f}/s"
         return [
-            f"It oscillates: the loop shakes {told} and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
+            f"It oscillates: the loop shakes {shaking} and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
             "hvf certify says which gains are stable."
         ]
 
@@ -88,7 +92,7 @@ class OscillationSummary:
 def oscillation_summary(recording: Recording) -> OscillationSummary:
     """Measure a recording, from the channels ``t``, ``force``, ``p`` and ``nearest`` of its ticks."""
     ticks, period = recording.groups["ticks"], 1.0 / recording.rates["ticks"]
-    detector, measure = OscillationDetector(period), _Fast(period)
+    detector, measure = OscillationDetector(period), _FastMotion(period)
     memory: list[float] = detector.fresh_memory().tolist()
     count, unbroken, since, n = 0, 0, math.nan, len(ticks["t"])
     for first in range(0, n, BLOCK_ROWS):
@@ -99,23 +103,24 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
         measure.add(force, np.nan_to_num(p), np.nan_to_num(p - nearest), found)
         count += int(found.sum())
         # Number of ticks of uninterrupted shaking up to each tick, including the end of the previous block.
-        at = np.arange(len(found))
-        stopped = np.maximum.accumulate(np.where(found, -1 - unbroken, at))
-        going = np.where(found, at - stopped, 0)
-        unbroken = int(going[-1])
-        if math.isnan(since) and going.max() * period >= _SHAKEN:
-            first_told = int(np.argmax(going * period >= _SHAKEN))
-            since = float(ticks["t"][rows][first_told]) - (int(going[first_told]) - 1) * period
-    told = not math.isnan(since)
-    own = measure.over_rounding() if told else None
-    oscillates = own is not None and own > _OWN
+        ticks_in_block = np.arange(len(found))
+        last_calm = np.maximum.accumulate(np.where(found, -1 - unbroken, ticks_in_block))
+        shaking_ticks = np.where(found, ticks_in_block - last_calm, 0)
+        unbroken = int(shaking_ticks[-1])
+        if math.isnan(since) and shaking_ticks.max() * period >= _MIN_SHAKING_TIME:
+            first_reported = int(np.argmax(shaking_ticks * period >= _MIN_SHAKING_TIME))
+            since = float(ticks["t"][rows][first_reported]) - (int(shaking_ticks[first_reported]) - 1) * period
+    reported = not math.isnan(since)
+    motion_ratio = measure.over_rounding() if reported else None
+    oscillates = motion_ratio is not None and motion_ratio > _MIN_MOTION_RATIO
     return OscillationSummary(
-        since if told else None, count / max(n, 1), measure.frequency() if told else None, measure.force.root,
-        measure.force.largest, 1e3 * measure.motion.root, own, oscillates, measure.growth(since) if told else None,
+        since if reported else None, count / max(n, 1), measure.frequency() if reported else None, measure.force.root,
+        measure.force.largest, 1e3 * measure.motion.root, motion_ratio, oscillates,
+        measure.growth(since) if reported else None,
     )  # fmt: skip
 
 
-class _Size:
+class _VectorSize:
     """Root mean square and largest norm of vectors that are given in blocks."""
 
     def __init__(self) -> None:
@@ -131,64 +136,67 @@ class _Size:
         return math.sqrt(self._sum / max(self._count, 1))
 
 
-class _Fast:
+class _FastMotion:
     """Force above the detector's corner frequency, and motion above that of the hand, filtered block by block."""
 
     def __init__(self, period: float) -> None:
         from scipy.signal import butter  # imported late, as the start of a run does not need it
 
         self._period = period
-        corners = (OscillationDetector(period).corner, _CORNER, _CORNER)
+        corners = (OscillationDetector(period).corner, _CORNER_FREQUENCY, _CORNER_FREQUENCY)
         self._sections: list[Array] = [
             np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos")) for corner in corners
         ]
         self._states: list[Array] = []
-        self.force, self.motion = _Size(), _Size()
-        self._turns, self._shaken, self._last = 0, 0, np.zeros(3)
-        self._moved: list[Array] = []
+        self.force, self.motion = _VectorSize(), _VectorSize()
+        self._crossing_count, self._shaking_ticks, self._last_force = 0, 0, np.zeros(3)
+        self._motion_windows: list[Array] = []
 
     def add(self, force: Array, place: Array, away: Array, found: Mask) -> None:
         from scipy.signal import sosfilt
 
-        given = (force, place, away)
+        inputs = (force, place, away)
         if not self._states:
             # The filters start settled on the first values, so that these are no step.
-            self._states = [_settled(*pair) for pair in zip(self._sections, (v[0] for v in given), strict=True)]
-        fast = list(given)
-        for i, values in enumerate(given):
+            self._states = [_settled_state(*pair) for pair in zip(self._sections, (v[0] for v in inputs), strict=True)]
+        fast = list(inputs)
+        for i, values in enumerate(inputs):
             fast[i], self._states[i] = sosfilt(self._sections[i], values, axis=0, zi=self._states[i])
         self.force.add(fast[0])
         self.motion.add(fast[2])
         # Zero crossings of the force component with the most energy.
         axis = int(np.argmax(np.sum(fast[0] ** 2, axis=0)))
-        changes = np.diff(np.signbit(fast[0][:, axis]), prepend=np.signbit(self._last[axis]))
-        self._turns, self._shaken = self._turns + int(np.sum(changes & found)), self._shaken + int(found.sum())
-        self._last = fast[0][-1]
-        width = max(1, round(_WINDOW / self._period))
+        changes = np.diff(np.signbit(fast[0][:, axis]), prepend=np.signbit(self._last_force[axis]))
+        self._crossing_count, self._shaking_ticks = (
+            self._crossing_count + int(np.sum(changes & found)),
+            self._shaking_ticks + int(found.sum()),
+        )
+        self._last_force = fast[0][-1]
+        width = max(1, round(_WINDOW_TIME / self._period))
         whole = len(found) // width * width
         total, across = (np.sum(moved[:whole] ** 2, axis=1) for moved in fast[1:])
-        self._moved.append(np.stack((total, across, found[:whole]), axis=1).reshape(-1, width, 3).mean(axis=1))
+        self._motion_windows.append(np.stack((total, across, found[:whole]), axis=1).reshape(-1, width, 3).mean(axis=1))
 
     def over_rounding(self) -> float:
-        """Largest r: the largest median over `_LASTING` successive windows of shaking."""
-        total, across, found = np.concatenate(self._moved).T
-        ratio = np.sqrt(np.maximum(across / 2.0, total / 3.0))[found > 0.5] / _ROUNDING
-        lasting = np.lib.stride_tricks.sliding_window_view(ratio, min(_LASTING, len(ratio)))
-        return float(np.median(lasting, axis=1).max())
+        """Largest r: the largest median over `_MEDIAN_WINDOWS` successive windows of shaking."""
+        total, across, found = np.concatenate(self._motion_windows).T
+        ratio = np.sqrt(np.maximum(across / 2.0, total / 3.0))[found > 0.5] / _QUANTISATION_NOISE
+        windows = np.lib.stride_tricks.sliding_window_view(ratio, min(_MEDIAN_WINDOWS, len(ratio)))
+        return float(np.median(windows, axis=1).max())
 
     def frequency(self) -> float | None:
-        return self._turns / (2.0 * self._shaken * self._period) if self._shaken else None
+        return self._crossing_count / (2.0 * self._shaking_ticks * self._period) if self._shaking_ticks else None
 
     def growth(self, since: float) -> float | None:
         """Largest slope of the logarithm of the envelope over three windows, up to a second after `since` [s]."""
-        envelope = np.sqrt(np.concatenate(self._moved)[: int((since + 1.0) / _WINDOW) + 1, 1])
+        envelope = np.sqrt(np.concatenate(self._motion_windows)[: int((since + 1.0) / _WINDOW_TIME) + 1, 1])
         if len(envelope) < 4:
             return None
-        slopes = np.log(np.maximum(envelope[3:], 1e-9) / np.maximum(envelope[:-3], 1e-9)) / (3.0 * _WINDOW)
+        slopes = np.log(np.maximum(envelope[3:], 1e-9) / np.maximum(envelope[:-3], 1e-9)) / (3.0 * _WINDOW_TIME)
         return float(slopes.max())
 
 
-def _settled(sections: Array, value: Array) -> Array:
+def _settled_state(sections: Array, value: Array) -> Array:
     """State of a filter that has settled on a constant input."""
     from scipy.signal import sosfilt_zi
 

@@ -76,16 +76,16 @@ class EditingSummary:
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
         done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
-        shown, told = self.animation, list[str]()
+        shown, changes = self.animation, list[str]()
         if shown is not None:
             changed = max(shown.pushed_deg, shown.unpushed_deg)
-            told = [
+            changes = [
                 f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."
             ]
         return [
             f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
             *pushes_line(self.pushes),
-            *told,
+            *changes,
             *(
                 []
                 if self.until is None or self.seconds >= self.until
@@ -117,17 +117,17 @@ class PerformanceSummary:
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
-        alone, shown, told = self.path.deviation_rms_mm, self.animation, list[str]()
+        alone, shown, changes = self.path.deviation_rms_mm, self.animation, list[str]()
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
         if shown is not None:
             by = f"{shown.unpushed_deg:.1f}°"
             if self.path.pushes:
                 by = f"{shown.pushed_deg:.1f}° a joint where it was pushed, {shown.unpushed_deg:.1f}° elsewhere"
-            told = [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
+            changes = [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
         return [
             f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
             *pushes_line(self.path.pushes),
-            *told,
+            *changes,
         ]
 
 

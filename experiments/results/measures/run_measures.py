@@ -36,8 +36,8 @@ SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has 
 HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
 STANDS_WITHIN = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
-_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
-_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
+_TICK_CHANNELS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
+_FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 
 
 def summarise(
@@ -92,8 +92,10 @@ def measured(
     for start in range(begin, end, BLOCK_FRAMES):
         stop = min(start + BLOCK_FRAMES, end)
         rows = slice(start * per_frame, stop * per_frame)
-        ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
-        frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
+        ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICK_CHANNELS}
+        frames = {
+            name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAME_CHANNELS
+        }
         pushed = path.add(ticks)
         if shown:
             default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
@@ -137,34 +139,34 @@ class PathMeasure:
         self._since, self._handled = since, tuple(handled)
         start, end = recording.array("curve_span")
         self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
-        self._alone = MeanSquare()
+        self._left_alone = MeanSquare()
         self._phase: float | None = None
         self._clip_seconds = float(recording.array("clip_seconds"))
-        self._turned, self._first, self._time = 0.0, 0.0, 0.0
-        self._anchor, self._moved = np.full(3, np.inf), 0.0
-        self._released = -math.inf
+        self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
+        self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
+        self._last_push_time = -math.inf
         self._replayed = "replayed" in recording.texts
         self._pushes: list[PushSummary] = []
-        self._pushing, self._from = False, np.zeros(3)
-        self._along = False  # whether the field has been along a curve at any tick
+        self._pushing, self._push_origin = False, np.zeros(3)
+        self._has_curve = False  # whether the field had a curve at any tick
 
     def add(self, ticks: Mapping[str, Array]) -> Mask:
         """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
         at_work = size > HAND_AT_WORK
-        last = np.maximum.accumulate(np.where(at_work, t, self._released))
+        last = np.maximum.accumulate(np.where(at_work, t, self._last_push_time))
         pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
-        self._released = float(last[-1])
-        along = np.isfinite(ticks["distance"])  # a law without a curve leaves it infinite
-        self._along |= bool(along.any())
-        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed & along])
+        self._last_push_time = float(last[-1])
+        along = np.isfinite(ticks["distance"])  # infinite for a law without a curve
+        self._has_curve |= bool(along.any())
+        self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed & along])
         self._add_phase(t, ticks["phase"])
-        self._add_place(t, ticks["p"])
+        self._add_position(t, ticks["p"])
         handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
         self._add_pushes(ticks, size, at_work & ~handled)
         return pushed
 
-    def _add_place(self, t: Array, p: Array) -> None:
+    def _add_position(self, t: Array, p: Array) -> None:
         """Update the time at which the stylus last moved by more than `STANDS_WITHIN`."""
         k = 0
         while k < len(t):
@@ -172,24 +174,24 @@ class PathMeasure:
             if not far.any():
                 return
             k += int(np.argmax(far))
-            self._anchor, self._moved = p[k].copy(), float(t[k])
+            self._anchor, self._last_move_time = p[k].copy(), float(t[k])
 
     def _add_phase(self, t: Array, phase: Array) -> None:
         if self._phase is None:
-            self._phase, self._first = float(phase[0]), float(t[0])
+            self._phase, self._start_time = float(phase[0]), float(t[0])
         steps = np.diff(phase, prepend=self._phase)
         if self._closed:
             steps -= self._span * np.round(steps / self._span)
-        self._turned += float(np.sum(steps))
-        self._phase, self._time = float(phase[-1]), float(t[-1])
+        self._phase_travelled += float(np.sum(steps))
+        self._phase, self._last_time = float(phase[-1]), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
         for first, last in spans(at_work):
             block = slice(first, last)
             if not (first == 0 and self._pushing):
-                self._from = ticks["p"][first].copy()
+                self._push_origin = ticks["p"][first].copy()
             along = np.isfinite(ticks["distance"][block])
-            away = ticks["p"][block] - np.where(along[:, None], ticks["nearest"][block], self._from)
+            away = ticks["p"][block] - np.where(along[:, None], ticks["nearest"][block], self._push_origin)
             distance = np.linalg.norm(away, axis=1)
             k = int(np.argmax(distance))
             cosine = float(away[k] @ ticks["user"][block][k] / max(distance[k] * size[block][k], 1e-12))
@@ -198,23 +200,25 @@ class PathMeasure:
                 float(t[0]), float(t[-1] - t[0]), float(np.max(size[block])), 1e3 * float(distance[k]), cosine
             )
             if first == 0 and self._pushing:
-                push = _joined(self._pushes.pop(), push)
+                push = _join_pushes(self._pushes.pop(), push)
             self._pushes.append(push)
         self._pushing = bool(at_work[-1])
 
     def summary(self) -> PathSummary:
         """What was taken so far."""
-        laps = self._turned / self._span
-        seconds, clip = self._time - self._first, self._clip_seconds
+        laps = self._phase_travelled / self._span
+        seconds, clip = self._last_time - self._start_time, self._clip_seconds
         lap_seconds = seconds / laps if laps >= 1.0 else None
-        stopped = self._moved if self._time - self._moved >= SETTLING else None
-        moving = (seconds if stopped is None else stopped - self._first) or math.inf
-        pace = None if math.isnan(clip) or not self._along else laps * clip / moving
-        alone, most = (1e3 * self._alone.root, 1e3 * self._alone.largest) if self._alone.count else (None, None)
+        stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING else None
+        moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
+        pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
+        alone, most = (
+            (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
+        )
         return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace)
 
 
-def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
+def _join_pushes(before: PushSummary, after: PushSummary) -> PushSummary:
     """Join the two parts of a push that crosses the border of two blocks."""
     further = max(before, after, key=lambda push: push.deviation_mm)
     return PushSummary(
@@ -228,13 +232,13 @@ class AnimationMeasure:
 
     def __init__(self, recording: Recording, since: float) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
-        self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
+        self._stride, self._next_row = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
         self._pushed, self._unpushed = 0.0, 0.0
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: Mask) -> None:
         """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
-        self._soles.add(frames["reference"][self._next :: self._stride])
-        self._next = (self._next - len(default)) % self._stride
+        self._soles.add(frames["reference"][self._next_row :: self._stride])
+        self._next_row = (self._next_row - len(default)) % self._stride
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING

@@ -6,17 +6,18 @@ from controllers.state import Array
 
 CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
 RATE = 100.0  # [Hz] at which the speed is sampled
-_HIGHEST, _THRESHOLD, _PADDING = 10.0, 0.05, 4  # [Hz], share of the largest value, powers of two
-_SETTLED = 2.0  # periods of the cutoff after which the filter's response to an end has decayed, to some 1e-4
+_MAX_FREQUENCY, _AMPLITUDE_THRESHOLD, _PADDING_POWERS = 10.0, 0.05, 4  # [Hz], share of the largest value, powers of two
+_SETTLING_PERIODS = 2.0  # periods of the cutoff after which the filter's response to an end has decayed, to some 1e-4
 
 
 def speed_profile(velocity: Array, rate: float) -> Array:
     r"""Speed |v| of a velocity (n, 3) sampled at `rate` [Hz], low-passed with zero phase and resampled at `RATE`.
 
     The gain :math:`1/(1 + (f/f_c)^4)` is that of a second-order Butterworth filter run forwards and backwards. Beyond
-    its ends the velocity is continued by point reflection. One not longer than `_SETTLED` periods is not filtered.
+    its ends the velocity is continued by point reflection. A velocity of at most `_SETTLING_PERIODS` periods of the
+    cutoff frequency is not filtered.
     """
-    margin = round(_SETTLED / CUTOFF * rate)
+    margin = round(_SETTLING_PERIODS / CUTOFF * rate)
     smooth = velocity
     if len(velocity) > margin:
         before, after = 2.0 * velocity[0] - velocity[margin:0:-1], 2.0 * velocity[-1] - velocity[-2 : -margin - 2 : -1]
@@ -43,13 +44,13 @@ def spectral_arc_length(speed: Array, rate: float) -> float:
     rate : float
         Sampling rate [Hz].
     """
-    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + _PADDING)
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + _PADDING_POWERS)
     spectrum, frequency = np.abs(np.fft.rfft(speed, size)), np.fft.rfftfreq(size, 1.0 / rate)
     if spectrum.max() <= 0.0:
         return 0.0
-    within = frequency <= _HIGHEST
+    within = frequency <= _MAX_FREQUENCY
     spectrum, frequency = spectrum[within] / spectrum.max(), frequency[within]
-    above = np.flatnonzero(spectrum >= _THRESHOLD)
+    above = np.flatnonzero(spectrum >= _AMPLITUDE_THRESHOLD)
     spectrum, frequency = spectrum[above[0] : above[-1] + 1], frequency[above[0] : above[-1] + 1]
     if len(frequency) < 2:
         return 0.0

@@ -21,12 +21,12 @@ class Soles:
     """
 
     def __init__(self, scene: SceneConfig, touch: float = STANDS):
-        self._touch = touch
+        self._contact_height = touch
         self._model = figure_model(scene.stature, scene.mass)
         self._data = mujoco.MjData(self._model)
         self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
         self._radius = CONTACT_RADIUS * scene.stature / DEFAULT_STATURE
-        self._since = np.full((len(self._geoms), 2), np.nan)
+        self._contact_origin = np.full((len(self._geoms), 2), np.nan)
         self.slide, self.lowest = 0.0, float("inf")
 
     def add(self, poses: Array) -> None:
@@ -37,9 +37,9 @@ class Soles:
             places = self._data.geom_xpos[self._geoms]
             height = places[:, 2] - self._radius
             self.lowest = min(self.lowest, float(height.min()))
-            touching = height < self._touch
-            begins = touching & np.isnan(self._since[:, 0])
-            self._since[begins] = places[begins, :2]
-            self._since[~touching] = np.nan
-            way = np.linalg.norm(places[:, :2] - self._since, axis=1)
-            self.slide = max(self.slide, float(np.max(way[touching], initial=0.0)))
+            touching = height < self._contact_height
+            starting = touching & np.isnan(self._contact_origin[:, 0])
+            self._contact_origin[starting] = places[starting, :2]
+            self._contact_origin[~touching] = np.nan
+            slid = np.linalg.norm(places[:, :2] - self._contact_origin, axis=1)
+            self.slide = max(self.slide, float(np.max(slid[touching], initial=0.0)))

@@ -13,8 +13,8 @@ from experiments.results.measures.phases import Doing, EditingSummary, Performan
 from experiments.results.measures.run_measures import Span, measured
 from sim.recording.recording import Channel, Recording
 
-_CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
-_HELD = 1e-9  # [m] distance from the stylus below which a point of the curve counts as held
+_PRESS_CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
+_MAX_HELD_DISTANCE = 1e-9  # [m] distance from the stylus below which a point of the curve counts as held
 
 
 def editing_summary(
@@ -61,8 +61,10 @@ def press_summaries(
     ticks = recording.groups["ticks"]
     presses: list[PressSummary] = []
     done = taken_back = 0
-    for first, end in _presses(ticks["switch"], ticks["t"], until):
-        press = _press({name: ticks[name][max(first - 1, 0) : end] for name in _CHANNELS}, curve, epsilon, first > 0)
+    for first, end in _press_intervals(ticks["switch"], ticks["t"], until):
+        press = _press_summary(
+            {name: ticks[name][max(first - 1, 0) : end] for name in _PRESS_CHANNELS}, curve, epsilon, first > 0
+        )
         if press.what in ("held", "pushed"):
             done, taken_back = done + 1, 0
         elif press.what in ("undo", "redo"):
@@ -75,7 +77,7 @@ def press_summaries(
     return tuple(presses)
 
 
-def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]:
+def _press_intervals(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]:
     """First tick of every press, and the first tick after it."""
     edges: list[int] = []
     pressed = False
@@ -88,7 +90,7 @@ def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: bool) -> PressSummary:
+def _press_summary(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: bool) -> PressSummary:
     """Summary of one press; if `before`, the first row is the tick before the press."""
     k = int(before)
     t, p, phase, nearest = ticks["t"][k:], ticks["p"][k:], ticks["phase"][k:], ticks["nearest"]
@@ -97,12 +99,12 @@ def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: b
     lap, since, what = (
         float((phase[-1] - curve.start) / curve.duration),
         0,
-        _what(p, seconds, ticks["distance"][k], epsilon),
+        _press_kind(p, seconds, ticks["distance"][k], epsilon),
     )
     if what == "pushed":
         changes = np.flatnonzero(np.diff(phase))
         since = k + int(changes[-1]) if len(changes) else 0
-        # While a tube is pushed the phase stays and the point moves; if the point stays too, nothing was touched.
+        # While a tube is pushed, the phase stays and the point moves; if the point stays too, the tube was not touched.
         if np.all(nearest[since + 1 :] == nearest[-1]):
             what = "nothing"
     if what not in ("held", "pushed"):
@@ -112,10 +114,10 @@ def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: b
     return PressSummary(float(t[0]), seconds, what, lap, 1e3 * dragged, 1e3 * deviation, force)
 
 
-def _what(p: Array, seconds: float, distance: float, epsilon: float) -> Doing:
+def _press_kind(p: Array, seconds: float, distance: float, epsilon: float) -> Doing:
     """Kind of a press, from the stylus path, the duration [s] and the initial distance from the curve [m]."""
     if distance > epsilon:
         return "pushed"
     if np.linalg.norm(p - p[0], axis=1).max() < CLICK_DISTANCE:
         return "undo" if seconds < CLICK_TIME else "redo"
-    return "held" if distance < _HELD else "nothing"
+    return "held" if distance < _MAX_HELD_DISTANCE else "nothing"

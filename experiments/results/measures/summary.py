@@ -66,27 +66,27 @@ class RunSummary:
     def lines(self) -> list[str]:
         """Summary in words, one sentence per line."""
         figure = self.figure
-        warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
+        warnings_text = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
         bent = [] if self.stretch is None else [self.stretch.line()]
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
         return [
             *self.faults,
-            *([fell] if figure is not None and (fell := figure.fall_line()) else []),
+            *([fall_line] if figure is not None and (fall_line := figure.fall_line()) else []),
             *([] if self.oscillation is None else self.oscillation.lines()),
             *bent,
             *changed,
             *([held] if self.tank.scaled_ticks else []),
-            *self._of_the_hand(),
-            *([went] if (went := self.path.line()) else []),
+            *self._hand_lines(),
+            *([pace_line] if (pace_line := self.path.line()) else []),
             *([] if self.animation is None else [self.animation.soles()]),
             *([] if figure is None else figure.lines()),
             *([] if self.arm is None else self.arm.lines()),
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
-            f"MuJoCo's warnings: {warned}.",
+            f"MuJoCo's warnings: {warnings_text}.",
         ]
 
-    def _of_the_hand(self) -> list[str]:
+    def _hand_lines(self) -> list[str]:
         """Sentences on stylus and animation, by kind of run: LEADING, a bent curve, or any other."""
         replayed = [self.trace.line()] if isinstance(self.trace, ReplaySummary) else []
         if self.lead is not None:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from sim.body.residual import Residual
 
-_TOLD = 5  # falls that are listed one by one
-_TOLD_SECONDS = 0.01  # [s] without ground force from which its residual is reported
+_MAX_LISTED_FALLS = 5  # falls that are listed one by one
+_MIN_REPORTED_TIME = 0.01  # [s] without ground force from which its residual is reported
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,9 @@ class FigureSummary:
         """When the figure fell, and over which time it is measured, in a sentence; None if it did not fall."""
         if not self.falls:
             return None
-        when = ", ".join(f"{at:.1f}" for at in self.falls[:_TOLD]) + (", …" if len(self.falls) > _TOLD else "")
+        when = ", ".join(f"{at:.1f}" for at in self.falls[:_MAX_LISTED_FALLS]) + (
+            ", …" if len(self.falls) > _MAX_LISTED_FALLS else ""
+        )
         times = "" if len(self.falls) == 1 else f" ({len(self.falls)} falls)"
         return (
             f"The physical figure fell at {when} s{times}; its measures are over the {self.up_seconds:.1f} of "
@@ -237,7 +239,7 @@ class FigureSummary:
             f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
             f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance.",
             f"Residual in stance, RMS and peak: {stance.brief()} ({stance.verdict()})."
-            + (f" {airborne}" if lost.seconds >= _TOLD_SECONDS else ""),
+            + (f" {airborne}" if lost.seconds >= _MIN_REPORTED_TIME else ""),
         ]
 
 

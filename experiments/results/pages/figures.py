@@ -80,9 +80,9 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
-    drawn, path = courses(recording.static), 1e3 * _rows(recording, "ticks", "p")
+    drawn, path = courses(recording.static), 1e3 * _thinned_rows(recording, "ticks", "p")
     radius = 1e3 * float(recording.array("tube_radius"))
-    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    pushed = np.linalg.norm(_thinned_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
         for course in drawn:
@@ -92,11 +92,13 @@ def path_figure(recording: Recording) -> Figure:
             ax.add_collection(PatchCollection(discs, color=PALE_TUBE, zorder=1), autolim=False)
             ax.update_datalim(np.concatenate([points - radius, points + radius]))
         if radius > 0.0:
-            ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube(recording))
+            ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube_name(recording))
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
         if np.any(pushed):
-            ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label=f"where the hand {_does(recording)}", zorder=3)
+            ax.plot(
+                held[:, i], held[:, j], color=USER, lw=1.6, label=f"where the hand {_hand_action(recording)}", zorder=3
+            )
         ax.margins(0.1)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
@@ -106,14 +108,14 @@ def path_figure(recording: Recording) -> Figure:
 
 def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
-    t = _rows(recording, "ticks", "t")
-    distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
-    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    t = _thinned_rows(recording, "ticks", "t")
+    distance, radius = 1e3 * _thinned_rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
+    pushed = np.linalg.norm(_thinned_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
-        _shade(ax, t, pushed, PALE_USER, f"hand {_does(recording)}")
+        _shade(ax, t, pushed, PALE_USER, f"hand {_hand_action(recording)}")
         if 0.0 < radius < 1.05 * np.max(distance):
-            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube(recording)}")
+            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube_name(recording)}")
         ax.plot(t, distance, color=CURVE)
         ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
         _mark_changes(ax, recording)
@@ -128,12 +130,12 @@ def deviation_figure(recording: Recording) -> Figure:
 
 def forces_figure(recording: Recording) -> Figure:
     """Force of the field on the hand and force of the hand on the stylus, by component [N]."""
-    t = _rows(recording, "ticks", "t")
+    t = _thinned_rows(recording, "ticks", "t")
     figure, axes = _panels(2, 1, height=4.2)
     for ax, name, title in zip(
         axes, ("force", "user"), ("force of the field, limited", "force of the hand"), strict=True
     ):
-        force = _rows(recording, "ticks", name)
+        force = _thinned_rows(recording, "ticks", name)
         ax.plot(t, np.linalg.norm(force, axis=1), color="#b9bec8", lw=2.4, label="norm")
         for axis, color in enumerate(AXES):
             ax.plot(t, force[:, axis], color=color, lw=1.0, label="xyz"[axis])
@@ -145,7 +147,7 @@ def forces_figure(recording: Recording) -> Figure:
 
 def torques_figure(recording: Recording) -> Figure:
     """Torques of the three motors with their continuous and peak limits [mN m]."""
-    t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
+    t, torque = _thinned_rows(recording, "ticks", "t"), 1e3 * _thinned_rows(recording, "ticks", "torque")
     continuous = 1e3 * recording.array("motor_continuous")
     peak = 1e3 * recording.array("motor_peak")
     figure, axes = _panels(3, 1, height=4.8)
@@ -168,14 +170,14 @@ def tracking_figure(recording: Recording) -> Figure:
 
     Frames in which the figure lies, or is being set back onto the animation, are left out.
     """
-    t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
-    down = _rows(recording, "frames", "down") > 0.5
+    t, flight = _thinned_rows(recording, "frames", "t"), _thinned_rows(recording, "frames", "flight") > 0.5
+    down = _thinned_rows(recording, "frames", "down") > 0.5
     weight = float(recording.array("body_weight"))
-    residual = 100 * np.linalg.norm(_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
-    ground = 100 * _rows(recording, "frames", "ground")[:, 2] / weight
+    residual = 100 * np.linalg.norm(_thinned_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
+    ground = 100 * _thinned_rows(recording, "frames", "ground")[:, 2] / weight
     curves = (
-        ("joints: RMS angle to the animation", "[°]", np.rad2deg(_rows(recording, "frames", "joint_error"))),
-        ("root: distance to the animation", "[cm]", 1e2 * _rows(recording, "frames", "root_error")),
+        ("joints: RMS angle to the animation", "[°]", np.rad2deg(_thinned_rows(recording, "frames", "joint_error"))),
+        ("root: distance to the animation", "[cm]", 1e2 * _thinned_rows(recording, "frames", "root_error")),
         ("residual force at the root", "[% body weight]", residual),
         ("ground force, vertical", "[% body weight]", ground),
     )
@@ -193,7 +195,7 @@ def tracking_figure(recording: Recording) -> Figure:
     return figure
 
 
-def _rows(recording: Recording, group: str, name: str) -> Array:
+def _thinned_rows(recording: Recording, group: str, name: str) -> Array:
     channel = recording.channel(group, name)
     return channel[:: max(1, -(-len(channel) // POINTS))]
 
@@ -209,11 +211,11 @@ def legend_above(ax: Axes) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
 
 
-def _does(recording: Recording) -> str:
+def _hand_action(recording: Recording) -> str:
     return recording.texts.get("hand_does", "pushes")
 
 
-def _tube(recording: Recording) -> str:
+def _tube_name(recording: Recording) -> str:
     return recording.texts.get("tube_name", "tube")
 
 

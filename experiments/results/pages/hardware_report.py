@@ -20,7 +20,7 @@ from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 
 SHADES = {State.ARMING: "#f1f1f4", State.RAMPING: "#e3ecf6", State.FAULT: "#f8dedb"}
-_WINDOW = 2.0  # [s] of motion shown, short enough to tell the prediction from the measurement
+_SHOWN_TIME = 2.0  # [s] of motion shown, short enough to tell the prediction from the measurement
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,"><title>{title}</title>
@@ -58,12 +58,12 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
 
 def forces_figure(recording: Recording) -> Figure:
     """Force commanded by the field, force after the gate, and distance from the curve; states of the gate shaded."""
-    t, asked, force = (_thinned(recording, name) for name in ("t", "asked", "force"))
+    t, asked, force = (_thinned_rows(recording, name) for name in ("t", "asked", "force"))
     figure, (above, below) = _panels(2)
     above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="asked for by the field")
     above.plot(t, np.linalg.norm(force, axis=1), color=FIELD, label="let through to the motors")
     above.set(title="force on the hand", ylabel="[N]")
-    below.plot(t, 1e3 * _thinned(recording, "distance"), color=AXES[0])
+    below.plot(t, 1e3 * _thinned_rows(recording, "distance"), color=AXES[0])
     below.set(title="distance from the curve", xlabel="t [s]", ylabel="[mm]")
     for axes in (above, below):
         _shade(axes, recording)
@@ -75,18 +75,18 @@ def twin_figure(recording: Recording) -> Figure:
     """Measured and predicted motion, the distance between them, and the hand's force as estimated by the twin."""
     last = recording.channel("ticks", "t")[-1]
     t = recording.channel("ticks", "t")[:]
-    some = t > last - _WINDOW
+    some = t > last - _SHOWN_TIME
     p, predicted = (1e3 * recording.channel("ticks", name)[:] for name in ("p", "predicted"))
     figure, (motion, apart, force) = _panels(3)
     for i, color in enumerate(AXES):
         motion.plot(t[some], p[some, i], color=color, label=f"{'xyz'[i]} measured")
         motion.plot(t[some], predicted[some, i], color="#222a38", lw=0.8, ls=(0, (2, 3)), label="predicted" * (i == 0))
-    motion.set(title=f"tip of the device and of its twin, the last {_WINDOW:g} s", ylabel="[mm]")
+    motion.set(title=f"tip of the device and of its twin, the last {_SHOWN_TIME:g} s", ylabel="[mm]")
     motion.legend(loc="upper right", ncols=4)
-    apart.plot(_thinned(recording, "t"), 1e6 * _thinned(recording, "apart"), color=AXES[0])
+    apart.plot(_thinned_rows(recording, "t"), 1e6 * _thinned_rows(recording, "apart"), color=AXES[0])
     apart.set(title="from the prediction of a tick to its measurement", ylabel="[µm]")
-    sizes = np.linalg.norm(_thinned(recording, "hand_force"), axis=1)
-    force.plot(_thinned(recording, "t"), sizes, color=USER)
+    sizes = np.linalg.norm(_thinned_rows(recording, "hand_force"), axis=1)
+    force.plot(_thinned_rows(recording, "t"), sizes, color=USER)
     force.set(title="force of the hand, as the twin tells it", xlabel="t [s]", ylabel="[N]")
     return figure
 
@@ -94,11 +94,11 @@ def twin_figure(recording: Recording) -> Figure:
 def servo_figure(recording: Recording) -> Figure:
     """Complementary distribution of computing time and lateness of the ticks."""
     figure, (axes,) = _panels(1)
-    for name, color, says in (("compute", FIELD, "computing"), ("lateness", AXES[1], "late")):
+    for name, color, label in (("compute", FIELD, "computing"), ("lateness", AXES[1], "late")):
         values = np.sort(np.maximum(1e-6, recording.channel("ticks", name)[:]))
         share = 1.0 - np.arange(len(values)) / len(values)
-        kept = np.unique(np.geomspace(1, len(values), 500).astype(int))
-        axes.loglog(1e6 * values[-kept], share[-kept], color=color, label=says)
+        ranks = np.unique(np.geomspace(1, len(values), 500).astype(int))
+        axes.loglog(1e6 * values[-ranks], share[-ranks], color=color, label=label)
     period = 1e6 / recording.rates["ticks"]
     axes.axvline(period, color="#222a38", lw=0.8, ls=(0, (4, 3)), label="a period")
     axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="share of ticks")
@@ -109,15 +109,17 @@ def servo_figure(recording: Recording) -> Figure:
 def link_figure(recording: Recording) -> Figure:
     """Quality of the link: round trip, staleness and jitter; readings lost and refused, deadlines missed."""
     figure, (times, counts) = _panels(2)
-    t = _thinned(recording, "t")
-    for name, color, says in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
+    t = _thinned_rows(recording, "t")
+    for name, color, label in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
                               ("jitter", AXES[0], "jitter")):  # fmt: skip
-        values = 1e6 * _thinned(recording, name)
+        values = 1e6 * _thinned_rows(recording, name)
         if np.isfinite(values).any():
-            times.plot(t, values, color=color, lw=0.8, label=says)
+            times.plot(t, values, color=color, lw=0.8, label=label)
     times.set(title="how the device answers", ylabel="[µs]", yscale="log")
     for name, color in (("lost", FIELD), ("refused", AXES[1]), ("missed", "#9aa3b2")):
-        counts.plot(t, _thinned(recording, name), color=color, label="deadlines missed" if name == "missed" else name)
+        counts.plot(
+            t, _thinned_rows(recording, name), color=color, label="deadlines missed" if name == "missed" else name
+        )
     counts.set(title="readings lost and refused, and deadlines that the servo missed, so far", xlabel="t [s]")
     for axes in (times, counts):
         if axes.lines:
@@ -130,7 +132,7 @@ def _panels(rows: int) -> tuple[Figure, Sequence[Axes]]:
     return figure, [figure.add_subplot(rows, 1, k + 1) for k in range(rows)]
 
 
-def _thinned(recording: Recording, name: str) -> Array:
+def _thinned_rows(recording: Recording, name: str) -> Array:
     channel = recording.channel("ticks", name)
     return channel[:: max(1, len(recording.channel("ticks", "t")[:]) // POINTS)]
 

@@ -32,7 +32,7 @@ def lead_figure(recording: Recording) -> Figure:
     stride, n = max(1, len(t) // POINTS), len(t)
     t, s = t[::stride], recording.channel("ticks", "phase")[: n * every : every * stride]
     turned = int(np.argmax(s))
-    _draw_ways(above, recording, stride, turned)
+    _draw_paths(above, recording, stride, turned)
     _draw_speed(moving, recording, t, s)
     force = recording.channel("ticks", "field")[: n * every : every * stride]
     for axis, colour in enumerate(AXES):
@@ -59,7 +59,7 @@ def _draw_speed(ax: Axes, recording: Recording, t: Array, s: Array) -> None:
     ax.set(title="speed along the path; white: on one foot", ylabel="ds/dt [m/s]", xlim=(t[0], t[-1]))
 
 
-def _draw_ways(ax: Axes, recording: Recording, stride: int, turned: int) -> None:
+def _draw_paths(ax: Axes, recording: Recording, stride: int, turned: int) -> None:
     """Paths over the floor: the hand and the animation's root, forth and back, and the physical figure's root."""
     every, scale = round(recording.rates["ticks"] / recording.rates["frames"]), float(recording.array("lead_scale"))
     hand = scale * recording.channel("ticks", "p")[:][:: every * stride]

@@ -40,7 +40,10 @@ def plots_html(recording: Recording) -> str:
     data = {
         "start": float(t[0]), "end": float(t[-1]),
         "plots": [
-            {"unit": plot.unit, "lines": [{"name": n, "color": c, "y": _short(values)} for n, c, values in plot.lines]}
+            {
+                "unit": plot.unit,
+                "lines": [{"name": n, "color": c, "y": _short_numbers(values)} for n, c, values in plot.lines]
+            }
             for plot in plots
         ],
     }  # fmt: skip
@@ -76,11 +79,11 @@ def _plots(recording: Recording) -> list[Plot]:
     found: list[Plot] = []
     if "distance" in ticks:
         source = recording.texts.get("distance_from", "the curve")
-        distance = Line("distance", CURVE, 1e3 * _largest(ticks["distance"][:]))
+        distance = Line("distance", CURVE, 1e3 * _interval_maxima(ticks["distance"][:]))
         found.append(Plot(f"distance of the hand from {source}", "mm", (distance,)))
     forces = (("force", "field", FIELD), ("user", "hand", USER))
     lines = [
-        Line(name, color, _largest(np.linalg.norm(ticks[channel][:], axis=1)))
+        Line(name, color, _interval_maxima(np.linalg.norm(ticks[channel][:], axis=1)))
         for channel, name, color in forces
         if channel in ticks
     ]
@@ -90,19 +93,19 @@ def _plots(recording: Recording) -> list[Plot]:
         up = (
             frames["down"][:] == UP if "down" in frames else np.array(1.0)
         )  # the wrench that sets a fallen figure back is no residual
-        residual = 100.0 * _largest(up * np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
-        error = np.rad2deg(_largest(frames["joint_error"][:]))
+        residual = 100.0 * _interval_maxima(up * np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
+        error = np.rad2deg(_interval_maxima(frames["joint_error"][:]))
         found.append(Plot("residual force at the root", "% body weight", (Line("residual", CURVE, residual),)))
         found.append(Plot("joints, RMS angle to the animation", "°", (Line("angle", CURVE, error),)))
     return found
 
 
-def _largest(values: Array) -> Array:
+def _interval_maxima(values: Array) -> Array:
     """Values unchanged, or if there are more than `POINTS`, the largest of each interval, so that no peak is lost."""
     if len(values) <= POINTS:
         return values
     return np.maximum.reduceat(values, np.linspace(0, len(values), POINTS, endpoint=False).astype(int))
 
 
-def _short(values: Array) -> list[float]:
+def _short_numbers(values: Array) -> list[float]:
     return [float(f"{value:.4g}") for value in np.nan_to_num(values)]

@@ -72,7 +72,7 @@ def write_report(
         replay=html.escape(replay_html(recording, model)),
         replayed=replayed,
         plots=plots_html(recording),
-        curves=_curves(recording, tube),
+        curves=_curve_legend(recording, tube),
         push=PUSH,
         field=FIELD,
         user=USER,
@@ -84,7 +84,7 @@ def write_report(
     path.write_text(html_page(title, body, _STYLE), encoding="utf-8")
 
 
-def _curves(recording: Recording, tube: str) -> str:
+def _curve_legend(recording: Recording, tube: str) -> str:
     """Legend of the replay: colours of the curve and its tube, or of each river, and a remark if the curve was bent."""
     name, drawn = recording.texts.get("tube_name", "tube"), courses(recording.static)
     if drawn[0].name:

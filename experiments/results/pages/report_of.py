@@ -39,8 +39,8 @@ def write_report_of(folder: Path) -> None:
         if recording.text("hand_does") == "leads":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        title, said = recording.text("title"), lines_of(recording, folder)
-        write_report(folder / REPORT, recording, world_of(recording), title, said, figures)
+        title, lines = recording.text("title"), lines_of(recording, folder)
+        write_report(folder / REPORT, recording, world_of(recording), title, lines, figures)
 
 
 def lines_of(recording: Recording, folder: Path) -> list[str]:

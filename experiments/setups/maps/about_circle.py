@@ -21,7 +21,8 @@ def about_circle(
 ) -> ClipMapParts:  # fmt: skip
     """Map parts of a map of clips about a circle.
 
-    `timing` is the clip whose pace an advised lap keeps, by default the first that does not fly (`grounded`).
+    `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights
+    (`grounded`).
     """
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
@@ -41,7 +42,7 @@ def check_clips(clips: Sequence[Clip], most: int, name: str) -> None:
     Raises
     ------
     ParameterError
-        The map, and how many it takes.
+        If so; the message names the map and how many clips it takes.
     """
     if not 1 <= len(clips) <= most:
         raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; expected so many --clips")

@@ -31,12 +31,12 @@ def composite_parts(
 ) -> ClipMapParts:
     """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
 
-    `parallel` is as for a cylinder.
+    `parallel` is as in `cylindrical_parts`.
 
     Raises
     ------
     ControllerError
-        If there are none, or more than three, or they do not fit together.
+        If there are no clips, or more than three, or they do not fit together.
     """
     lower, red, blue = motions_of(clips, PARTS, "composite")
     legs, radii = figure_legs(figure), place.radii()

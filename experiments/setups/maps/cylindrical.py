@@ -45,7 +45,7 @@ def cylindrical_parts(
     Raises
     ------
     ControllerError
-        If there are none, or more than four, or they do not fit together.
+        If there are no clips, or more than four, or they do not fit together.
     """
     motions, reach = motions_of(clips, CORNERS, "cylindrical"), place.reach
     radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
@@ -53,25 +53,25 @@ def cylindrical_parts(
     def with_legs_of(owner: int) -> CylindricalMap:
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
 
-    def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
+    def choose_legs() -> tuple[CylindricalMap, tuple[str, ...]]:
         return carried(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
     if out_of_step(clips, len(motions), lap):
-        return replace(about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
-    made = _cylinder(motions, radii, (-reach, reach), legs, lap)
+        return replace(about_circle(place, with_legs_of(grounded(clips)), clips), refined=choose_legs)
+    made = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
         if same(clips):
-            alone = balanced(made, figure, lap)
-            # An open clip is played there and back. Backwards it needs the same forces, but is followed less well.
+            balanced_map = balanced(made, figure, lap)
+            # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
             as_prepared = clips[0].closes(CLOSES) and keep_own_pace(clips[:1], made.loops[:1], lap)
-            return alone, () if as_prepared else unbearable(alone, clips[0].name, lap, parallel)
-        return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else carrying()
+            return balanced_map, () if as_prepared else unbearable(balanced_map, clips[0].name, lap, parallel)
+        return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
 
     return replace(about_circle(place, made, clips), refined=refined)
 
 
-def _cylinder(
+def _cached_map(
     clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...],
     lap: float,
 ) -> CylindricalMap:  # fmt: skip

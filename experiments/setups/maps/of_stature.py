@@ -1,4 +1,4 @@
-"""Maps for a figure of any stature: made for the default one, and in proportion to it."""
+"""Maps for a figure of any stature: made for the default stature, and scaled."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,9 +11,9 @@ from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 
 
 def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMapParts]) -> ClipMapParts:
-    """Map parts of a figure of any stature: made for the default one, whose motions clips are, and in proportion to it.
+    """Map parts of a figure of any stature: made for the default stature, which is that of the clips, and scaled.
 
-    Lengths in proportion s at the same times scale accelerations by s, and gravity stays: a flight of the scaled motion
+    Lengths scaled by s at the same times scale accelerations by s, while gravity stays: a flight of the scaled motion
     is ballistic at 1/√s of its own pace (equal Froude number, Alexander 1989, *Optimization and gaits in the locomotion
     of vertebrates*, Physiol. Rev. 69, 1199-1227).
     """
@@ -22,8 +22,8 @@ def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMap
         return made(figure)
     parts = made(figure_model())
     flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
-    falls = (
+    remark = (
         f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
         f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' own pace"
     )
-    return replace(parts, size=size, remarks=parts.remarks + ((falls,) if flying else ()))
+    return replace(parts, size=size, remarks=parts.remarks + ((remark,) if flying else ()))

@@ -13,7 +13,7 @@ from experiments.setups.parts.pace import reached
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
 
-_COMPARED = 5  # places of a lap at which a user-defined derivative is compared: few symmetries of a map have all five
+_N_COMPARED = 5  # phases of a lap at which a user-defined derivative is checked: few symmetries of a map share all five
 
 
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
@@ -28,7 +28,7 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
         name = type(haptic_map).__name__
         raise ParameterError(f"poses of {name} have {haptic_map.nq} numbers; the figure's have {N_POSE}")
 
-    haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _COMPARED, endpoint=False)))
+    haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _N_COMPARED, endpoint=False)))
 
     def none(*_: object) -> Any:
         raise ParameterError("a map of one's own has no rivers; expected another field")

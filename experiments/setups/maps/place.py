@@ -1,4 +1,4 @@
-"""Place of a map of clips: the curve that it lies about, and its domain there."""
+"""Place of a map of clips: its curve, and its domain about the curve."""
 
 from typing import NamedTuple
 

@@ -22,7 +22,7 @@ from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
-_MOST_LAPS = 4  # in a round: with more, a hand waits long for a change, and there are many changes to compute
+_MAX_LAPS = 4  # laps in a round: with more, a hand waits long for a transition, and there are many to compute
 
 
 def river_clips_setup(
@@ -40,7 +40,7 @@ def river_clips_setup(
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = motions_of(clips, 3, part.kind), place_of(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
-    laps, apart = _round(clips, 3, place.curve.duration)
+    laps, apart = _fit_round(clips, 3, place.curve.duration)
     made = RiverClipsMap(
         curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
@@ -53,20 +53,20 @@ def river_clips_setup(
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, not_followed(changing, names, config.figure, figure)
 
-    told = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
-    return replace(parts.with_remarks((told,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
+    remark = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
+    return replace(parts.with_remarks((remark,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
 
 
-def _round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
-    """Laps in a round of clips on `count` rivers, and whether strides are apart: the fewest laps that keep their pace.
+def _fit_round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
+    """Fewest laps of a round in which clips on `count` rivers keep their pace, and whether their strides are apart.
 
-    If none do, the laps in which the clip furthest from its own pace is nearest to it.
+    If there are none, the laps for which the largest deviation of a clip from its own pace is smallest.
     """
     if same(clips):
         return 1, False
     played, best = [clips[i % len(clips)] for i in range(count)], (np.inf, 1, True)
     loops = closed_loops(played)
-    for laps in range(1, _MOST_LAPS + 1):
+    for laps in range(1, _MAX_LAPS + 1):
         for apart in (False, True):
             fitted = in_step(loops, laps * lap, apart)
             if keep_own_pace(played, fitted, laps * lap):

@@ -22,12 +22,13 @@ from models.world.scene import PEDESTAL
 from sim.reference.reference import poses_along
 
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
-_TILT = np.radians(75.0)  # tilt of the tool from the vertical
-ORIENTATION = np.array([np.cos(0.5 * _TILT), 0.0, np.sin(0.5 * _TILT), 0.0])
-_REACH = (0.105, 0.15)  # [m] way of the tool up to which it follows the stylus exactly, and its bound in saturation
-_TURN = (np.radians(15.0), np.radians(25.0))  # [rad] the same of the stylus's rotation
+_TOOL_TILT = np.radians(75.0)  # tilt of the tool from the vertical
+ORIENTATION = np.array([np.cos(0.5 * _TOOL_TILT), 0.0, np.sin(0.5 * _TOOL_TILT), 0.0])
+# [m] displacement up to which the tool follows the stylus exactly, and its bound in saturation
+_TOOL_RANGE = (0.105, 0.15)
+_TURN_RANGE = (np.radians(15.0), np.radians(25.0))  # [rad] the same for the rotation of the stylus
 _ARM_ANGLE = np.radians(30.0)  # ψ of `controllers.haptic_map.robot_arm.RobotArm` [rad]
-_SAMPLES = 241  # of a curve, where it is furthest away
+_SAMPLE_COUNT = 241  # samples of a curve in the search for its farthest point
 _CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
 
 
@@ -41,8 +42,8 @@ def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
 
 def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:
     """The map by which the tool of an arm follows the stylus in front of it, its displacements scaled [1]."""
-    near, far = (way / scale for way in _REACH)
-    return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, (near, far), _TURN, float(_ARM_ANGLE))
+    near, far = (distance / scale for distance in _TOOL_RANGE)
+    return RobotArmMap(arm_lengths(arm), HOME, ORIENTATION, scale, (near, far), _TURN_RANGE, float(_ARM_ANGLE))
 
 
 def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float) -> ClipMapParts:
@@ -62,21 +63,22 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     Raises
     ------
     ParameterError
-        If the tool would not go all the way that the curve, scaled, leads it. What the arm does not reach is refused
-        when the parts are refined, which evaluates the map.
+        If the scaled curve leads the tool farther than it follows exactly. What the arm does not reach is refused when
+        the parts are refined, which evaluates the map.
     SimError
         If the Phantom does not reach the curve.
     """
-    away = float(np.linalg.norm(reached(curve).point(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
-    if scale * away > _REACH[0]:
+    away = float(np.linalg.norm(reached(curve).point(np.linspace(curve.start, curve.end, _SAMPLE_COUNT)), axis=1).max())
+    if scale * away > _TOOL_RANGE[0]:
         raise ParameterError(
-            f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most {1e3 * _REACH[0]:.0f} mm "
-            f"from its home; expected --scale {_REACH[0] / away:.2g} or less, or a smaller curve"
+            f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most "
+            f"{1e3 * _TOOL_RANGE[0]:.0f} mm from its home; expected --scale {_TOOL_RANGE[0] / away:.2g} or less, or a "
+            "smaller curve"
         )
     made = robot_arm_map(arm, scale)
 
     def refined() -> tuple[ClipMap, tuple[str, ...]]:
-        made.check_domain(arm_limits(arm), _evaluated)
+        made.check_domain(arm_limits(arm), _evaluate)
         return cast(ClipMap, made), ()
 
     return ClipMapParts(
@@ -98,7 +100,7 @@ def tilted(circle: Trajectory) -> Trajectory:
     return Trajectory(times, turned, periodic=True)
 
 
-def _evaluated(compiled: CompiledMap, points: Array) -> Array:
+def _evaluate(compiled: CompiledMap, points: Array) -> Array:
     poses = np.empty((len(points), len(ARM_JOINTS)))
     poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
     return poses

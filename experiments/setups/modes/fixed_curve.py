@@ -79,11 +79,11 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),
         remarks=turning_remark(user, maps.oriented) + late_remark(user, config.seconds),
-        summarise=_traced if traces else lambda summary, of: summary,
+        summarise=_add_trace if traces else lambda summary, of: summary,
     )  # fmt: skip
 
 
-def _traced(summary: RunSummary, of: Measuring) -> RunSummary:
+def _add_trace(summary: RunSummary, of: Measuring) -> RunSummary:
     return replace(summary, trace=trace_summary(of.recording))
 
 

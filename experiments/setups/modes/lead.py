@@ -24,13 +24,14 @@ from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
-_START = 0.025  # [m] from its place on the curve within which a hand begins
-# Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
-_FLYING_LATERAL = 1.2
-# Largest pace of a gait with flights, over the clip's own: played faster it lands late, since gravity stays the same.
+_START_RADIUS = 0.025  # [m] largest distance of the hand from its place on the curve at the start
+# Largest lateral acceleration of a gait with flights [m/s²]: leaning more, the figure falls after a slightly missed
+# landing.
+_MAX_FLYING_LATERAL = 1.2
+# Largest pace of a gait with flights over the clip's own: played faster, it lands late, since gravity stays the same.
 # The same holds for a run led by steps: its limbs already swing as fast as in the run; if they swing faster, motors of
 # the stance leg saturate.
-_RUNNING_FORWARD = 1.0
+_MAX_RUNNING_PACE = 1.0
 
 
 def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
@@ -38,7 +39,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     field, course = leading(mode, maps.gait), s_curve()
     config = replace(config, mode=replace(mode, floor_scale=field.walking.scale))
     limiter = ForceLimiter(config.clock.servo_period)
-    tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
+    tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START_RADIUS, limiter)
     gait = field.walking.gait
     static = {"lead_scale": field.walking.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
@@ -50,7 +51,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
         return replace(summary, lead=lead)
 
     return Parts(
-        config=config, maps=maps, field=field, program=field.program(), course=course, user=_hand(config, field),
+        config=config, maps=maps, field=field, program=field.program(), course=course, user=_make_hand(config, field),
         tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walking=field.walking,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
@@ -67,13 +68,13 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
     scale = FORTH * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
-    flying = {"lateral": _FLYING_LATERAL} if gait.flies else {}
-    running = {"forward": _RUNNING_FORWARD} if gait.flies or gait.grounded else {}
+    flying = {"lateral": _MAX_FLYING_LATERAL} if gait.flies else {}
+    running = {"forward": _MAX_RUNNING_PACE} if gait.flies or gait.grounded else {}
     walking = Walking(gait, (float(x), float(y)), -BEND, scale, **flying, **running)
     return Leading(walking, k_l=mode.leash, b=mode.damping)
 
 
-def _hand(config: RunConfig, field: Leading) -> Arm | Participant:
+def _make_hand(config: RunConfig, field: Leading) -> Arm | Participant:
     """The hand that leads: an arm's impedance, or a person along the same path."""
     arm, person = leading_hand(field), config.user.person
     if person is None:

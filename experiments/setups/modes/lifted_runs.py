@@ -18,11 +18,13 @@ from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
 from sim.users.hand.actions import Push
 
-_SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
-_SECONDS = 0.6  # [s] duration of a push from one curve to another
-_LEAD = 0.36  # [s] before the transition at which the push begins: with 0.34 to 0.55 the figure stands (nine pushes)
-_CROSSING = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
-_STAY = 3  # laps on the other curve
+# Admissible speeds over the river's own: a hand from a neighbouring river has that river's speed.
+_SPEED_RANGE = (0.5, 2.0)
+_PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
+# [s] from the start of a push to the transition: with 0.34 to 0.55 the figure stays up (nine pushes)
+_PUSH_LEAD_TIME = 0.36
+_CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
+_STAY_LAPS = 3  # laps on the other curve
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
 HELD_GAINS = FigureGains(contact_reach=0.004)
@@ -84,7 +86,7 @@ def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverCho
 def lifted_river(course: Trajectory, mode: Rivers) -> River:
     """The river of a clip along its course; it takes a hand at half to twice its own speed."""
     speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
-    return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEEDS))
+    return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEED_RANGE))
 
 
 def best_transition(haptic_map: Lifted, curve: str) -> MapTransition:
@@ -121,7 +123,7 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
     begin = laps[0]
     return (
         pushed_over(haptic_map, first, second, best.angle, begin, damping),
-        pushed_over(haptic_map, second, first, best.angle, begin + _STAY * laps[1], damping),
+        pushed_over(haptic_map, second, first, best.angle, begin + _STAY_LAPS * laps[1], damping),
     )
 
 
@@ -147,10 +149,10 @@ def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start
     curve, angles = haptic_map.curve(first), haptic_map.angles[first]
     # A closed clip may begin at any angle of the lap.
     frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
-    at = frame / haptic_map.clips[first][1] - _LEAD
+    at = frame / haptic_map.clips[first][1] - _PUSH_LEAD_TIME
     place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))
-    way = haptic_map.curve_point(second, angle) - haptic_map.curve_point(first, angle)
-    distance = float(np.linalg.norm(way))
-    x, y, z = (float(value) for value in way)
+    displacement = haptic_map.curve_point(second, angle) - haptic_map.curve_point(first, angle)
+    distance = float(np.linalg.norm(displacement))
+    x, y, z = (float(value) for value in displacement)
     p, q, r = (float(value) for value in place)
-    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), NEAR)
+    return Push(start, _PUSH_DURATION, _CROSSING_RATE * drag * distance, (x, y, z), (p, q, r), NEAR)

@@ -26,7 +26,7 @@ ADMISSION, HYSTERESIS = 1.2, 0.15
 # [m/s] least hysteresis of rivers that cross, that of the encoders' noise: with less of it a push out of a river at
 # 32 mm/s changes over 20 times in 0.3 s instead of once (docs/validation/crossing-rivers.md).
 LEAST_HYSTERESIS = 0.01
-BESIDE = 0.05  # the same of rivers side by side, as those of a lifted map: position tells them apart, not direction
+BESIDE = 0.05  # hysteresis over speed of rivers side by side, as on a lifted map: position tells them apart
 # In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
 # both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
@@ -57,7 +57,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
 
 
 def slow_remark(pace: float) -> tuple[str, ...]:
-    """That rivers of a speed [m/s] are too slow for a push across, if they are."""
+    """Remark, if rivers of this speed [m/s] are too slow for a push from one into another."""
     if pace >= SLOWEST:
         return ()
     return (
@@ -67,7 +67,7 @@ def slow_remark(pace: float) -> tuple[str, ...]:
 
 
 def beside(curves: tuple[Trajectory, ...], own: Trajectory) -> Trajectory | None:
-    """The river nearest to one's own, by the mean distance at equal shares of the lap; None if there is no other."""
+    """The curve nearest to `own`, by the mean distance at equal shares of the lap; None if there is no other."""
     share = np.linspace(0.0, 1.0, 33)
     here = own.point(own.start + share * own.duration)
     away = [np.linalg.norm(c.point(c.start + share * c.duration) - here, axis=1).mean() for c in curves]

@@ -42,30 +42,30 @@ from sim.world.world import FigureKind
 # [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
 # it.
 REACH = 1.8
-# Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
+# Distance from the curve, in tube radii, at which the hand aims to press; the seeking spring pulls it in by a third.
 OUTSIDE = 2.2
-EASE = 1.0  # [s] in which the bent curve comes up to its pace: a body in mid-step cannot go on at full speed at once
-_BEND = 2.0  # steepest slope of a bump of height and half width 1, rounded up
+EASE = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
+_MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch"."""
-    return _parts(config, mode, maps, maps.curve, _Performance(None, np.inf), ())
+    return _make_parts(config, mode, maps, maps.curve, _Performance(None, np.inf), ())
 
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch-then-follow": FOLLOW on the bent curve once the last grab is over."""
     course = maps.course(mode.damping, mode.stiffness)
-    user = _user(config, mode, maps)
+    user = _resolve_user(config, mode, maps)
     until = edited_until(user.grabs)
     carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)
-    power = river_power(mode.damping, fastest(course) + _BEND * carried / mode.bump)
+    power = river_power(mode.damping, fastest(course) + _MAX_BUMP_SLOPE * carried / mode.bump)
     late = f"the curve is bent until {until:.1f} s and performed then; give --seconds more than that"
     remarks = (late,) if config.seconds <= until else ()
     performance = _Performance(
         Follow(course, mode.stiffness, mode.damping, mode.tube), until, ((mode.stiffness, mode.tube),), power
     )
-    return _parts(config, mode, maps, course, performance, remarks)
+    return _make_parts(config, mode, maps, course, performance, remarks)
 
 
 class _Performance(NamedTuple):
@@ -77,7 +77,7 @@ class _Performance(NamedTuple):
     power: float = 0.0
 
 
-def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
+def _resolve_user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
     if isinstance(config.device, Replay):
         return config.user
     by_default = stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
@@ -87,7 +87,7 @@ def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapPar
     return resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
 
 
-def _parts(
+def _make_parts(
     config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts, course: Trajectory,
     performance: _Performance, remarks: tuple[str, ...],
 ) -> Parts:  # fmt: skip
@@ -99,7 +99,7 @@ def _parts(
             f"a lap of {lap:g} s is too short for a bend of --bump {mode.bump:g} s to either side; expected --lap "
             f"{least:g} or more, or --bump {most:g} or less"
         )
-    user = _user(config, mode, maps)
+    user = _resolve_user(config, mode, maps)
     seek, damping = tube_gains(mode)
     tubes = StretchyTubes(
         course, seek, mode.rubber, damping,
@@ -181,7 +181,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     away = (third - centre) / np.linalg.norm(third - centre)
     outwards = 0.02 * share * (first - centre) / np.linalg.norm(first - centre)
     still = np.zeros(3)
-    doings = (
+    actions = (
         (outwards, 1.3, 0.4, first),
         (np.array([0.0, 0.0, 0.015 * share]), 1.3, 0.4, second),
         (still, 0.15, 0.0, None),
@@ -189,12 +189,12 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
         (-(OUTSIDE * epsilon - epsilon + share * (epsilon + 0.01)) * away, 1.3, 0.4, third + OUTSIDE * epsilon * away),
     )
     grabs: list[Grab] = []
-    for carry, duration, hold, place in doings:
+    for carry, duration, hold, place in actions:
         start = grabs[-1].end + PAUSE if grabs else PAUSE
-        grabs.append(Grab(start, _vector(carry), duration, hold, None if place is None else _vector(place), REACH))
+        grabs.append(Grab(start, _as_tuple(carry), duration, hold, None if place is None else _as_tuple(place), REACH))
     return tuple(grabs)
 
 
-def _vector(values: Array) -> tuple[float, float, float]:
+def _as_tuple(values: Array) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -12,7 +12,7 @@ from sim.reference.reference import make_reference, no_reference
 from sim.reference.reference_state import CompiledReference
 from sim.world.world import World
 
-_RATE = 60.0  # feedback rate of the robot arm's computed-torque control [1/s]
+_FEEDBACK_RATE = 60.0  # feedback rate of the robot arm's computed-torque control [1/s]
 
 
 def body_of(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
@@ -33,25 +33,25 @@ def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledRef
     )  # fmt: skip
 
 
-def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+def _physical_body(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
     bounds = parts.config.figure
     gains = parts.gains._replace(force_bound=bounds.residual_force, moment_bound=bounds.residual_moment)
     figure = Figure(world.model, world.data, world.body, FIGURE, gains, figure_period(parts.config))
     return figure.state, _reference(parts, world, compiled)
 
 
-def _kinematic(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+def _kinematic_body(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
     return kinematic_figure(), _reference(parts, world, compiled)
 
 
-def _none(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+def _no_body(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
     return no_figure(), no_reference()
 
 
-def _robot(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+def _robot_body(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
     smoothing = parts.config.figure.smoothing
     reference = make_reference(world.body, compiled, figure_period(parts.config), smoothing)
-    return robot_state(world, _RATE), reference
+    return robot_state(world, _FEEDBACK_RATE), reference
 
 
-_BODIES = {"physical": _physical, "kinematic": _kinematic, "none": _none, "robot": _robot}
+_BODIES = {"physical": _physical_body, "kinematic": _kinematic_body, "none": _no_body, "robot": _robot_body}

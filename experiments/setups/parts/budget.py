@@ -1,6 +1,6 @@
 r"""Energy tank of a run: the power and energy that its field may inject.
 
-The tank is dimensioned so that a run as intended never empties it, and a wrong or late law does.
+The tank is dimensioned such that a normal run never empties it, while a wrong or late law does.
 
 .. math:: P = \tfrac14 b_d |\dot\varphi|^2_{max}
 
@@ -20,8 +20,8 @@ from controllers.safety.energy_tank import EnergyTank, spring_store
 from controllers.safety.limiter import ForceLimiter
 
 SPAN = 0.2  # [m] by which a spring can be drawn: the width of the workspace
-_LEAST = 1e-3  # [W], [J] for a field without springs or dampers: quantised encoders falsify the measured work
-_SAMPLES = 512  # samples of a curve in the search for its greatest speed
+_MIN_BUDGET = 1e-3  # [W], [J] for a field without springs or dampers: quantised encoders falsify the measured work
+_SAMPLE_COUNT = 512  # samples of a curve in the search for its greatest speed
 
 
 def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float, limiter: ForceLimiter) -> EnergyTank:
@@ -38,17 +38,17 @@ def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float,
     limiter : ForceLimiter
         Bounds the force of the device.
     """
-    stores = (sum(_store(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
-    power, capacity, initial = (max(number, _LEAST) for number in (power, *stores))
+    stores = (sum(_spring_energy(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
+    power, capacity, initial = (max(number, _MIN_BUDGET) for number in (power, *stores))
     drain_time = max(EnergyTank.drain_time, 2.0 * limiter.period)  # two periods are the least that a tank accepts
     return EnergyTank(limiter.period, power, capacity, drain_time, initial)
 
 
-def _store(spring: tuple[float, float], most: float, force: float) -> float:
+def _spring_energy(spring: tuple[float, float], most: float, force: float) -> float:
     stiffness, reach = spring
     return spring_store(stiffness, min(reach, most), force)
 
 
 def fastest(curve: Trajectory) -> float:
-    """Greatest |φ̇| at `_SAMPLES` phases [m/s]."""
-    return float(np.linalg.norm(curve.velocity(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
+    """Greatest |φ̇| at `_SAMPLE_COUNT` phases [m/s]."""
+    return float(np.linalg.norm(curve.velocity(np.linspace(curve.start, curve.end, _SAMPLE_COUNT)), axis=1).max())

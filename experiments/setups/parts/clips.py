@@ -9,7 +9,7 @@ from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 
 BLINK = 0.05
-"""Shortest flight of a clip that counts [s]: half or twice of it changes none of eight captures that are led."""
+"""Shortest flight of a clip that counts [s]: half or twice this value changes none of eight captures that are led."""
 
 
 def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...], tuple[str, ...]]:

@@ -44,24 +44,24 @@ def device_of(settings: Settings, world: World, seconds: float | None) -> Device
         if device.device_file:
             linkage_of(device).into(world)
         return None
-    rows, period = _recorded(device)
+    rows, period = _read_hand(device)
     servo = settings.clock.servo_period
     if abs(period - servo) > 1e-9:
         raise SimError(
             f"{device.run}: the hand was recorded every {period:g} s, and the servo runs every {servo:g} s; expected "
             f"--servo-period {period:g}"
         )
-    every, least = settings.figure.figure_ticks, len(rows) * period
+    every, available = settings.figure.figure_ticks, len(rows) * period
     if seconds is not None and every * round(seconds / (servo * every)) > len(rows):
         raise ParameterError(
-            f"{device.run}: the recorded hand moves for {least:g} s, and the run lasts {seconds:g} s; expected "
-            f"--seconds {least:g} or less"
+            f"{device.run}: the recorded hand moves for {available:g} s, and the run lasts {seconds:g} s; expected "
+            f"--seconds {available:g} or less"
         )
     return lambda world: replayed_hand(rows, world, period)
 
 
 def recorded_as(settings: Settings, device: DeviceState) -> dict[str, str]:
-    """What a recording keeps of a replayed hand: where it is from, and its hash; empty for another device."""
+    """Texts that a recording stores about a replayed hand: its source and its hash; empty for another device."""
     if isinstance(settings.device, Replay) and isinstance(device, ReplayedHand):
         return {"replayed": settings.device.run, "hand_sha256": _digest(device.rows)}
     return {}
@@ -78,7 +78,7 @@ def check_hand(settings: Settings, recording: Recording) -> None:
     recorded, device = recording.texts.get("hand_sha256"), settings.device
     if recorded is None or not isinstance(device, Replay):
         return
-    found = _digest(_recorded(device)[0])
+    found = _digest(_read_hand(device)[0])
     if found != recorded:
         raise SimError(
             f"{device.run}: the recorded hand has changed since the run was recorded: its SHA-256 is {found[:12]}…, "
@@ -86,7 +86,7 @@ def check_hand(settings: Settings, recording: Recording) -> None:
         )
 
 
-def _recorded(device: Replay) -> tuple[Array, float]:
+def _read_hand(device: Replay) -> tuple[Array, float]:
     """Hand vectors of a recording, shape (n, 15), and the period between them [s]."""
     with Recording(Path(device.run) / RECORDING) as recording:
         return recorded_hand(recording), 1.0 / recording.rates["ticks"]

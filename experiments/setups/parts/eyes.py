@@ -16,8 +16,9 @@ from sim.users.person.eye import Eye
 from sim.users.person.wishes import ENGAGED, PLACE, Wishes
 
 POSES = 128  # poses along a motion: some 3 degrees of a lap apart
-_BESIDE = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
-_BLIND = 0.15  # damping of the inverse over the largest singular value: weaker effects are felt rather than seen
+_DIFFERENCE_STEP = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
+# Damping of the inverse over the largest singular value: weaker effects are felt rather than seen.
+_DAMPING_RATIO = 0.15
 
 
 def with_eyes(servo: Servo, wishes: Wishes, curve: Array) -> Servo:
@@ -53,11 +54,11 @@ def learned_eye(servo: Servo, places: Array) -> Eye:
         return found
 
     effects = np.stack([
-        pose_difference(poses(places - step), poses(places + step)) / (2.0 * _BESIDE)
-        for step in _BESIDE * np.eye(3)
+        pose_difference(poses(places - step), poses(places + step)) / (2.0 * _DIFFERENCE_STEP)
+        for step in _DIFFERENCE_STEP * np.eye(3)
     ], axis=2)  # fmt: skip
     u, strengths, v = np.linalg.svd(effects, full_matrices=False)
-    trust = (_BLIND * strengths[:, 0]) ** 2
+    trust = (_DAMPING_RATIO * strengths[:, 0]) ** 2
     inverses = np.einsum("nij,ni,nki->njk", v, strengths / (strengths**2 + trust[:, None]), u)
     unseen = np.eye(3) - inverses @ effects
     return Eye(reference.pose, poses(places), *(np.ascontiguousarray(a) for a in (places, inverses, unseen, trust)))

@@ -17,8 +17,8 @@ from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 
-_FPS = 120.0  # [1/s] frame rate of the animation whose flights are judged
-_FASTEST = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
+_FRAME_RATE = 120.0  # [1/s] frame rate of the animation whose flights are judged
+_MAX_SPEED = 10.0  # [m/s] bound where there is no other: no hand is faster
 
 
 def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:
@@ -38,7 +38,7 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
     if isinstance(haptic_map, RiverClips):
         change_clip(compiled.params, memory, float(river), curve.start)
         seconds, laps = haptic_map.loops[river].duration, haptic_map.laps
-    frames = max(64, round(_FPS * seconds)) + 1
+    frames = max(64, round(_FRAME_RATE * seconds)) + 1
     stylus = stylus_path(curve.point(np.linspace(curve.start, curve.start + laps * curve.duration, frames)))
     return Clip(map_poses(haptic_map, stylus, memory), (frames - 1) / seconds, "along the curve")
 
@@ -86,7 +86,7 @@ def speeds_along(maps: ClipMapParts, curve: Trajectory, river: int = 0, course: 
     low, high = np.max([low for low, _ in found], axis=0), np.min([high for _, high in found], axis=0)
     # Where the least speed is infinite, no speed makes the motion ballistic: none is demanded of the hand.
     low = np.minimum(np.where(np.isfinite(low), low, 0.0), high)
-    return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
+    return np.stack((np.minimum(low, _MAX_SPEED), np.minimum(high, _MAX_SPEED)), axis=1)
 
 
 def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:

@@ -30,18 +30,21 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-NEAR = 3e-3  # [m] from its place within which a push across begins: a fifth of a river's tube
-SLOWEST = 0.0235  # [m/s]: in slower rivers no push across was found, only ones too weak or ones that throw out of all
+NEAR = 3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
+SLOWEST = 0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 TRACED = 0.01  # [s] between samples of a path that the hand traces
 
-_CROSSING = 0.5  # share of the lap at which the wave rises through the level river
-_LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
-_PACE = 0.0749  # [m/s] of the default rivers, at which these and `RIVER_PUSH` were measured
-_FASTEST = 0.2  # [m/s]: in faster rivers a push is as in these, for a harder one throws the hand out of all
-_WEAKER = 0.2  # power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind
-_AWAY = 1e-3  # [m] standard deviation of the start position
-_SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
+_CROSSING_PHASE = 0.5  # share of the lap at which the wave rises through the level river
+# [s] from the start of a push to the crossing, and its duration
+_LEAD_TIME, _PUSH_DURATION = 0.05, 0.3
+_REFERENCE_SPEED = 0.0749  # [m/s] of the default rivers, at which these and `RIVER_PUSH` were measured
+_MAX_SCALED_SPEED = 0.2  # [m/s] in faster rivers a push is the same as at this speed: a harder one throws the hand out
+# Power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind.
+_SLOW_FORCE_EXPONENT = 0.2
+_START_SPREAD = 1e-3  # [m] standard deviation of the start position
+# [m/s] least speed that turns an offset into a phase; largest phase as a share of a lap
+_MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
 
 
 class Beginning(NamedTuple):
@@ -71,11 +74,13 @@ def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Begin
         Whether the run begins in motion. The offset is then along the curve, not beside it: the field pulls a hand back
         to its curve within a fiftieth of a second, which a figure at full speed cannot follow.
     """
-    away = rng.normal(scale=_AWAY, size=3)
+    offset = rng.normal(scale=_START_SPREAD, size=3)
     if not moves:
-        return Beginning(curve.point(curve.start) + away, np.zeros(3), np.zeros(3))
+        return Beginning(curve.point(curve.start) + offset, np.zeros(3), np.zeros(3))
     speed = float(np.linalg.norm(curve.velocity(curve.start)))
-    phase = curve.start + min(float(np.linalg.norm(away)) / max(speed, _SLOW), _FURTHEST * curve.duration)
+    phase = curve.start + min(
+        float(np.linalg.norm(offset)) / max(speed, _MIN_START_SPEED), _MAX_START_PHASE * curve.duration
+    )
     return Beginning(curve.point(phase), curve.velocity(phase), curve.acceleration(phase))
 
 
@@ -106,14 +111,14 @@ def resolved_user(
     if user.does == "turn" and not turns:
         laps = range(1, max(2, int(seconds / lap)))
         turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
-    done = user.pushes
-    if user.does == "push" and not done and pushes is not None:
-        done = pushes
-    elif user.does == "push" and not done:
+    user_pushes = user.pushes
+    if user.does == "push" and not user_pushes and pushes is not None:
+        user_pushes = pushes
+    elif user.does == "push" and not user_pushes:
         begin = first_pushed_lap(curve, grabs)
         laps = range(max(1, int((seconds - begin) / lap)))
-        done = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
-    return User(does=user.does, pushes=done, turns=turns, grabs=grabs, person=user.person)
+        user_pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
+    return User(does=user.does, pushes=user_pushes, turns=turns, grabs=grabs, person=user.person)
 
 
 def user_hand(
@@ -205,8 +210,8 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
 
     At s times the default rivers' speed a push lasts 1/s times as long. Against a river's damping it then needs s times
     the force, and against its stiffness the same force, since distances are the same. In faster rivers, up to
-    `_FASTEST`, damping counts, and it gets s times the force; in slower ones it gets s^0.2 times, between the two.
-    There is none in rivers slower than `SLOWEST`.
+    `_MAX_SCALED_SPEED`, damping dominates and the push gets s times the force; in slower ones it gets s^0.2 times the
+    force, between the two cases. There are no pushes in rivers slower than `SLOWEST`.
 
     Parameters
     ----------
@@ -219,8 +224,11 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     pace = curve.length / lap
     if pace < SLOWEST:
         return ()
-    share = min(pace, _FASTEST) / _PACE
-    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD / share))
-    over, force = _OVER / share, share ** (1.0 if share > 1.0 else _WEAKER) * RIVER_PUSH
+    speed_ratio = min(pace, _MAX_SCALED_SPEED) / _REFERENCE_SPEED
+    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING_PHASE * lap - _LEAD_TIME / speed_ratio))
+    duration, force = (
+        _PUSH_DURATION / speed_ratio,
+        speed_ratio ** (1.0 if speed_ratio > 1.0 else _SLOW_FORCE_EXPONENT) * RIVER_PUSH,
+    )
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
-    return tuple(Push(float(start), over, force, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)
+    return tuple(Push(float(start), duration, force, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)

@@ -26,9 +26,10 @@ from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import lap_of
 from sim.world.world import FigureKind
 
-_PHASES = 256  # samples of a lap that tell which feet stand: of a lap of a second, one in 4 ms
-_UNLIKE = np.deg2rad(15.0)  # pose gap above which ends are not of one cycle: CMU 02_01's lap has 5°, its whole clip 35°
-_SWING = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
+_PHASE_COUNT = 256  # samples of the stance over a lap: one in 4 ms for a lap of a second
+# Difference of the end poses above which a clip is not a cycle: CMU 02_01's lap has 5°, its whole clip 35°.
+_MAX_CYCLE_GAP = np.deg2rad(15.0)
+_MIN_SWING_TIME = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +82,8 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
     A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise. A figure of another stature
-    moves in proportion, with strides of its size.
+    stance feet held (`Capture`); so is a clip with flights for which no other form without flights exists. A figure of
+    another stature moves in proportion, with strides of its size.
 
     Raises
     ------
@@ -94,17 +95,17 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     size, legs = proportion(figure), figure_legs(figure)
     clip, capture = lap.clip.resized(size), Capture(CONTACT_RADIUS * size)
     if not closes:
-        return _led(clip, legs, stances(marks, clip.fps), capture)
-    made = _led(clip, legs, marks.planted[:-1], None)
+        return _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
+    made = _map_and_gait(clip, legs, marks.planted[:-1], None)
     if made[0].flies and not made[0].grounds:
-        steps = _led(clip, legs, stances(marks, clip.fps), capture)
+        steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
         return steps if steps[0].grounds else made
     return made
 
 
-def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
+def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
     """Map and gait of one lap; `stands` marks the feet on the floor in each of its frames but the last."""
-    phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
+    phases, steps = np.linspace(0.0, 1.0, _PHASE_COUNT, endpoint=False), clip.n_frames - 1
     sampled = stands[np.round(phases * steps).astype(int) % steps]
     support = sampled.sum(axis=1).astype(np.int64)
     if not support.any():
@@ -124,7 +125,7 @@ def lap_remark(clip: Clip, figure: FigureKind) -> tuple[str, ...]:
         remarks.append(
             f"of the clip {clip.name!r} the lap that repeats itself best is led, {lap.start:.2f} to {lap.end:.2f} s"
         )
-    if lap.gap > _UNLIKE:
+    if lap.gap > _MAX_CYCLE_GAP:
         remarks.append(
             f"the clip {clip.name!r} does not repeat itself (its ends are {np.degrees(lap.gap):.0f}° apart): it is "
             "closed over its ends" + (", and the physical figure may fall there" if figure == "physical" else "")
@@ -135,15 +136,15 @@ def lap_remark(clip: Clip, figure: FigureKind) -> tuple[str, ...]:
 def stances(marks: Contacts, fps: float) -> Mask:
     """Stance of each foot of a capture, shape (n − 1, 2), for n frames of which the last begins the next lap.
 
-    Contact marks are cleaned in three steps. A foot that is up for less than `_SWING` stands throughout. Where no foot
-    is settled, one that stood and is still planted goes on standing: it has not left the floor, but sunk into it. A
-    flight shorter than `BLINK` is none: the feet that stood before it go on standing.
+    Contact marks are cleaned in three steps. A foot that is up for less than `_MIN_SWING_TIME` stands throughout. Where
+    no foot is settled, a foot that was in stance and is still planted stays in stance: it has not left the floor, but
+    sunk into it. A flight shorter than `BLINK` is ignored: the feet in stance before it stay in stance.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
     for foot in range(stands.shape[1]):
         for start, end in runs(~stands[:, foot]):
-            if end - start < _SWING * fps:
+            if end - start < _MIN_SWING_TIME * fps:
                 stands[np.arange(start, end) % n, foot] = True
     for start, end in runs(~np.any(stands, axis=1)):
         for sample in range(start, end):

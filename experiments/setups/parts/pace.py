@@ -19,10 +19,11 @@ from models.phantom.kinematics import jacobian, vector_to_device_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.world import phantom_angles
 
-# Step to either side for the finite difference of joint rates [s]: half or twice moves a friction of 2 mN by 2e-8 N
-# at most.
-_STEP = 1e-3
-_LONGER = 0.5  # largest relative lengthening of the path: beyond, the spring is too soft to keep the tip on the curve
+# Step to either side for the finite difference of joint rates [s]: half or twice this value changes a friction of 2 mN
+# by 2e-8 N at most.
+_TIME_STEP = 1e-3
+# Largest relative lengthening of the path: beyond, the spring is too soft to keep the tip on the curve.
+_MAX_LENGTHENING = 0.5
 
 
 def friction_along(curve: Trajectory, phases: Array) -> Array:
@@ -35,7 +36,7 @@ def friction_along(curve: Trajectory, phases: Array) -> Array:
     """
     coulomb, viscous = np.array(PREMIUM_1_5.coulomb_friction), np.array(PREMIUM_1_5.viscous_friction)
     force = np.zeros(len(phases))
-    for k, (rates, v) in enumerate(zip(_rates(curve, phases), curve.velocity(phases), strict=True)):
+    for k, (rates, v) in enumerate(zip(_joint_rates(curve, phases), curve.velocity(phases), strict=True)):
         speed = float(np.linalg.norm(v))
         if speed > 0.0:
             force[k] = float(np.abs(rates) @ coulomb + rates**2 @ viscous) / speed
@@ -64,11 +65,11 @@ def inertia_along(curve: Trajectory, phases: Array) -> tuple[Array, Array]:
         If the Phantom does not reach the curve.
     """
     first, last = (-np.inf, np.inf) if curve.periodic else (curve.start, curve.end)
-    ahead, behind = np.minimum(phases + _STEP, last), np.maximum(phases - _STEP, first)
-    changes = (_rates(curve, ahead) - _rates(curve, behind)) / (ahead - behind)[:, None]
+    ahead, behind = np.minimum(phases + _TIME_STEP, last), np.maximum(phases - _TIME_STEP, first)
+    changes = (_joint_rates(curve, ahead) - _joint_rates(curve, behind)) / (ahead - behind)[:, None]
     along, bending = np.zeros(len(phases)), np.zeros(len(phases))
     velocities, accelerations = curve.velocity(phases), curve.acceleration(phases)
-    for k, (p, rates) in enumerate(zip(curve.point(phases), _rates(curve, phases), strict=True)):
+    for k, (p, rates) in enumerate(zip(curve.point(phases), _joint_rates(curve, phases), strict=True)):
         v, a = (np.array(vector_to_device_frame.py_func(tuple(x))) for x in (velocities[k], accelerations[k]))
         speed = float(np.linalg.norm(v))
         if speed > 0.0:
@@ -80,7 +81,7 @@ def inertia_along(curve: Trajectory, phases: Array) -> tuple[Array, Array]:
     return along, bending
 
 
-def _rates(curve: Trajectory, phases: Array) -> Array:
+def _joint_rates(curve: Trajectory, phases: Array) -> Array:
     """Joint rates q̇ of the linkage on a curve at the curve's own pace, shape (n, 3) [rad/s]."""
     rates = [
         np.linalg.solve(jacobian.py_func(phantom_angles(p)), vector_to_device_frame.py_func(tuple(v)))
@@ -123,7 +124,7 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     own, middles = np.diff(times), 0.5 * (times[1:] + times[:-1])
     speed = np.linalg.norm(curve.velocity(middles), axis=1)
     along, bending = inertia_along(curve, middles)
-    longer = np.clip(bending / stiffness, -_LONGER, _LONGER) if stiffness > 0.0 else 0.0
+    longer = np.clip(bending / stiffness, -_MAX_LENGTHENING, _MAX_LENGTHENING) if stiffness > 0.0 else 0.0
     needed = drag * speed * (1.0 + longer) + friction_along(curve, middles) + along
     pulled = np.maximum(needed, 0.5 * drag * speed)
     # Where the curve rests, its timing is kept.

@@ -152,11 +152,13 @@ class MapParts(Generic[Map]):
         return replace(self, remarks=remarks + self.remarks)
 
     def refine(self, physical: bool) -> Self:
-        """The same parts with the improved map, and what is said of it for a physical figure; needs compiled code."""
+        """The same parts with the improved map and, for a physical figure, remarks on it; needs compiled code."""
         if self.refined is None:
             return self
-        made, told = self.refined()
-        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks + (told if physical else ()))
+        made, figure_remarks = self.refined()
+        return replace(
+            self, haptic_map=made, remarks=self.remarks + made.remarks + (figure_remarks if physical else ())
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

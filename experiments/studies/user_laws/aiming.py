@@ -14,8 +14,8 @@ from sim.users.person.wishes import targets
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
 TIMES = (0.2, 0.3, 0.4)  # [s] imposed movement times, too short for visual feedback on the end
 MOVES = 10  # movements from side to side; the first two are practice
-_PRACTICE = 2
-_SECONDS = 20.0  # [s] in which also the slowest people complete all movements
+_N_PRACTICE = 2
+_TRIAL_DURATION = 20.0  # [s] in which also the slowest people complete all movements
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
@@ -23,7 +23,7 @@ def fitts(people: Sequence[Person], seed: int) -> Study:
     difficulty, times = list[float](), list[float]()
     for amplitude, width in _conditions():
         found = np.concatenate([
-            np.diff(_tapped(person, amplitude, width, seed + i).clicks)[_PRACTICE:] for i, person in enumerate(people)
+            np.diff(_tap(person, amplitude, width, seed + i).clicks)[_N_PRACTICE:] for i, person in enumerate(people)
         ])  # fmt: skip
         difficulty.append(np.log2(amplitude / width + 1.0))
         times.append(float(np.mean(found)) if len(found) else np.nan)
@@ -54,7 +54,7 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
         spread = list[float]()
         for i, person in enumerate(people):
             width = 2.0 * amplitude * person.caution * person.motor_noise / seconds
-            spread.append(float(np.var(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
+            spread.append(float(np.var(_first_ends(_tap(person, amplitude, width, seed + i)), ddof=1)))
         speeds.append(amplitude / seconds)
         spreads.append(float(np.sqrt(np.mean(spread))))
     x, y = np.array(speeds), np.array(spreads)
@@ -75,15 +75,15 @@ def _first_ends(trace: Trace) -> Array:
     """End of the first submovement of each movement, as the signed distance from its start along its direction [m]."""
     ends = list[float]()
     for k, (start, end) in enumerate(itertools.pairwise(trace.clicks)):
-        if k < _PRACTICE:
+        if k < _N_PRACTICE:
             continue
         sign = 1.0 if k % 2 == 0 else -1.0
         move = (trace.t >= start) & (trace.t < end + AFTER)
-        way, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
+        position, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
         fastest = int(np.argmax(speed))
         stopped = np.flatnonzero(speed[fastest:] <= 0.0)
         if len(stopped):
-            ends.append(float(way[fastest + stopped[0]]))
+            ends.append(float(position[fastest + stopped[0]]))
     return np.array(ends)
 
 
@@ -91,8 +91,8 @@ def _conditions() -> list[tuple[float, float]]:
     return [(amplitude, width) for amplitude in AMPLITUDES for width in WIDTHS if amplitude >= 2.0 * width]
 
 
-def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
+def _tap(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((MOVES + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    trace = trial(person, targets(points, width), _SECONDS, seed, points[0], clicks=MOVES + 1)
+    trace = trial(person, targets(points, width), _TRIAL_DURATION, seed, points[0], clicks=MOVES + 1)
     return trace._replace(clicks=trace.clicks[: MOVES + 1])

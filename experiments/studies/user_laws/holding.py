@@ -15,7 +15,7 @@ from sim.users.person.wishes import Wishes, following
 PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # force [N], period [s], number, window of a response [s]
 GRIPS = (1.0, 2.0, 4.0, 8.0)  # [N]
 HELD_SECONDS = 20.0  # [s] for which the hand holds still
-_HOLD = Wishes(following(np.zeros((2, 3))), 0.02)
+_HOLD_STILL = Wishes(following(np.zeros((2, 3))), 0.02)
 
 
 def tremor(people: Sequence[Person], seed: int) -> Study:
@@ -23,7 +23,7 @@ def tremor(people: Sequence[Person], seed: int) -> Study:
     spectra, peaks, sizes = list[Array](), list[float](), list[float]()
     f = np.zeros(0)
     for i, person in enumerate(people):
-        trace = trial(person, _HOLD, HELD_SECONDS, seed + i, np.zeros(3))
+        trace = trial(person, _HOLD_STILL, HELD_SECONDS, seed + i, np.zeros(3))
         acceleration = np.gradient(trace.v[2000:], PERIOD, axis=0)
         f, power = welch(acceleration, 1.0 / PERIOD, nperseg=4096, axis=0)
         power = power.sum(axis=1)
@@ -57,7 +57,7 @@ def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, flo
     pushes = np.zeros((n, 3))
     for k in range(1, REPEATS):
         pushes[k * period : k * period + window, 0] = PUSH * (1.0 if k % 2 else -1.0)
-    trace = trial(person, _HOLD, REPEATS * EVERY, seed, np.zeros(3), pushes)
+    trace = trial(person, _HOLD_STILL, REPEATS * EVERY, seed, np.zeros(3), pushes)
     answers = [
         (1.0 if k % 2 else -1.0) * (trace.p[k * period : k * period + window, 0] - trace.p[k * period - 1, 0])
         for k in range(1, REPEATS)

@@ -18,7 +18,7 @@ LOADS = (0.25, 0.4, 0.6, 0.8)  # shares of the person's strength; published mode
 FATIGUE, STRENGTH = 0.6, 6.0  # rate for the grip [1/min]; strength that the device can load [N]
 BEGUN = 2.0  # [s] in which the person takes up the load
 SLIPPED = 0.02  # [m] displacement from which a hand counts as no longer holding
-_SAMPLING = 0.01  # [s] between wishes
+_SAMPLE_TIME = 0.01  # [s] between wishes
 
 
 def practice(people: Sequence[Person], seed: int) -> Study:
@@ -27,7 +27,7 @@ def practice(people: Sequence[Person], seed: int) -> Study:
     Individual practice curves are exponential, e = a + b exp(-c n), rather than a power of n (Heathcote, Brown &
     Mewhort 2000: 475 people, in all data sets that are not averaged).
     """
-    t = np.arange(0.0, (LAPS + 1) * LAP, _SAMPLING)
+    t = np.arange(0.0, (LAPS + 1) * LAP, _SAMPLE_TIME)
     angle, n = 2.0 * np.pi * t / LAP, round(LAPS * LAP / PERIOD)
     points = RADIUS * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     phase = 2.0 * np.pi * PERIOD * np.arange(n) / LAP
@@ -36,11 +36,11 @@ def practice(people: Sequence[Person], seed: int) -> Study:
     curves = list[Array]()
     for i, person in enumerate(people):
         learner = replace(person, learning=LEARNING, entrainment=0.0)
-        trace = trial(learner, Wishes(following(points), _SAMPLING, LAP), LAPS * LAP, seed + i, points[0], pushes)
+        trace = trial(learner, Wishes(following(points), _SAMPLE_TIME, LAP), LAPS * LAP, seed + i, points[0], pushes)
         off = np.linalg.norm(trace.p - wanted, axis=1).reshape(LAPS, -1)
         curves.append(np.sqrt(np.mean(off**2, axis=1))[1:])
     number = np.arange(1.0, LAPS)
-    fits = [(_fitted(number, curve, _exponential), _fitted(number, curve, _power)) for curve in curves]
+    fits = [(_fit_law(number, curve, _exponential_law), _fit_law(number, curve, _power_law)) for curve in curves]
     rate = float(np.median([one[0][2] for one, _ in fits]))
     worse = float(np.median([other[1] / one[1] for one, other in fits]))
     return Study(
@@ -84,15 +84,15 @@ def endurance(people: Sequence[Person], seed: int) -> Study:
     )  # fmt: skip
 
 
-def _exponential(n: Array, a: float, b: float, c: float) -> Array:
+def _exponential_law(n: Array, a: float, b: float, c: float) -> Array:
     return a + b * np.exp(-c * n)
 
 
-def _power(n: Array, a: float, b: float, c: float) -> Array:
+def _power_law(n: Array, a: float, b: float, c: float) -> Array:
     return a + b * n**-c
 
 
-def _fitted(n: Array, errors: Array, law: Callable[..., Array]) -> tuple[Array, float]:
+def _fit_law(n: Array, errors: Array, law: Callable[..., Array]) -> tuple[Array, float]:
     """Fitted parameters of a law of practice, and the residual sum of squares."""
     start = (float(errors[-1]), float(errors[0] - errors[-1]), 0.3)
     found = np.asarray(curve_fit(law, n, errors, start, bounds=((0.0, 0.0, 0.0), (1.0, 1.0, 5.0)))[0], dtype=np.float64)

@@ -22,7 +22,7 @@ STUDIES = {
     "step-response": step_response, "grip": grip, "practice": practice, "endurance": endurance,
 }  # fmt: skip
 TABLE = "laws.json"
-_OLDEST = 40.0  # [years] of the published panels, which are of young adults
+_MAX_AGE = 40.0  # [years] of the published panels, which are of young adults
 
 
 def user_laws(people: int, seed: int, names: tuple[str, ...]) -> list[Study]:
@@ -52,11 +52,11 @@ def young_adults(people: int, seed: int) -> tuple[Person, ...]:
     """
     population(people, seed)  # refuses a number of people that is none
     everybody = itertools.count(2 * people, 2 * people)
-    return next(young[:people] for n in everybody if len(young := _young(n, seed)) >= people)
+    return next(young[:people] for n in everybody if len(young := _young_people(n, seed)) >= people)
 
 
-def _young(number: int, seed: int) -> tuple[Person, ...]:
-    return tuple(person for person in population(number, seed) if person.age <= _OLDEST)
+def _young_people(number: int, seed: int) -> tuple[Person, ...]:
+    return tuple(person for person in population(number, seed) if person.age <= _MAX_AGE)
 
 
 def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwrite: bool) -> list[Law]:
@@ -98,7 +98,7 @@ def draw(study: Study, path: Path) -> None:
     axes.plot(study.x, study.y, "-" if study.joined else "o", ms=4.0 if len(study.x) > 40 else 6.0, color="tab:blue")
     if study.line is not None:
         slope, intercept = study.line
-        x = np.geomspace(*_ends(study.x)) if study.log else np.linspace(*_ends(study.x))
+        x = np.geomspace(*_data_range(study.x)) if study.log else np.linspace(*_data_range(study.x))
         y = np.exp(intercept) * x**slope if study.log else slope * x + intercept
         axes.plot(x, y, "-", color="tab:orange", label="fit")
         axes.legend()
@@ -115,5 +115,5 @@ def draw(study: Study, path: Path) -> None:
     plt.close(figure)
 
 
-def _ends(x: np.ndarray) -> tuple[float, float]:
+def _data_range(x: np.ndarray) -> tuple[float, float]:
     return float(np.min(x)), float(np.max(x))

@@ -23,7 +23,7 @@ PRACTISED, PASSED = 9, 9  # laps per pace in practice, and per tunnel; the first
 LEAST = 5  # fewest of these that go all the way round, at a pace that the person can hold
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # durations of a lap [s]
-_SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
+_SAMPLE_TIME, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
@@ -38,7 +38,7 @@ def steering(people: Sequence[Person], seed: int) -> Study:
     for i, person in enumerate(people):
         paces = _chosen_paces(person, widths, seed + i)
         for k, (pace, width) in enumerate(zip(paces, widths, strict=True)):
-            farthest, lasted = _laps(person, pace, PASSED, seed + 1000 * (k + 1) + i)
+            farthest, lasted = _traced_laps(person, pace, PASSED, seed + 1000 * (k + 1) + i)
             touches = farthest > 0.5 * width
             touched.append(touches)
             if not np.all(touches):
@@ -67,7 +67,7 @@ def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
     """
     held, needed = list[float](), list[float]()
     for pace in PACES:
-        farthest, _ = _laps(person, pace, PRACTISED, seed)
+        farthest, _ = _traced_laps(person, pace, PRACTISED, seed)
         if len(farthest) >= LEAST:
             held.append(pace)
             needed.append(float(2.0 * (np.mean(farthest) + norm.isf(ERRORS) * np.std(farthest, ddof=1))))
@@ -75,9 +75,9 @@ def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
     return np.interp(widths, falling[::-1], held[::-1])
 
 
-def _laps(person: Person, pace: float, laps: int, seed: int) -> tuple[Array, Array]:
+def _traced_laps(person: Person, pace: float, laps: int, seed: int) -> tuple[Array, Array]:
     """Largest deviation of each lap from the middle [m], and its duration [s], without the first lap."""
-    angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * pace, _SAMPLING) / pace
+    angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * pace, _SAMPLE_TIME) / pace
     points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     trace = trial(person, _wishes(points, pace), laps * pace, seed, points[0])
     gone = np.unwrap(np.arctan2(trace.p[:, 1], trace.p[:, 0])) / (2.0 * np.pi)
@@ -99,7 +99,7 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
         angle = np.linspace(0.0, 2.0 * np.pi, 257)
         drawn = np.stack([long * np.cos(angle), short * np.sin(angle), np.zeros_like(angle)], axis=1)
         times = natural_times(drawn, lap)
-        t = np.arange(0.0, (LAPS + 1) * lap, _SAMPLING)
+        t = np.arange(0.0, (LAPS + 1) * lap, _SAMPLE_TIME)
         points = np.stack([np.interp(t % lap, times, drawn[:, k]) for k in range(3)], axis=1)
         trace = trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0])
         kappa, speed = _curvature(trace, lap)
@@ -117,7 +117,7 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
 
 
 def _wishes(points: Array, lap: float) -> Wishes:
-    return Wishes(following(points), _SAMPLING, lap)
+    return Wishes(following(points), _SAMPLE_TIME, lap)
 
 
 def _curvature(trace: Trace, lap: float) -> tuple[Array, Array]:

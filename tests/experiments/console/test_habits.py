@@ -36,7 +36,7 @@ def test_time_left_is_that_of_the_last_time_less_what_has_gone() -> None:
 
 def test_what_took_long_is_kept_and_a_broken_file_is_no_hindrance(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr("experiments.console.progress._WORTH_KEEPING", 0.01)
+    monkeypatch.setattr("experiments.console.progress._MIN_STORED_DURATION", 0.01)
     file = tmp_path / "hvf" / "durations.json"
     with working("waiting", share=2.0):
         time.sleep(0.05)

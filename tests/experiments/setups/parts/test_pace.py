@@ -58,7 +58,7 @@ def _turn_rate(lap: float) -> float:
 
 def test_a_hand_that_goes_round_outside_a_bend_keeps_the_curves_angle(monkeypatch):
     assert _turn_rate(0.6) == pytest.approx(1.0, abs=0.004)
-    monkeypatch.setattr(pace, "_LONGER", 0.0)
+    monkeypatch.setattr(pace, "_MAX_LENGTHENING", 0.0)
     assert _turn_rate(0.6) < 0.985
 
 
