@@ -2,15 +2,18 @@ r"""Run-time removal of foot skate: feet in stance keep their place on the floor
 
 The corrections of a mixture (`pair_corrections`) hold a foot only while the mixture is constant. The foot would slide
 when the hand changes the mixture, and with it the foot's mean position, or between the mixtures that were corrected. So
-each end has an offset o over the ground, stored in the memory. It cancels a fraction σ, the degree of stance, of the
-slip Δp of the end's touching points, and fades as the end swings through the air,
+each end has an offset o over the ground, and one ψ of its heading, stored in the memory. They cancel a fraction σ of
+the slip Δp of the end's touching points and of its turning. They fade as the end swings through the air, and where a
+clip is alone:
 
-.. math:: o \leftarrow o - \sigma\,\Delta p, \qquad \frac{do}{d\theta} = -\kappa\,(1 - \sigma_0)\, o .
+.. math:: o \leftarrow o - \sigma\,\Delta p, \qquad
+          \sigma = \sigma_0(h)\,\mu(w)\,\bigl(1 - o^2/o_{max}^2 - \psi^2/\psi_{max}^2\bigr)_+, \qquad
+          \frac{do}{d\theta} = -\bigl(\kappa\,(1 - \sigma_0) + \kappa_1 (1 - \mu)\bigr)\, o .
 
-σ = σ₀(h) μ(w) falls with the height h of the sole, and to 0 where a clip is alone: a clip keeps its own foot skate, so
-that h∘α̃ = α. Headings are treated likewise. While a hand moves back a little, the offset grows again, until the
-direction counts as reversed; so velocity and acceleration of the figure may be computed by one-sided differences. h_*
-is the derivative at a given offset.
+The degree of stance σ₀ falls with the height h of the sole; μ is 0 where a clip is alone: a clip keeps its own foot
+skate, so that h∘α̃ = α. σ and σ₀ are means over the step. While a hand moves back a little, the offset grows again,
+until the direction counts as reversed; so velocity and acceleration of the figure may be computed by one-sided
+differences. h_* is the derivative at a given offset.
 """
 
 from collections.abc import Sequence

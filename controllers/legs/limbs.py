@@ -132,7 +132,7 @@ def flexion(c: float) -> tuple[float, float]:
     over = (abs(c) - _SOFT_COSINE) / (_HARD_COSINE - _SOFT_COSINE)
     soft, slope = c, 1.0
     if over > 0.0:
-        # x / (1 + x³)^(1/3) departs from the identity with a C² onset.
+        # x / (1 + x³)^(1/3) = x − x⁴/3 + … departs from the identity with a C³ onset.
         root = np.cbrt(1.0 + over**3)
         soft, slope = np.copysign(_SOFT_COSINE + (_HARD_COSINE - _SOFT_COSINE) * over / root, c), root**-4
     return np.arccos(soft), -slope / np.sqrt(1.0 - soft * soft)

@@ -121,7 +121,7 @@ def _hold_end(limb: Array, pose: Pose, end: Array, share: float) -> None:
     room = max(_ONSET_RATIO * share * longest, 1e-9)
     over = (distance - (1.0 - _MIN_SHORTENING_RATIO * share) * longest) / room + 1.0
     if over > 0.0:
-        # x / (1 + x³)^(1/3) departs from the identity with a C² onset.
+        # x / (1 + x³)^(1/3) = x − x⁴/3 + … departs from the identity with a C³ onset.
         back = room * over * (1.0 - 1.0 / np.cbrt(1.0 + over**3))
         way = np.sqrt(line[0] ** 2 + line[1] ** 2) + 1e-9
         for i in range(2):

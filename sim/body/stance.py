@@ -4,12 +4,12 @@ The feedback would drag a foot that landed a centimetre off its reference along 
 plan lacks. So the wanted accelerations of a leg's nine degrees of freedom are changed by the smallest δ that brings its
 contact points to rest on the floor:
 
-.. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p
+.. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p n_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p
           + \tfrac14 \eta^2 h_p e_z\|^2_{W_p} ,
 
-over the points p that are in stance in the reference, with h_p the height of a point. The horizontal weights in W_p are
-the share of load of the point itself, the vertical one the largest share in its foot: a foot that lands tilted is set
-flat.
+with n_p the degree to which the point is in stance in the reference, and h_p its height. The horizontal weights in W_p
+are the point's own fraction of its full load, the vertical one the largest fraction in its foot: a foot that lands
+tilted is set flat.
 """
 
 from numba import njit

@@ -1,16 +1,17 @@
 r"""Lowering of the reference to the floor when the hand is slow, so that no figure hovers in the middle of a flight.
 
 Gravity sets the duration of a flight phase. Played at σ times its pace it would need a gravity of σ² g, and a hand that
-stops during a flight would demand a figure that hangs in the air. So the reference is lowered by a share s of its
+stops during a flight would demand a figure that hangs in the air. So the reference is lowered by a fraction s of its
 feet's clearance c; s is 1 for a slow hand and 0 at the clips' own pace:
 
 .. math:: z \leftarrow z - s\,u\,S(c), \qquad s \to S_{01}\Bigl(\frac{\sigma_1 - \sigma}{\sigma_1 - \sigma_0}\Bigr),
           \qquad \sigma = |\dot\theta|\,T_c / 2\pi,
 
 with θ the stylus's angle about the vertical axis of H, which is the phase of these maps, T_c the duration of the clips,
-S_01 the smooth step, S(x) = x³/(x² + r²) for x > 0, and u from 0 to 1 the uprightness of the figure: one that is upside
-down cannot be put on its feet. s follows its goal with critical damping, so that pose, velocity and acceleration are
-continuous.
+S_01 the cubic step, S(x) = x³/(x² + r²) for x > 0, and u = S_01(2 cos β) the uprightness of the figure, with β the
+root's tilt: 1 up to 60° and 0 from 90° on, since a figure that is upside down cannot be put on its feet. s follows its
+goal with critical damping. Pose and velocity are continuous; acceleration is, too, except where the tilt passes 60° or
+90°.
 """
 
 import math

@@ -26,7 +26,7 @@ _MAX_VERTICAL_ACCELERATION = 6.0
 # [m/s²] the same horizontally, where the root also travels. With twice the value the feet of the worst change rise
 # 4 mm higher.
 _MAX_HORIZONTAL_ACCELERATION = 5.0
-_ACCELERATION_FACTOR = 5.77  # largest |ö| T² of a unit offset that decays from rest: 10/√3
+_ACCELERATION_FACTOR = 10.0 / np.sqrt(3.0)  # largest |ö| T² of a unit offset that decays from rest
 # Largest factor on the shortest blend time by which a horizontal offset prolongs a change. With 1 the feet of the worst
 # of 40 changes are 7 mm higher and slide 4 mm less; with twice the value those of the median are 2 mm lower.
 _MAX_PROLONGATION = 1.9
@@ -164,7 +164,7 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
 def plan_depth(transition: Transition) -> None:
     """Set the root's depth to the length that the legs lack at mid-change, between the two steps.
 
-    `ahead[0]` holds the new motion's pose at that time. The root goes no deeper than it would fall by its own weight.
+    `ahead[0]` holds the new motion's pose at that time. The root accelerates downwards by 1.14 g at most.
     """
     limbs, ends, lasts, pose = transition.limbs, transition.ends, transition.lasts[0], transition.ahead[0]
     transition.depth[0] = 0.0
