@@ -103,7 +103,9 @@ def test_normal_equations_are_those_of_the_stacked_rows(change):
 
 def test_the_jacobian_of_the_errors(change, monkeypatch):
     """Against central differences along random changes; contacts keep their edges for so small a step."""
-    monkeypatch.setattr(feasible, "_STRONG", 0.02)  # so that most torques count, those of standing legs among them
+    monkeypatch.setattr(
+        feasible, "_STRAIN_THRESHOLD", 0.02
+    )  # so that most torques count, those of standing legs among them
     clip = change.clip
     problem = _Problem(change, stances(clip, smoothed(clip)))
     # Narrow ranges, so that bent joints exceed them about all axes, where a rotation is no longer its vector's change.
