@@ -161,7 +161,7 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
 
 
 def _foremost(tips: list[Array], hip: Array, knee: Array, ankle: Array) -> Array:
-    """Of the ends of a foot, such as heel and toes, the one that lies furthest ahead of it; all of shape (n, 3)."""
+    """Of the ends of a foot (heel, toes), the one furthest in the direction of the knee's bend; all of shape (n, 3)."""
     left = np.cross(knee - hip, ankle - knee)
     ahead = np.cross(left, hip - ankle)
     return max(tips, key=lambda tip: float(np.median(np.sum((tip - ankle) * ahead, axis=1))))
