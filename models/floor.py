@@ -3,11 +3,11 @@
 import mujoco
 
 FRICTION = 0.9  # μ of a sole on the floor, as of rubber on a dry one (models/humanoid/README.md)
-_TORSION, _ROLLING = 0.005, 0.0001  # [m], MuJoCo's defaults; contacts with condim 3 do not use them
+_TORSIONAL_FRICTION, _ROLLING_FRICTION = 0.005, 0.0001  # [m], MuJoCo's defaults; contacts with condim 3 do not use them
 
-# impratio: ratio of frictional to normal constraint impedance. MuJoCo's contacts are soft: at 1 a loaded point creeps
-# over the floor by some centimetres a second, although its force is well within the friction cone.
-_HARDNESS = 10.0
+# MuJoCo's impratio: ratio of frictional to normal constraint impedance. Contacts are soft: with a ratio of 1, a loaded
+# point creeps over the floor by some centimetres a second, although its force is well within the friction cone.
+_IMPEDANCE_RATIO = 10.0
 
 
 def add_floor(spec: mujoco.MjSpec, material: str = "") -> None:
@@ -17,8 +17,8 @@ def add_floor(spec: mujoco.MjSpec, material: str = "") -> None:
     diagonals of 1/√2 of that along the axes.)
     """
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = _HARDNESS
+    spec.option.impratio = _IMPEDANCE_RATIO
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material=material,
-        contype=1, conaffinity=0, condim=3, friction=[FRICTION, _TORSION, _ROLLING],
+        contype=1, conaffinity=0, condim=3, friction=[FRICTION, _TORSIONAL_FRICTION, _ROLLING_FRICTION],
     )  # fmt: skip

@@ -1,7 +1,8 @@
-"""BLAS on one thread: the matrices are small, so that its threads wait for each other and for other programs.
+"""BLAS on one thread: the matrices are small, so more threads only wait for each other and for other programs.
 
-The `hvf` command asks for one in its environment, before NumPy is imported; a program that imports NumPy on its own has
-one where it matters. Beside another busy program on two cores, a capture is prepared in 10 s so, and in 81 s with two.
+The `hvf` command sets one thread in its environment, before NumPy is imported. In a program that imports NumPy itself,
+the functions for which it matters are decorated. Beside another busy program on two cores, a capture is prepared in
+10 s with one thread, and in 81 s with two.
 """
 
 from collections.abc import Callable

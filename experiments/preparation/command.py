@@ -1,4 +1,4 @@
-"""``hvf prepare``: makes a capture well-formed, and writes it and a page about it."""
+"""``hvf prepare``: make a capture well-formed, and write it and a report page."""
 
 from pathlib import Path
 
@@ -53,8 +53,8 @@ def prepare_file(
     made = prepared(source, loop, mirror, hints)
     found = clip_ballistics(made.clip)
     refuted = tuple(flight.reason for flight in found.flights if flight.verdict == "refuted")
-    outcome = PreparedFile(made, *_measured(made.clip), refuted, doubts(found))
-    captured = None if report is None else _measured(made.captured)
+    outcome = PreparedFile(made, *_measure(made.clip), refuted, doubts(found))
+    captured = None if report is None else _measure(made.captured)
     with writing(target):
         write_bvh(made.clip, target)
         if report is not None and captured is not None:
@@ -65,5 +65,5 @@ def prepare_file(
     return outcome
 
 
-def _measured(clip: Clip) -> Measured:
+def _measure(clip: Clip) -> Measured:
     return Measured(well_formed(clip, clip_flights(clip)), followed(clip))

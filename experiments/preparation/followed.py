@@ -1,4 +1,4 @@
-"""Trial of a clip: how the physical figure follows it, without a hand or a map."""
+"""Trial of a clip: how well the physical figure tracks it, without a hand or a map."""
 
 from collections.abc import Callable
 from time import process_time
@@ -21,7 +21,7 @@ class Followed(NamedTuple):
     Attributes
     ----------
     residual : float
-        RMS of the residual force while the reference stands, until the end of a clip that is not repeated [weights].
+        RMS residual force while the reference stands, until the end of a clip that is not repeated [body weights].
     fell : float or None
         Time at which it first fell, or its root was `ROOT_LOST` from its reference [s]; None if it did not fall.
     seconds : float
@@ -65,11 +65,11 @@ class Followed(NamedTuple):
 def followed(
     clip: Clip, seconds: float = SECONDS, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> Followed:
-    """Let the physical figure follow a clip; `ready` is called with the compilation units that this needs."""
+    """Let the physical figure track a clip; `ready` is called with the compilation units that this needs."""
     began = process_time()
     motion = tracked_motion(clip, seconds, TrackingConfig(), ready)
     cost = (process_time() - began) / seconds
-    away = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
-    told = report(motion)
-    fallen = [*motion.reference.times[away > ROOT_LOST][:1].tolist(), *told.falls[:1]]
-    return Followed(told.stance.force_rms, min(fallen, default=None), seconds, cost)
+    root_errors = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
+    tracking = report(motion)
+    fall_times = [*motion.reference.times[root_errors > ROOT_LOST][:1].tolist(), *tracking.falls[:1]]
+    return Followed(tracking.stance.force_rms, min(fall_times, default=None), seconds, cost)

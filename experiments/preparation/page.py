@@ -14,20 +14,20 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     gap_before, gap = gaps(made)
     names = ("soles", "ends", "continuity", "dynamics", "loop", "physical figure")
-    was = (*before.lines(), gap_before, follows.line())
-    now = (*outcome.measures.lines(), gap, outcome.followed.line())
+    captured_lines = (*before.lines(), gap_before, follows.line())
+    prepared_lines = (*outcome.measures.lines(), gap, outcome.followed.line())
     rows = "".join(
         f"<tr><th>{name}</th><td>{escape(first)}</td><td>{escape(then)}</td></tr>"
-        for name, first, then in zip(names, was, now, strict=True)
+        for name, first, then in zip(names, captured_lines, prepared_lines, strict=True)
     )
 
     def listed(title: str, lines: tuple[str, ...]) -> str:
         points = "".join(f"<li>{escape(line)}</li>" for line in lines)
         return f"<h2>{title}</h2><ul>{points}</ul>" if lines else ""
 
-    well = "Well-formed." if made.near and not outcome.faults() else "Not well-formed."
+    verdict = "Well-formed." if made.near and not outcome.faults() else "Not well-formed."
     body = (
-        f'<p>{well} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
+        f'<p>{verdict} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
         + listed("What is not within bounds, or not certified", (*outcome.faults(), *outcome.doubts, *advice(made)))

@@ -1,4 +1,4 @@
-"""Prepared clips for runs: foreign motion files are prepared once and cached."""
+"""Prepared clips for runs: motion files on other skeletons are prepared once and cached."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,8 @@ from models.mocap.motion.clip import Clip
 from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 
-_CODE = "models.mocap.preparation.prepare"  # a change of this module, or of any that it imports, invalidates the cache
+# A change of this module, or of any that it imports, invalidates the cache.
+_PREPARING_MODULE = "models.mocap.preparation.prepare"
 
 
 class PreparedClip(NamedTuple):
@@ -27,7 +28,7 @@ class PreparedClip(NamedTuple):
     remarks : tuple of str
         What the file lacks, what was assumed or repaired, and what was done with it, a line each.
     feasible : bool
-        False if the capture was prepared, but no motion near it is feasible on contact.
+        False if the capture was prepared, but no motion near it is feasible by contact forces.
     """
 
     clip: Clip
@@ -36,7 +37,7 @@ class PreparedClip(NamedTuple):
 
 
 def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedClip]:
-    """The motions in files, prepared in parallel; files of `write_bvh` are taken unchanged, and all files if `raw`.
+    """The motions in files, prepared in parallel; files of `write_bvh`, and all files if `raw`, are used unchanged.
 
     Prepared clips are cached under a hash of the captured poses and of the code that prepares them.
 
@@ -54,7 +55,7 @@ def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedCli
 
 
 class _Capture(NamedTuple):
-    """A motion file as it was read."""
+    """A motion file that was read, and its cached preparation."""
 
     path: Path
     loaded: Loaded
@@ -65,10 +66,10 @@ class _Capture(NamedTuple):
 
     @property
     def is_kept(self) -> bool:
-        return is_kept(kept_folder(_CODE), "prepared", self._made_of, self._shape)
+        return is_kept(kept_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape)
 
     @property
-    def _made_of(self) -> tuple[Array, Array]:
+    def _cache_key(self) -> tuple[Array, Array]:
         clip, loops = self.loaded.clip, self.loaded.loops
         return clip.poses, np.array([clip.fps, -1.0 if loops is None else float(loops)])
 
@@ -81,20 +82,20 @@ class _Capture(NamedTuple):
         notes = () if report is None else tuple(f"{self.path.name}: {note}" for note in report.notes())
         if raw or report is None:
             return PreparedClip(clip, notes)
-        rows = kept_array(kept_folder(_CODE), "prepared", self._made_of, self._shape, self._found)
-        done = (
+        rows = kept_array(kept_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape, self._prepare)
+        outcome = (
             "prepared"
             if rows[0, 1]
             else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
         )
-        remarks = (*notes, f"{self.path.name}: {done}; --raw takes the capture as it is")
+        remarks = (*notes, f"{self.path.name}: {outcome}; --raw takes the capture as it is")
         return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks, bool(rows[0, 1]))
 
-    def _found(self) -> Array:
+    def _prepare(self) -> Array:
         from models.mocap.preparation.prepare import prepared  # imported late: loads signal processing
 
         with working(f"preparing {self.path.name}"):
             made = prepared(self.path)
-        told = np.zeros((1, made.clip.poses.shape[1]))
-        told[0, :2] = made.clip.fps, made.near
-        return np.vstack((told, made.clip.poses))
+        header = np.zeros((1, made.clip.poses.shape[1]))
+        header[0, :2] = made.clip.fps, made.near
+        return np.vstack((header, made.clip.poses))

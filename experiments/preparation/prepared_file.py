@@ -13,10 +13,10 @@ from models.mocap.preparation.laps import likeness
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
 
-_ADDED = {"way back": "the way back", "open": "coming to rest at both ends"}
-_NAMED = 3  # flights whose reasons are in the line for the terminal
-_MOST = 0.5  # share of the file's own motion below which it is told
-_CARRIED = 0.02  # [m] displacement of the root below which nothing is said: stances are extended over as much
+_ADDED_MOTION = {"way back": "the way back", "open": "coming to rest at both ends"}
+_MAX_NAMED = 3  # largest number of flights whose reasons are in the line for the terminal
+_MIN_OWN_FRACTION = 0.5  # fraction of the file's own motion in the clip below which it is reported
+_MIN_ROOT_SHIFT = 0.02  # displacement of the root that is reported [m]: stances are extended over as much
 
 
 class Measured(NamedTuple):
@@ -40,7 +40,7 @@ class PreparedFile(NamedTuple):
     flights : tuple of str
         Flights that the certificate refutes, and why, a line each.
     doubts : tuple of str
-        What else the certificate does not certify, and why, a line each (`doubts`).
+        Other properties that are not certified, and why, a line each (`doubts`).
     """
 
     made: Prepared
@@ -70,8 +70,11 @@ class PreparedFile(NamedTuple):
 def summary(outcome: PreparedFile) -> str:
     """One line for the terminal."""
     made, flights = outcome.made, outcome.flights
-    if len(flights) > _NAMED + 1:
-        flights = (*flights[:_NAMED], f"{len(flights) - _NAMED} more flights are refuted, as the report lists")
+    if len(flights) > _MAX_NAMED + 1:
+        flights = (
+            *flights[:_MAX_NAMED],
+            f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists",
+        )
     faults = outcome._replace(flights=flights).faults()
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; "
@@ -83,7 +86,7 @@ def summary(outcome: PreparedFile) -> str:
 
 
 def doubts(found: ClipBallistics) -> tuple[str, ...]:
-    """Verdicts that are neither certified nor told by a refuted flight: a line each, without the certified flights."""
+    """Verdicts that are neither certified nor reported as refuted flights, a line each, without certified flights."""
     ballistic, turns = (found.certificate.verdicts[name] for name in ("ballistic", "turns"))
     certified = {flight.reason for flight in found.flights if flight.verdict == "certified"}
     lines: list[str] = []
@@ -107,13 +110,13 @@ def changes(made: Prepared) -> tuple[str, ...]:
         "open": "the whole, at rest at both ends",
     }
     lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
-    own = (part.end - max(part.start, 0.0)) / made.clip.duration
-    if part.kind in _ADDED and own < _MOST:
+    own_fraction = (part.end - max(part.start, 0.0)) / made.clip.duration
+    if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {made.clip.duration:.2f} s the file's own motion is {part.end - max(part.start, 0.0):.2f} s"
-        lines.append(f"{what}; the rest is {_ADDED[part.kind]}, which is not in the file")
+        lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
-    if made.carried > _CARRIED:
+    if made.carried > _MIN_ROOT_SHIFT:
         lines.append(
             f"carried over the floor by up to {100 * made.carried:.0f} cm, since a foot that bears the load slides"
         )
@@ -132,7 +135,7 @@ def changes(made: Prepared) -> tuple[str, ...]:
 
 
 def gaps(made: Prepared) -> tuple[str, str]:
-    """How far the ends of the loop are apart, d of `laps`, in the capture and in the clip."""
+    """Distance d (`laps`) between the ends of the loop, in the capture and in the clip, in words."""
     part, last = made.looped, made.clip.n_frames - 1
     if part.kind == "open":
         return "no loop", "no loop: at rest at both ends"
@@ -143,7 +146,7 @@ def gaps(made: Prepared) -> tuple[str, str]:
 
 
 def advice(made: Prepared) -> tuple[str, ...]:
-    """Advice, if no feasible motion is near the capture: how far the nearest one found is, and what may help."""
+    """Advice if no feasible motion is near the capture: how far the nearest one found is, and what may help."""
     change = made.feasible
     if made.near:
         return ()

@@ -1,19 +1,20 @@
-r"""Deviation of a motion on the figure from the file it was read from: directions of segments, places of joints.
+r"""Deviation of a motion on the figure from the file it was read from: directions of segments, positions of joints.
 
-The joints of the file are where plain forward kinematics of its own skeleton has them. Its vertical is turned up, and
-its heading is that which fits best. No rotation that the calibration found is used, and the slope of a floor that was
-removed counts; of the retargeting come the vertical, the scale of the path and the height of the floor. With the lines
-d of a body (trunk, hips, shoulders, arms, legs and feet) in figure and file, the direction of a segment s deviates by
+The joints of the file are positioned by plain forward kinematics of its own skeleton. Its vertical is turned up, and
+its heading is the best fit. No rotation from the calibration is used, and the removal of a floor's slope counts as a
+deviation; only the vertical, the scale of the path and the height of the floor come from the retargeting. With the
+lines d of a body (trunk, hips, shoulders, arms, legs and feet) in figure and file, the direction of a segment s
+deviates by
 
 .. math:: \theta_s = \operatorname{median}_t \angle(d_s(t), d'_s(t)) .
 
 The file is scaled to the figure's limbs: each of its lines by the ratio of the median lengths, and the path of its hips
-by that of the legs. Joints p′ of these lines, laid upon the figure's by the best planar displacement, are
+by that of the legs. The joints p′ of these lines, aligned with the figure's by the best planar displacement, are
 
 .. math:: e_j = \operatorname{median}_t |p_j(t) - p'_j(t)|
 
-from the figure's. How far the toes of a file lie below its ankles differs from rig to rig: feet are compared up to a
-constant pitch, for soles in stance tell whether they lie flat.
+away from the figure's. How far the toes of a file lie below its ankles differs from rig to rig, so feet are compared up
+to a constant pitch: whether they lie flat is measured by the soles in stance.
 """
 
 from pathlib import Path
@@ -47,7 +48,7 @@ class Source(NamedTuple):
     Attributes
     ----------
     directions : array of shape (n, 13, 3)
-        Unit vectors along `LINES`, z up; NaN where the skeleton has none.
+        Unit vectors along `LINES`, z up; NaN if the skeleton does not have them.
     places : array of shape (n, 12, 3)
         `PLACES` of the body scaled to the figure's limbs, z up [m].
     middle : array of shape (n, 3)
@@ -65,11 +66,11 @@ class Deviation(NamedTuple):
     Attributes
     ----------
     direction : float
-        Largest deviation of a segment's direction, median over the time [rad].
+        Largest deviation of a segment's direction, median over time [rad].
     segment : str
         The segment that deviates most.
     place : float
-        Largest distance of a joint from its place, median over the time [m].
+        Largest distance of a joint from its place, median over time [m].
     joint : str
         The joint that is furthest.
     """
@@ -81,30 +82,31 @@ class Deviation(NamedTuple):
 
 
 def source_of(path: Path, captured: Clip, report: RetargetReport) -> Source:
-    """The body in a file from which a clip was retargeted without hints."""
+    """The body in the file from which a clip was retargeted without hints."""
     motion = read_motion(path)
     roles = roles_of(motion.joints, motion.parents)
-    assert not isinstance(roles, str)  # or it had not been retargeted
+    assert not isinstance(roles, str)  # otherwise it would not have been retargeted
     rotations = motion.global_rotations()
     lines = body_lines(motion, roles, motion.global_positions(rotations), rotations)
-    kept, up = slice(report.dropped, report.dropped + captured.n_frames), _upright(report.up)
+    frames, up = slice(report.dropped, report.dropped + captured.n_frames), _rotation_up(report.up)
     joints = (lines.hips, lines.knees, lines.ankles, lines.shoulders, lines.elbows, lines.wrists)
     middle, vectors, toes = (
-        quaternions.rotated(up, part[kept]) for part in (lines.middle, _vectors(*joints), lines.toes - lines.ankles)
+        quaternions.rotated(up, part[frames])
+        for part in (lines.middle, _line_vectors(*joints), lines.toes - lines.ankles)
     )
-    places, own, feet = _figure(captured.poses)
-    heading = _heading(unit(own), unit(vectors))
+    places, own, feet = _figure_lines(captured.poses)
+    heading = _best_heading(unit(own), unit(vectors))
     middle, vectors, toes = (quaternions.rotated(heading, part) for part in (middle, vectors, toes))
     for k, side in enumerate(SIDES):
         joint = roles.segments.get(f"{side}_foot")
         if joint is not None and np.isnan(toes[:, k]).any():
-            toes[:, k] = _ahead(
-                quaternions.product(quaternions.product(heading, up), rotations[kept, joint]), feet[:, k]
+            toes[:, k] = _foot_direction(
+                quaternions.product(quaternions.product(heading, up), rotations[frames, joint]), feet[:, k]
             )
     scales = np.median(np.linalg.norm(own, axis=2), axis=0) / np.median(np.linalg.norm(vectors, axis=2), axis=0)
     middle = report.scale * (middle - middle.mean(axis=0)) + places.mean(axis=0)
-    directions = np.concatenate((unit(vectors), _pitched(unit(toes), feet)), axis=1)
-    return Source(directions, _places(middle, scales[:, None] * vectors), middle)
+    directions = np.concatenate((unit(vectors), _without_pitch(unit(toes), feet)), axis=1)
+    return Source(directions, _joint_places(middle, scales[:, None] * vectors), middle)
 
 
 def deviations(path: Path, made: Prepared) -> tuple[Deviation, Deviation] | None:
@@ -114,52 +116,52 @@ def deviations(path: Path, made: Prepared) -> tuple[Deviation, Deviation] | None
     captured, pace = made.captured, made.paced.pace
     source = source_of(path, captured, made.report)
     seconds = np.arange(captured.n_frames) / (captured.fps * pace)
-    ours, theirs = common_frames(made.clip, captured, made.looped, pace)
-    rate, last = made.clip.fps, theirs.stop - 1
-    shown = (theirs.start <= seconds * rate + 1e-6) & (seconds * rate <= last + 1e-6)
-    times = seconds[shown] + (ours.start - theirs.start) / rate
+    clip_frames, capture_frames = common_frames(made.clip, captured, made.looped, pace)
+    rate, last = made.clip.fps, capture_frames.stop - 1
+    compared_frames = (capture_frames.start <= seconds * rate + 1e-6) & (seconds * rate <= last + 1e-6)
+    times = seconds[compared_frames] + (clip_frames.start - capture_frames.start) / rate
     poses = CubicSpline(np.arange(made.clip.n_frames) / rate, made.clip.poses)(times)
-    compared = Source(*(part[shown] for part in source))
+    compared = Source(*(part[compared_frames] for part in source))
     return deviation(source, captured.poses), deviation(compared, Clip(poses, rate, made.clip.name).poses)
 
 
 def deviation(source: Source, poses: Array) -> Deviation:
     """Deviation of poses of the figure, shape (n, 75), from a body in the same frames."""
-    middle, vectors, feet = _figure(poses)
+    middle, vectors, feet = _figure_lines(poses)
     own = np.concatenate((unit(vectors), quaternions.rotated(feet, _X)), axis=1)
-    heading = _heading(own, source.directions)
-    apart = np.linalg.norm(own - quaternions.rotated(heading, source.directions), axis=2)
-    angles = _medians(2.0 * np.arcsin(np.clip(apart / 2.0, 0.0, 1.0)))
+    heading = _best_heading(own, source.directions)
+    chords = np.linalg.norm(own - quaternions.rotated(heading, source.directions), axis=2)
+    angles = _medians(2.0 * np.arcsin(np.clip(chords / 2.0, 0.0, 1.0)))
     shift = (middle - quaternions.rotated(heading, source.middle)).mean(axis=0) * (1.0, 1.0, 0.0)
     moved = quaternions.rotated(heading, source.places) + shift
-    away = _medians(np.linalg.norm(_places(middle, vectors) - moved, axis=2))
-    segment, joint = int(np.argmax(angles)), int(np.argmax(away))
-    return Deviation(float(angles[segment]), LINES[segment], float(away[joint]), PLACES[joint])
+    distances = _medians(np.linalg.norm(_joint_places(middle, vectors) - moved, axis=2))
+    segment, joint = int(np.argmax(angles)), int(np.argmax(distances))
+    return Deviation(float(angles[segment]), LINES[segment], float(distances[joint]), PLACES[joint])
 
 
-def _upright(up: str) -> Array:
+def _rotation_up(up: str) -> Array:
     """Rotation that turns an axis of a file, such as ``+Y``, up."""
     axis = np.eye(3)["XYZ".index(up[1])] * (1.0 if up[0] == "+" else -1.0)
     return quaternions.arcs(axis[None], np.array([[0.0, 0.0, 1.0]]))[0]
 
 
-def _heading(own: Array, others: Array) -> Array:
+def _best_heading(own: Array, others: Array) -> Array:
     """Rotation about the vertical that turns vectors of shape (n, k, 3) as nearly as possible into others."""
     flat, theirs = own @ (1, 1j, 0), others @ (1, 1j, 0)
     return quaternions.about_axis(2, np.array(np.angle(np.nansum(theirs.conj() * flat))))
 
 
-def _figure(poses: Array) -> tuple[Array, Array, Array]:
+def _figure_lines(poses: Array) -> tuple[Array, Array, Array]:
     """Middle of the figure's hips, its lines, and rotations of its feet; shapes (n, 3), (n, 11, 3), (n, 2, 4)."""
     places = segment_places(poses, figure_model())
     joints = [
         np.stack([places[:, BODIES.index(f"{side}_{part}")] for side in SIDES], axis=1)
         for part in ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
     ]
-    return joints[0].mean(axis=1), _vectors(*joints), global_rotations(poses)[:, _FEET]
+    return joints[0].mean(axis=1), _line_vectors(*joints), global_rotations(poses)[:, _FEET]
 
 
-def _vectors(hips: Array, knees: Array, ankles: Array, shoulders: Array, elbows: Array, wrists: Array) -> Array:
+def _line_vectors(hips: Array, knees: Array, ankles: Array, shoulders: Array, elbows: Array, wrists: Array) -> Array:
     """All of `LINES` but the feet, with their lengths, from joints of shape (n, 2, 3); shape (n, 11, 3)."""
     trunk = shoulders.mean(axis=1) - hips.mean(axis=1)
     limbs = (elbows - shoulders, wrists - elbows, knees - hips, ankles - knees)
@@ -167,7 +169,7 @@ def _vectors(hips: Array, knees: Array, ankles: Array, shoulders: Array, elbows:
     return np.stack((trunk, *across, *(limb[:, k] for k in range(len(SIDES)) for limb in limbs)), axis=1)
 
 
-def _places(middle: Array, vectors: Array) -> Array:
+def _joint_places(middle: Array, vectors: Array) -> Array:
     """`PLACES` at the ends of lines, shape (n, 12, 3)."""
     trunk, across, shoulders, *limbs = np.moveaxis(vectors, 1, 0)
     found: list[tuple[Array, ...]] = []
@@ -178,14 +180,14 @@ def _places(middle: Array, vectors: Array) -> Array:
     return np.stack([place for both in zip(*found, strict=True) for place in both], axis=1)
 
 
-def _ahead(joint: Array, foot: Array) -> Array:
-    """Where a foot without toes points: along the axis of its joint that is mostly that of the figure's, (n, 3)."""
+def _foot_direction(joint: Array, foot: Array) -> Array:
+    """Direction of a foot without toes: fixed to its joint, and that of the figure's foot in the median, (n, 3)."""
     local = quaternions.rotated(quaternions.conjugate(joint), quaternions.rotated(foot, _X))
     return quaternions.rotated(joint, np.median(local, axis=0))
 
 
-def _pitched(feet: Array, turned: Array) -> Array:
-    """Directions (n, 2, 3) turned in the figure's feet by the pitch at which most lie along their x axes."""
+def _without_pitch(feet: Array, turned: Array) -> Array:
+    """Directions (n, 2, 3), pitched in the figure's feet so that in the median they have no pitch to their x axes."""
     local = quaternions.rotated(quaternions.conjugate(turned), feet)
     pitch = np.nanmedian(np.arctan2(-local[..., 2], local[..., 0]), axis=0) if np.isfinite(local).any() else np.zeros(2)
     return quaternions.rotated(turned, quaternions.rotated(quaternions.about_axis(1, -pitch), local))
@@ -193,7 +195,7 @@ def _pitched(feet: Array, turned: Array) -> Array:
 
 def _medians(measures: Array) -> Array:
     """Medians over time, shape (n, k) → (k,); −1 where there is no measure."""
-    told = np.isfinite(measures).any(axis=0)
-    found = np.full(measures.shape[1], -1.0)
-    found[told] = np.nanmedian(measures[:, told], axis=0)
-    return found
+    measured = np.isfinite(measures).any(axis=0)
+    medians = np.full(measures.shape[1], -1.0)
+    medians[measured] = np.nanmedian(measures[:, measured], axis=0)
+    return medians

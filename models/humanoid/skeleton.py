@@ -69,7 +69,7 @@ def _deg(*ranges: tuple[float, float]) -> tuple[tuple[float, float], tuple[float
     return x, y, z
 
 
-_ANY = ((-np.pi, np.pi), (-np.pi, np.pi), (-np.pi, np.pi))
+_UNLIMITED = ((-np.pi, np.pi), (-np.pi, np.pi), (-np.pi, np.pi))
 _H = 1.741  # stature of de Leva's mean male subject [m]
 
 
@@ -99,7 +99,7 @@ def _leg(side: str, first: int) -> tuple[Segment, ...]:
     )  # fmt: skip
 
 
-def _mirrored(segment: Segment) -> Segment:
+def _mirror(segment: Segment) -> Segment:
     """Reflect in the x–z plane: rotations about x and z change sign."""
     (x_low, x_high), y_limit, (z_low, z_high) = segment.limit
     x, y, z = segment.com
@@ -109,7 +109,7 @@ def _mirrored(segment: Segment) -> Segment:
 # The trunk's masses keep de Leva's sum (43.46 %): the clavicles' 2 % are taken from the upper trunk.
 SEGMENTS: tuple[Segment, ...] = (
     Segment("pelvis", "root", -1, 0.1117, 0.1457 / _H, (0, 0, 0.3885 * 0.1457 / _H), (0.615, 0.551, 0.587), "z",
-            _ANY, (0, 0, 0)),
+            _UNLIMITED, (0, 0, 0)),
     Segment("abdomen", "abdomen", 0, 0.1633, 0.2155 / _H, (0.003, 0, 0.0565), (0.482, 0.383, 0.468), "z",
             _deg((-35, 35), (-30, 65), (-40, 40)), (200, 300, 150)),
     Segment("chest", "chest", 1, 0.1396, 0.2421 / _H, (0, 0, 0.062), (0.505, 0.32, 0.465), "z",
@@ -117,9 +117,9 @@ SEGMENTS: tuple[Segment, ...] = (
     Segment("head", "head", 2, 0.0694, 0.2429 / _H, (0.008, 0, 0.069), (0.303, 0.315, 0.261), "z",
             _deg((-50, 50), (-65, 65), (-80, 80)), (50, 60, 40)),
     *_arm("left", 4),
-    *(_mirrored(segment) for segment in _arm("right", 8)),
+    *(_mirror(segment) for segment in _arm("right", 8)),
     *_leg("left", 12),
-    *(_mirrored(segment) for segment in _leg("right", 15)),
+    *(_mirror(segment) for segment in _leg("right", 15)),
 )  # fmt: skip
 
 BODIES: tuple[str, ...] = tuple(segment.body for segment in SEGMENTS)
@@ -131,7 +131,7 @@ FOOT_CONTACTS: tuple[str, ...] = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel_out", "heel_in", "toe_out", "toe_in")
 )
 HAND_CONTACTS: tuple[str, ...] = ("left_palm", "right_palm")
-_NEARLY_HALF_TURN = np.deg2rad(175.0)  # just below 180°, where the rotation vector of a joint jumps to its opposite
+_MAX_LIMITED_ANGLE = np.deg2rad(175.0)  # just below 180°, where the rotation vector of a joint jumps to its opposite
 CONTACT_RADIUS = 0.02  # radius of the contact spheres at the default stature [m]
 
 
@@ -147,7 +147,7 @@ def torque_limit(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -
 
 
 def rest_pose(stature: float = DEFAULT_STATURE) -> Pose:
-    """The T-pose with the soles on the floor, shape (75,); raises `ModelError` for a stature that is none."""
+    """The T-pose with the soles on the floor, shape (75,); raises `ModelError` unless 0 < stature < ∞."""
     if not (isinstance(stature, Real) and 0.0 < stature < np.inf):
         raise ModelError(f"stature is {stature!r}; expected more than 0 m, and finite")
     pose = np.zeros(N_POSE)
@@ -203,7 +203,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
         body.explicitinertial = True
         body.mass, body.ipos, body.inertia = inertia.mass, inertia.com, inertia.principal
     for segment, limit in zip(SEGMENTS[1:], limits, strict=True):
-        _add_stop(spec.joint(segment.joint), segment)
+        _add_angle_limit(spec.joint(segment.joint), segment)
         for axis, name in enumerate("xyz"):
             gear = [float(axis == k) for k in range(3)] + [0.0, 0.0, 0.0]
             spec.add_actuator(
@@ -214,7 +214,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
 
 
 def proportion(figure: mujoco.MjModel) -> float:
-    """Lengths of a figure's model (`figure_model`) over those of the default stature [1]."""
+    """Scale of lengths in a figure's model (`figure_model`), relative to the default stature [1]."""
     return float(figure.geom(FOOT_CONTACTS[0]).size[0]) / CONTACT_RADIUS
 
 
@@ -228,13 +228,13 @@ def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -
     return float(data.subtree_com[0, 2])
 
 
-def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
+def _add_angle_limit(joint: mujoco.MjsJoint, segment: Segment) -> None:
     """Limit a ball joint to the largest angle that its box of limits contains, if that is less than half a turn.
 
     MuJoCo's ball joints have a single limit, of the total angle of rotation: that of the corner of `Segment.limit`.
     """
     angle = float(np.linalg.norm(np.abs(segment.limit).max(axis=1)))
-    if angle < _NEARLY_HALF_TURN:
+    if angle < _MAX_LIMITED_ANGLE:
         joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.array([0.0, angle])
 
 
@@ -247,11 +247,11 @@ def soles() -> npt.NDArray[np.float64]:
 def figure_model(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> mujoco.MjModel:
     """The figure alone, compiled: for kinematics, centre of mass and inverse dynamics away from the world.
 
-    A copy of one's own, since compiling takes ten times as long as copying and reading a clip needs ten models.
+    Every call returns a copy of a cached model: compiling takes ten times as long, and reading a clip needs ten models.
     """
-    return copy.copy(_compiled(stature, mass))
+    return copy.copy(_compile(stature, mass))
 
 
 @lru_cache(maxsize=16)
-def _compiled(stature: float, mass: float) -> mujoco.MjModel:
+def _compile(stature: float, mass: float) -> mujoco.MjModel:
     return figure_spec(stature, mass).compile()

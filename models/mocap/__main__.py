@@ -10,7 +10,7 @@ CLIPS = choreography.CLIPS | gait.CLIPS | flights.CLIPS
 
 
 def main(names: list[str]) -> int:
-    """Write the named clips, or every one."""
+    """Write the named clips, or all if none is named; return the exit status."""
     unknown = sorted(set(names) - set(CLIPS))
     if unknown:
         print(f"no clip {', '.join(unknown)}; there are {', '.join(CLIPS)}", file=sys.stderr)

@@ -25,10 +25,10 @@ from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 
 _FORMATS = "BVH, AMC (with its ASF beside it) or DeepMimic JSON"
-_BY_CONTENT = ("", ".txt", ".json")  # suffixes that do not tell the format
-_WRITTEN = {".bvh": "BVH", ".glb": "glTF"}
+_AMBIGUOUS_SUFFIXES = ("", ".txt", ".json")  # suffixes that do not determine the format: it follows from the content
+_WRITABLE_FORMATS = {".bvh": "BVH", ".glb": "glTF"}
 Writer: TypeAlias = Callable[[Clip, Path], None]
-_CLIPS = files("models.mocap") / "clips"
+_CLIPS_FOLDER = files("models.mocap") / "clips"
 
 
 class Loaded(NamedTuple):
@@ -51,9 +51,11 @@ class Loaded(NamedTuple):
 
 def embedded_names() -> tuple[str, ...]:
     """Names of the clips that come with the package, sorted."""
-    if not _CLIPS.is_dir():
+    if not _CLIPS_FOLDER.is_dir():
         return ()
-    return tuple(sorted(entry.name.removesuffix(".bvh") for entry in _CLIPS.iterdir() if entry.name.endswith(".bvh")))
+    return tuple(
+        sorted(entry.name.removesuffix(".bvh") for entry in _CLIPS_FOLDER.iterdir() if entry.name.endswith(".bvh"))
+    )
 
 
 def embedded(name: str) -> Clip:
@@ -66,12 +68,12 @@ def embedded(name: str) -> Clip:
     """
     if name not in embedded_names():
         raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}")
-    return replace(_read_once(name))
+    return replace(_read_embedded(name))
 
 
 @lru_cache
-def _read_once(name: str) -> Clip:
-    with as_file(_CLIPS / f"{name}.bvh") as path:
+def _read_embedded(name: str) -> Clip:
+    with as_file(_CLIPS_FOLDER / f"{name}.bvh") as path:
         return load_clip(path)
 
 
@@ -93,8 +95,8 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     Raises
     ------
     MotionFileError
-        If the file cannot be read, its skeleton is not a human's, it has more than one, of which none is chosen, or it
-        is the figure's own, of which nothing but the frame rate is there to state.
+        If the file cannot be read, its skeleton is not a human's, it has several people of whom none is chosen, or it
+        is on the figure's own skeleton and `hints` states more than the frame rate.
     """
     hints, motion = hints or Hints(), read_motion(path)
     if hints.frame_rate is not None:
@@ -108,7 +110,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     if hints.roles is not None:
         motion, roles = stated_roles(hints.roles, motion, people)
     else:
-        _check_alone(motion, people)
+        _check_single_person(motion, people)
         roles = roles_of(motion.joints, motion.parents)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
@@ -125,7 +127,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     return Loaded(clip, report._replace(remarks=remarks), motion.loops)
 
 
-def _check_alone(motion: SourceMotion, people: Sequence[Sequence[int]]) -> None:
+def _check_single_person(motion: SourceMotion, people: Sequence[Sequence[int]]) -> None:
     """Raise if there are several people in a file."""
     if len(people) < 2:
         return
@@ -149,7 +151,7 @@ def read_motion(path: Path) -> SourceMotion:
         return read_bvh(path)
     if suffix == ".amc":
         return read_amc(path)
-    if suffix not in _BY_CONTENT:
+    if suffix not in _AMBIGUOUS_SUFFIXES:
         raise MotionFileError(path, 0, f"{suffix} files are not read", _FORMATS)
     start = next((text.strip() for _, text in numbered_lines(path) if text.strip()), "")
     if start.upper().startswith("HIERARCHY"):
@@ -168,7 +170,7 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
         If its name has none of the `ends`, or it exists and is not to be overwritten.
     """
     if target.suffix.lower() not in ends:
-        formats = " and ".join(_WRITTEN[end] for end in ends)
+        formats = " and ".join(_WRITABLE_FORMATS[end] for end in ends)
         raise ModelError(
             f"cannot write {target}: only {formats} can be written; expected a name that ends in {', '.join(ends)}"
         )
@@ -200,7 +202,7 @@ def convert(
     hints: Hints | None = None,
     writers: Mapping[str, Writer] | None = None,
 ) -> Loaded:
-    """Read any motion file and write it on the figure's 57 channels: retargeted and put on the floor, nothing more.
+    """Read any motion file and write it on the figure's 57 channels: retargeted and put on the floor, not prepared.
 
     Parameters
     ----------
@@ -218,7 +220,7 @@ def convert(
     MotionFileError
         If the source cannot be read.
     ModelError
-        If nothing writes the target, it cannot be written, or exists and is not to be overwritten.
+        If no writer has the target's suffix, or the target cannot be written or exists and is not to be overwritten.
     """
     writers = writers or {".bvh": write_bvh}
     check_target(target, overwrite, tuple(writers))

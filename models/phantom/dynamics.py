@@ -1,4 +1,4 @@
-r"""Dynamics of the Phantom in closed form: compiled functions, which also take CasADi symbols through ``.py_func``.
+r"""Dynamics of the Phantom in closed form: compiled functions; their ``.py_func`` also takes CasADi symbols.
 
 .. math:: M(\theta)\,\ddot\theta + C(\theta, \dot\theta)\,\dot\theta + N(\theta) = \tau
 

@@ -1,10 +1,10 @@
-"""Closed-form kinematics of the Phantom (Çavuşoğlu, Feygin & Tendick 2002): compiled, or symbolic by ``.py_func``.
+"""Closed-form kinematics of the Phantom (Çavuşoğlu, Feygin & Tendick 2002): compiled, or symbolic with ``.py_func``.
 
 θ = (θ1, θ2, θ3): turret about y, upper arm above the horizontal, forearm from hanging straight down; θ3 is absolute,
 because of the parallelogram. Frame P is the device's: x right, y up, z to the user, origin at the tip for θ = 0. Frame
 H has the same origin and the world's axes (x away from the user, y left, z up). S is the stylus: its axes are parallel
-to H when all six joints are zero. Arguments are anything with three elements (array, tuple, CasADi vector) and results
-are tuples of scalars, so the same source runs in the servo loop and inside a certificate.
+to H when all six joints are zero. Arguments may be anything with three elements (array, tuple, CasADi vector), and
+results are tuples of scalars, so the same source runs in the servo loop and inside a certificate.
 """
 
 import numpy as np
@@ -73,7 +73,7 @@ def jacobian(theta: Vec3) -> Matrix3:
     s2, c2 = np.sin(theta[1]), np.cos(theta[1])
     s3, c3 = np.sin(theta[2]), np.cos(theta[2])
     reach = L1 * c2 + L2 * s3
-    # 0.0 * reach, not 0.0, so that on symbols every entry is one.
+    # 0.0 * reach, not 0.0, so that every entry is a symbol if θ is symbolic.
     return (
         (c1 * reach, -L1 * s1 * s2, L2 * s1 * c3),
         (0.0 * reach, L1 * c2, L2 * s3),

@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
-def _deg(low: float, high: float) -> Pair:
+def _radians(low: float, high: float) -> Pair:
     return float(np.deg2rad(low)), float(np.deg2rad(high))
 
 
@@ -147,9 +147,9 @@ PREMIUM_1_5 = PhantomParameters(
     viscous_friction=(5e-4, 5e-4, 5e-4),
     gimbal_inertia=(2e-5, 2e-5, 2e-6),
     gimbal_damping=1e-4,
-    limit=(_deg(-90, 90), _deg(-124, 119), _deg(-29, 214)),
-    elbow_limit=_deg(-65, 55),
-    gimbal_limit=(_deg(-148.5, 148.5), _deg(-130, 130), _deg(-167.5, 167.5)),
+    limit=(_radians(-90, 90), _radians(-124, 119), _radians(-29, 214)),
+    elbow_limit=_radians(-65, 55),
+    gimbal_limit=(_radians(-148.5, 148.5), _radians(-130, 130), _radians(-167.5, 167.5)),
 )
 
 LEAST_TIP = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0

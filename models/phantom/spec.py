@@ -12,7 +12,7 @@ CLOSING_JOINTS = ("elbow", "twin")
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
 MOTORS = ("motor1", "motor2", "motor3")
 
-_WEIGHTLESS = 1e-14  # MuJoCo requires every moving body to have a mass and inertia [kg], [kg m²]
+_NEGLIGIBLE_INERTIA = 1e-14  # MuJoCo requires every moving body to have a mass and inertia [kg], [kg m²]
 
 
 def _set_inertia(spec: mujoco.MjSpec, body: str, mass: float, com: Triple, about_com: Triple) -> None:
@@ -53,7 +53,13 @@ def phantom_spec() -> mujoco.MjSpec:
     _set_inertia(spec, "a", p.m_a, (0.0, -0.5 * p.l2, 0.0), p.inertia_a)
     _set_inertia(spec, "c", p.m_c, (0.0, 0.0, 0.5 * p.l1), p.inertia_c)
     for body in ("yoke", "fork", "stylus"):
-        _set_inertia(spec, body, _WEIGHTLESS, (0.0, 0.0, 0.0), (_WEIGHTLESS, _WEIGHTLESS, _WEIGHTLESS))
+        _set_inertia(
+            spec,
+            body,
+            _NEGLIGIBLE_INERTIA,
+            (0.0, 0.0, 0.0),
+            (_NEGLIGIBLE_INERTIA, _NEGLIGIBLE_INERTIA, _NEGLIGIBLE_INERTIA),
+        )
     for axis, (joint, motor) in enumerate(zip(MOTOR_JOINTS, MOTORS, strict=True)):
         item = spec.joint(joint)
         item.armature, item.frictionloss = rotor[axis], p.coulomb_friction[axis]

@@ -15,7 +15,7 @@ from models.robot_arm.spec import arm_spec
 PHANTOM = "phantom/"
 FIGURE = "figure/"
 ROBOT = "robot/"
-MOST_SUBSTEPS = 1000  # of a servo period: a step of 1 µs at 1 kHz; a tick keeps a row for each
+MOST_SUBSTEPS = 1000  # largest number in a servo period, 1 µs each at 1 kHz; a tick stores a row for each
 FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -73,7 +73,7 @@ class SceneConfig:
 
 
 def _add_table(world: mujoco.MjsBody) -> None:
-    """A table under the Phantom's base; its top is 0.25 m below the origin of H, and its centre 0.16 m beyond it."""
+    """Add a table under the Phantom's base; its top is 0.25 m below the origin of H, its centre 0.16 m beyond it."""
     top = (P_WH + np.array([0.16, 0.0, -0.265])).tolist()
     wood = [0.6, 0.48, 0.36, 1.0]
     box = mujoco.mjtGeom.mjGEOM_BOX
@@ -145,7 +145,7 @@ def device_world_model(config: SceneConfig) -> mujoco.MjModel:
 
 
 def robot_spec(config: SceneConfig) -> mujoco.MjSpec:
-    """The world with a robot arm (prefix ``robot/``) on a pedestal in the place of the figure, before compilation."""
+    """The world with a robot arm (prefix ``robot/``) on a pedestal in place of the figure, before compilation."""
     spec = device_spec(config)
     height = 0.5 * PEDESTAL
     pedestal = spec.worldbody.add_body(name=ROBOT + "pedestal", pos=[0.0, 0.0, height])

@@ -18,11 +18,12 @@ from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_POSE, figure_model
 
-_TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame [m], about which the heel rises
-_HANG = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards
-# Shares of a leg's length (knees bent by 36 and 5°): exact up to the first, limited to the second.
-_REACH = (0.95, 0.999)
-_LIFT = np.array([0.06, np.deg2rad(15)])  # default lift of toes [m] and pitch of the foot in mid-swing
+# Middle of the toe contacts in the foot's frame [m], about which the heel rises.
+_TOE_POSITION = np.array([0.165, 0.0, -0.048])
+_HANGING_ARM = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards
+# Hip-to-ankle distance over the leg's length (knee bent by 36 and 5°): exact up to the first, limited to the second.
+_REACH_RATIOS = (0.95, 0.999)
+_SWING_LIFT = np.array([0.06, np.deg2rad(15)])  # default lift of toes [m] and pitch of the foot in mid-swing
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Arm:
         """Rotation vectors [rad] of clavicle, shoulder, elbow and wrist of a left arm, shape (4, 3)."""
         raised, plane = np.deg2rad([self.raised, self.plane])
         swing = Rotation.from_rotvec(raised * np.array([np.sin(plane), -np.cos(plane), 0.0]))
-        arm = swing * _HANG * Rotation.from_euler("y", self.turn, degrees=True)
+        arm = swing * _HANGING_ARM * Rotation.from_euler("y", self.turn, degrees=True)
         # The shoulder girdle moves with the arm: it rises (scapulohumeral rhythm) and protracts.
         lift = 0.2 * max(0.0, self.raised - 30.0)
         reach = -14.0 * np.sin(raised) * np.cos(plane)
@@ -114,7 +115,7 @@ class Step:
     yaw, pitch, roll : float
         Heading to the left; heel up about the toes; roll [degrees].
     knee : float
-        Angle by which the knee points outwards of the mean heading of foot and pelvis [degrees].
+        Angle by which the knee points outwards from the mean heading of foot and pelvis [degrees].
     rest : bool
         Whether the foot has no velocity and no acceleration here.
     """
@@ -133,10 +134,10 @@ class Step:
     def in_air(
         cls, t: float, ankle: tuple[float, float, float], yaw: float = 0.0, pitch: float = 0.0, knee: float = 0.0
     ) -> "Step":
-        """A step given by a position of the ankle in the air [m], through which the foot passes, as in kicks."""
+        """A step in the air, as in kicks: the foot passes through a position of the ankle [m] without resting."""
         heading = Rotation.from_euler("z", yaw, degrees=True)
-        toe = np.array(ankle) + (heading * Rotation.from_euler("y", pitch, degrees=True)).apply(_TOE)
-        x, y, z = toe - heading.apply([_TOE[0], 0.0, CONTACT_RADIUS])
+        toe = np.array(ankle) + (heading * Rotation.from_euler("y", pitch, degrees=True)).apply(_TOE_POSITION)
+        x, y, z = toe - heading.apply([_TOE_POSITION[0], 0.0, CONTACT_RADIUS])
         return cls(t, float(x), float(y), float(z), yaw, pitch, 0.0, knee, rest=False)
 
 
@@ -186,8 +187,8 @@ def _check_times(choreography: Choreography, what: str, times: Array) -> None:
 
 def _from_rest_to_rest(times: Array, values: Array) -> BSpline:
     """Quintic spline through values (n, k) with zero velocity and acceleration at both ends."""
-    still = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
-    return make_interp_spline(times, values, k=5, bc_type=(still, still))
+    at_rest = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
+    return make_interp_spline(times, values, k=5, bc_type=(at_rest, at_rest))
 
 
 def _channel(choreography: Choreography, name: str, t: Array) -> Array:
@@ -195,7 +196,7 @@ def _channel(choreography: Choreography, name: str, t: Array) -> Array:
     keyed = [(key.t, getattr(key, name)) for key in choreography.keys if getattr(key, name) is not None]
     if not keyed:
         raise ModelError(f"{choreography.name}: no key sets {name}; set it at least once")
-    times = np.array([when for when, _ in keyed])
+    times = np.array([time for time, _ in keyed])
     _check_times(choreography, f"keys of {name}", times)
     values = np.array(
         [value.rotations().ravel() if isinstance(value, Arm) else value for _, value in keyed], dtype=float
@@ -225,7 +226,7 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     """Track of a foot as (x, y, z, yaw, pitch, roll, knee) [m, rad], shape (n, 7).
 
     Quintic splines between resting steps have zero velocity and acceleration there, so the track is C², and exactly
-    constant in stance. A swing without steps in between is lifted by `_LIFT`, heel first.
+    constant in stance. A swing without steps in between is lifted by `_SWING_LIFT`, heel first.
     """
     steps: Sequence[Step] = getattr(choreography, f"{side}_foot")
     rests = [i for i, step in enumerate(steps) if step.rest]
@@ -252,13 +253,16 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     if len(rests) == 1:
         return track + values[rests[0]]
     for k, (i, j) in enumerate(pairwise(rests)):
-        when, what = times[i : j + 1], values[i : j + 1]
-        if j == i + 1 and np.any(what[0, :2] != what[1, :2]):
-            via = what.mean(axis=0)
-            via[[2, 4]] += _LIFT
-            when, what = np.insert(when, 1, when.mean()), np.insert(what, 1, via, axis=0)
-        here = segment == k
-        track[here] += _from_rest_to_rest(when, what)(t[here])
+        knot_times, knot_poses = times[i : j + 1], values[i : j + 1]
+        if j == i + 1 and np.any(knot_poses[0, :2] != knot_poses[1, :2]):
+            via = knot_poses.mean(axis=0)
+            via[[2, 4]] += _SWING_LIFT
+            knot_times, knot_poses = (
+                np.insert(knot_times, 1, knot_times.mean()),
+                np.insert(knot_poses, 1, via, axis=0),
+            )
+        in_segment = segment == k
+        track[in_segment] += _from_rest_to_rest(knot_times, knot_poses)(t[in_segment])
     return track
 
 
@@ -292,13 +296,13 @@ def solve_leg(
     """
     sign = 1.0 if side == "left" else -1.0
     offset, a, b = _leg_geometry()
-    line = ankle - root - pelvis.apply(offset * [1.0, sign, 1.0])
-    distance = np.linalg.norm(line, axis=1)
-    u = line / distance[:, None]
-    soft, hard = _REACH[0] * (a + b), _REACH[1] * (a + b)
-    over = np.maximum(distance - soft, 0.0) / (hard - soft)
+    hip_to_ankle = ankle - root - pelvis.apply(offset * [1.0, sign, 1.0])
+    distance = np.linalg.norm(hip_to_ankle, axis=1)
+    u = hip_to_ankle / distance[:, None]
+    soft, hard = _REACH_RATIOS[0] * (a + b), _REACH_RATIOS[1] * (a + b)
+    excess = np.maximum(distance - soft, 0.0) / (hard - soft)
     # x / (1 + x³)^(1/3) agrees with x up to the second derivative at 0, so the saturation is C².
-    d = np.where(over > 0, soft + (hard - soft) * over / np.cbrt(1 + over**3), distance)
+    d = np.where(excess > 0, soft + (hard - soft) * excess / np.cbrt(1 + excess**3), distance)
     sideways = pelvis.apply([0.0, 1.0, 0.0]) + foot.apply([0.0, 1.0, 0.0])
     sideways = Rotation.from_rotvec(np.outer(sign * knee, [0.0, 0.0, 1.0])).apply(sideways)
     axis = sideways - np.sum(sideways * u, axis=1, keepdims=True) * u
@@ -348,8 +352,8 @@ def poses_at(choreography: Choreography, t: Array, sway: Array | None = None) ->
         track = _foot_track(choreography, side, t)
         heading = Rotation.from_rotvec(track[:, 3:4] * [0.0, 0.0, 1.0])
         foot = Rotation.from_euler("ZYX", track[:, 3:6])
-        toe = track[:, :3] + heading.apply([_TOE[0], 0.0, CONTACT_RADIUS])
-        leg = solve_leg(side, root, pelvis, toe - foot.apply(_TOE), foot, track[:, 6])
+        toe = track[:, :3] + heading.apply([_TOE_POSITION[0], 0.0, CONTACT_RADIUS])
+        leg = solve_leg(side, root, pelvis, toe - foot.apply(_TOE_POSITION), foot, track[:, 6])
         joints.update(zip((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), leg, strict=True))
     poses = np.empty((len(t), N_POSE))
     poses[:, :3] = root

@@ -12,10 +12,11 @@ from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from models.mocap.motion.clip import Clip
 
-# Height below which a contact sphere is support [m], at any speed, unlike in `contacts`: authored soles are exact.
+# Height below which a contact sphere supports the body [m], at any speed: unlike captured ones (`contacts`), authored
+# soles are exact.
 _SUPPORT_HEIGHT = 0.006
-_CUTOFF, _ROUNDS = 8.0, 12  # highest frequency of the sway [Hz], and iterations of its correction
-_WITHIN = 0.7  # the zero-moment point is to lie within the support polygon scaled by this about its middle
+_CUTOFF_FREQUENCY, _ITERATION_COUNT = 8.0, 12  # highest frequency of the sway [Hz], and iterations of its correction
+_SUPPORT_SCALE = 0.7  # scale, about its middle, of the support polygon in which the zero-moment point must lie
 
 
 class Dynamics(NamedTuple):
@@ -43,7 +44,7 @@ class Dynamics(NamedTuple):
 
     @property
     def touching(self) -> Mask:
-        """Which contact spheres are support, shape (n, 8)."""
+        """Which contact spheres support the body, shape (n, 8)."""
         return self.contacts[..., 2] < CONTACT_RADIUS + _SUPPORT_HEIGHT
 
 
@@ -66,17 +67,17 @@ def dynamics(clip: Clip) -> Dynamics:
     feet = [model.geom(name).id for name in FOOT_CONTACTS]
     velocities = clip.velocities()
     n = len(clip.poses) - 1
-    com, spin, contacts = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(feet), 3))
+    com, momentum, contacts = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(feet), 3))
     for k in range(n):
         data.qpos, data.qvel = clip.poses[k], velocities[k]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
         mujoco.mj_subtreeVel(model, data)
-        com[k], spin[k], contacts[k] = data.subtree_com[pelvis], data.subtree_angmom[pelvis], data.geom_xpos[feet]
+        com[k], momentum[k], contacts[k] = data.subtree_com[pelvis], data.subtree_angmom[pelvis], data.geom_xpos[feet]
     acceleration = (np.roll(com, -1, axis=0) - 2 * com + np.roll(com, 1, axis=0)) * clip.fps**2
     force = model.body_subtreemass[pelvis] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
-    torque = (np.roll(spin, -1, axis=0) - np.roll(spin, 1, axis=0)) * clip.fps / 2
+    torque = (np.roll(momentum, -1, axis=0) - np.roll(momentum, 1, axis=0)) * clip.fps / 2
     return Dynamics(com, force, torque, zero_moment_point(com, force, torque), contacts)
 
 
@@ -100,12 +101,12 @@ def balanced_clip(choreography: Choreography, fps: float) -> Clip:
     n = round(choreography.duration * fps)
     t = np.linspace(0.0, choreography.duration, n + 1)
     sway = np.zeros((n + 1, 2))
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATION_COUNT):
         motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
-        wanted = nearest_supported(motion.zmp, motion.contacts[..., :2], motion.touching, _WITHIN)
+        target = nearest_supported(motion.zmp, motion.contacts[..., :2], motion.touching, _SUPPORT_SCALE)
         # A sway adds a moment, which moves the zero-moment point further where the vertical force is smaller.
         load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
-        error = load * (wanted - motion.zmp)
-        change = sway_of(error, motion.com[:, 2].mean(), choreography.duration, _CUTOFF)
+        error = load * (target - motion.zmp)
+        change = sway_of(error, motion.com[:, 2].mean(), choreography.duration, _CUTOFF_FREQUENCY)
         sway += np.vstack([change, change[:1]])
     return Clip(poses_at(choreography, t, sway), fps, choreography.name)

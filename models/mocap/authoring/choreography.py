@@ -104,8 +104,8 @@ def spin() -> Choreography:
         track = []
         for k in range(0 if side > 0 else 1, steps, 2):
             heading = k * turn
-            where = np.deg2rad(heading)
-            x, y = -radius * side * np.sin(where), radius * side * np.cos(where)
+            angle = np.deg2rad(heading)
+            x, y = -radius * side * np.sin(angle), radius * side * np.cos(angle)
             yaw = heading + side * 10
             track += [Step(k * beat, x, y, yaw=yaw), Step((k + 2) * beat - 0.34, x, y, yaw=yaw)]
         return track
@@ -213,8 +213,8 @@ def ginga() -> Choreography:
     )  # fmt: skip
 
 
-def _clip(choreography: Callable[[], Choreography]) -> Callable[[], Clip]:
+def _clip_maker(choreography: Callable[[], Choreography]) -> Callable[[], Clip]:
     return lambda: balanced_clip(choreography(), FPS)
 
 
-CLIPS: dict[str, Callable[[], Clip]] = {c.__name__: _clip(c) for c in (angry, cheer, spin, squat_dance, ginga)}
+CLIPS: dict[str, Callable[[], Clip]] = {c.__name__: _clip_maker(c) for c in (angry, cheer, spin, squat_dance, ginga)}

@@ -19,18 +19,18 @@ from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
 from models.mocap.motion.clip import Clip
 
 FPS = 120.0  # [1/s]
-_HIP = 0.0875  # half the distance of the hips [m]: the feet stand below them
-# Symmetric degrees of freedom, with the weights of a distance of a radian (metre) from the sketch.
-_ACTIVE = (
+_HALF_HIP_WIDTH = 0.0875  # half the distance of the hips [m]: the feet stand below them
+# Symmetric degrees of freedom, with the weights of their distances from the sketch [1/rad], [1/m].
+_ACTIVE_DOFS = (
     ("position", "x", 0.3), ("position", "z", 0.3), ("root", "y", 0.5), ("abdomen", "y", 4.0), ("chest", "y", 4.0),
     ("head", "y", 6.0), ("left_clavicle", "x", 8.0), ("left_clavicle", "z", 8.0), ("left_shoulder", "x", 4.0),
     ("left_shoulder", "y", 4.0), ("left_shoulder", "z", 4.0), ("left_elbow", "z", 4.0), ("left_hip", "y", 2.0),
     ("left_knee", "y", 2.0), ("left_ankle", "y", 2.0),
 )  # fmt: skip
-_COLUMNS = [coordinate(joint, axis) for joint, axis, _ in _ACTIVE]
+_ACTIVE_COLUMNS = [coordinate(joint, axis) for joint, axis, _ in _ACTIVE_DOFS]
 
 
-_ROUGH = Weights(force=3.0, moment=6.0, flight=1.0, slip=100.0, depth=50.0, limit=20.0, strain=1.0)
+_ROUGH_WEIGHTS = Weights(force=3.0, moment=6.0, flight=1.0, slip=100.0, depth=50.0, limit=20.0, strain=1.0)
 
 
 class Key(NamedTuple):
@@ -81,7 +81,7 @@ class Flight(NamedTuple):
     intervals : int
         Knot intervals of the spline.
     weights : Weights
-        Weights of everything but the sketch.
+        Weights of all errors but the distance from the sketch.
     """
 
     name: str
@@ -93,34 +93,34 @@ class Flight(NamedTuple):
     weights: Weights
 
 
-# Arms that hang, and that are swung back before a jump.
-_HANG = Arm(raised=8, plane=60, elbow=14)
-_BACK = Arm(raised=48, plane=165, elbow=18)
+# Arms that hang, and arms that are swung back before a jump.
+_HANGING_ARMS = Arm(raised=8, plane=60, elbow=14)
+_SWUNG_BACK_ARMS = Arm(raised=48, plane=165, elbow=18)
 
 
-def _stand(time: float, x: float, pitch: float = 0.0) -> Key:
-    """Upright at rest with knees bent by 6° and the pelvis 2 cm ahead of the ankles: the weight is over the feet."""
+def _standing_key(time: float, x: float, pitch: float = 0.0) -> Key:
+    """A key at rest, upright: knees bent by 6°, pelvis 2 cm ahead of the ankles, so the weight is over the feet."""
     thigh, shank, bend = 0.4244, 0.4362, np.deg2rad(6.0)
     alpha = np.arctan2(shank * np.sin(bend), thigh + shank * np.cos(bend))
     length = thigh * np.cos(alpha) + shank * np.cos(bend - alpha)
     slope = np.arcsin(0.02 / length)
     hip, ankle = np.rad2deg([alpha - slope, bend - alpha + slope])
-    return Key(time, hip, 6.0, ankle, pitch, 0.0, 0.0, _HANG, (x + 0.02, 0.068 + length * np.cos(slope)))
+    return Key(time, hip, 6.0, ankle, pitch, 0.0, 0.0, _HANGING_ARMS, (x + 0.02, 0.068 + length * np.cos(slope)))
 
 
 JUMP = Flight(
     name="jump",
     keys=(
-        _stand(0.0, 0.0),
-        _stand(0.2, 0.0),
-        Key(0.66, 88, 92, 28, 28, 18, -25, _BACK, (-0.10, 0.62)),
+        _standing_key(0.0, 0.0),
+        _standing_key(0.2, 0.0),
+        Key(0.66, 88, 92, 28, 28, 18, -25, _SWUNG_BACK_ARMS, (-0.10, 0.62)),
         Key(0.94, 4, 6, -38, 2, -6, -5, Arm(raised=135, plane=12, elbow=20), (0.06, 1.02)),
         Key(1.10, 18, 22, -32, 0, -4, 0, Arm(raised=145, plane=15, elbow=20), (0.14, 1.20)),
         Key(1.25, 40, 34, -12, 4, 4, -4, Arm(raised=105, plane=20, elbow=25), (0.22, 1.18)),
         Key(1.40, 38, 24, -6, 12, 8, -10, Arm(raised=70, plane=25, elbow=25), (0.28, 0.98)),
         Key(1.66, 82, 84, 27, 26, 18, -22, Arm(raised=45, plane=20, elbow=30), (0.22, 0.66)),
-        _stand(2.2, 0.35),
-        _stand(2.4, 0.35),
+        _standing_key(2.2, 0.35),
+        _standing_key(2.4, 0.35),
     ),
     off=(0.82, 0.94), down=(1.45, 1.40), travel=0.35, intervals=48, weights=Weights(flight=10.0),
 )  # fmt: skip
@@ -128,9 +128,9 @@ JUMP = Flight(
 BACKFLIP = Flight(
     name="backflip",
     keys=(
-        _stand(0.0, 0.0),
-        _stand(0.2, 0.0),
-        Key(0.66, 84, 90, 28, 26, 16, -20, _BACK, (-0.10, 0.63)),
+        _standing_key(0.0, 0.0),
+        _standing_key(0.2, 0.0),
+        Key(0.66, 84, 90, 28, 26, 16, -20, _SWUNG_BACK_ARMS, (-0.10, 0.63)),
         Key(1.00, -8, 10, -36, -16, -12, -14, Arm(raised=150, plane=12, elbow=12), (-0.02, 1.02)),
         Key(1.15, 75, 80, -25, -75, 10, 5, Arm(raised=100, plane=15, elbow=30), (-0.08, 1.38)),
         Key(1.26, 112, 122, -15, -150, 38, 18, Arm(raised=45, plane=20, elbow=75), (-0.14, 1.50)),
@@ -138,8 +138,8 @@ BACKFLIP = Flight(
         Key(1.57, 65, 60, -15, -315, 18, 0, Arm(raised=60, plane=15, elbow=30), (-0.24, 1.20)),
         Key(1.68, 45, 26, -4, -338, 8, -8, Arm(raised=65, plane=20, elbow=22), (-0.28, 0.98)),
         Key(1.94, 86, 88, 27, -334, 20, -22, Arm(raised=58, plane=20, elbow=25), (-0.34, 0.64)),
-        _stand(2.5, -0.25, -360.0),
-        _stand(2.7, -0.25, -360.0),
+        _standing_key(2.5, -0.25, -360.0),
+        _standing_key(2.7, -0.25, -360.0),
     ),
     off=(0.90, 1.00), down=(1.73, 1.68), travel=-0.25, intervals=60,
     weights=Weights(force=30.0, moment=60.0, flight=7.0, slip=600.0, depth=800.0, jerk=6e-5),
@@ -165,7 +165,7 @@ def _stances(flight: Flight) -> list[Stance]:
     stances: list[Stance] = []
     for sphere, (name, (x, across, _)) in enumerate(zip(FOOT_CONTACTS, soles(), strict=True)):
         part = int("toe" in name)
-        y = across + (_HIP if name.startswith("left") else -_HIP)
+        y = across + (_HALF_HIP_WIDTH if name.startswith("left") else -_HALF_HIP_WIDTH)
         stances.append(Stance(sphere, -np.inf, flight.off[part], (x, y)))
         stances.append(Stance(sphere, flight.down[part], np.inf, (x + flight.travel, y)))
     return stances
@@ -175,19 +175,19 @@ def task(flight: Flight, weights: Weights) -> Task:
     """The whole motion, from rest to rest, as a task for the spacetime optimisation."""
     frames = 3 * flight.intervals
     duration = flight.keys[-1].time
-    columns = np.eye(N_TANGENT)[:, _COLUMNS]
+    columns = np.eye(N_TANGENT)[:, _ACTIVE_COLUMNS]
     embed = np.clip(columns + reflection() @ columns, -1.0, 1.0)
     return Task(
         duration=duration, intervals=flight.intervals, embed=embed, mirror=None, speed=0.0,
-        sketch=_sketch(flight.keys, np.arange(frames) * duration / frames)[:, _COLUMNS],
-        tracking=np.tile([cost for _, _, cost in _ACTIVE], (frames, 1)), stances=_stances(flight),
+        sketch=_sketch(flight.keys, np.arange(frames) * duration / frames)[:, _ACTIVE_COLUMNS],
+        tracking=np.tile([cost for _, _, cost in _ACTIVE_DOFS], (frames, 1)), stances=_stances(flight),
         clearance=np.zeros((frames, len(FOOT_CONTACTS))), weights=weights,
     )  # fmt: skip
 
 
 def _clip(flight: Flight) -> Clip:
     # With the final weights from the start the optimisation ends in poor local minima: a rough solution warm-starts it.
-    rough = Motion(task(flight, _ROUGH))
+    rough = Motion(task(flight, _ROUGH_WEIGHTS))
     rough.solve(40, 1e-3)
     motion = Motion(task(flight, flight.weights))
     motion.unknowns = rough.unknowns

@@ -1,7 +1,7 @@
 """Walk and run: published normative joint angles, made feasible by spacetime optimisation.
 
 The sketches are the sagittal hip, knee and ankle angles of normal adults at every 5 % of the cycle, rounded to a few
-degrees from what is published: Winter (1991, *The Biomechanics and Motor Control of Human Gait*, natural cadence) and
+degrees from published curves: Winter (1991, *The Biomechanics and Motor Control of Human Gait*, natural cadence) and
 Perry & Burnfield (2010, *Gait Analysis*) for the walk, Novacheck (1998, "The biomechanics of running", *Gait & Posture*
 7) for the run. Pelvis and arms are first harmonics with the amplitudes and phases that those sources describe. To make
 the motion feasible, the optimisation changes the path of the pelvis, and joint angles by a few degrees.
@@ -21,15 +21,17 @@ from models.mocap.dynamics.spacetime import Motion, Stance, Task
 from models.mocap.motion.clip import Clip
 
 FPS = 120.0  # [1/s]
-_ACTIVE = (
+_ACTIVE_DOFS = (
     ("position", "xyz"), ("root", "xyz"), ("abdomen", "xyz"), ("chest", "xyz"), ("head", "xyz"),
     *((f"{side}_{joint}", axes) for side in ("left", "right")
       for joint, axes in (("shoulder", "xyz"), ("elbow", "z"), ("hip", "xyz"), ("knee", "y"), ("ankle", "xy"))),
 )  # fmt: skip
-_COLUMNS = [coordinate(joint, axis) for joint, axes in _ACTIVE for axis in axes]
-# Weights of a distance of a radian or metre from the sketch: low for the pelvis, which contacts and forces determine.
-_TRACKING = {"position": 0.3, "root": 8.0, "abdomen": 6.0, "chest": 6.0, "head": 10.0, "shoulder": 6.0, "elbow": 6.0,
-             "hip": 3.0, "knee": 3.0, "ankle": 3.0}  # fmt: skip
+_ACTIVE_COLUMNS = [coordinate(joint, axis) for joint, axes in _ACTIVE_DOFS for axis in axes]
+# Weights of the distances from the sketch [1/rad], [1/m]: low for the pelvis, which contacts and forces determine.
+_TRACKING_WEIGHTS = {
+    "position": 0.3, "root": 8.0, "abdomen": 6.0, "chest": 6.0, "head": 10.0, "shoulder": 6.0, "elbow": 6.0,
+    "hip": 3.0, "knee": 3.0, "ankle": 3.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -135,9 +137,9 @@ def _sketch(gait: Gait, phase: Array) -> Array:
     u[:, coordinate("head", "z")] = 0.8 * turn
     for side, start, sign in (("left", 0.0, 1.0), ("right", 0.5, -1.0)):
         p = (phase + start) % 1.0
-        for joint, curve, way in (("hip", gait.hip, -1), ("knee", gait.knee, 1), ("ankle", gait.ankle, -1)):
+        for joint, curve, direction in (("hip", gait.hip, -1), ("knee", gait.knee, 1), ("ankle", gait.ankle, -1)):
             spline = CubicSpline(np.linspace(0, 1, 21), np.deg2rad([*curve, curve[0]]), bc_type="periodic")
-            u[:, coordinate(f"{side}_{joint}", "y")] = way * spline(p)
+            u[:, coordinate(f"{side}_{joint}", "y")] = direction * spline(p)
         u[:, coordinate(f"{side}_hip", "x")] = sign * np.deg2rad(gait.apart)
         u[:, coordinate(f"{side}_hip", "z")] = sign * np.deg2rad(gait.splay)
         swing = -np.cos(2 * np.pi * (p - 0.03))
@@ -169,16 +171,20 @@ def task(gait: Gait) -> Task:
     """Half a cycle of a gait, as a task for the spacetime optimisation."""
     frames = 4 * gait.intervals
     phase = 0.5 * np.arange(frames) / frames
-    embed = np.eye(N_TANGENT)[:, _COLUMNS]
+    embed = np.eye(N_TANGENT)[:, _ACTIVE_COLUMNS]
     clearance = np.zeros((frames, len(FOOT_CONTACTS)))
     for sphere, name in enumerate(FOOT_CONTACTS):
         p = (phase + (0.0 if name.startswith("left") else 0.5)) % 1.0
-        swung = np.clip((p - gait.toe[1]) / (1 - gait.toe[1]), 0, 1)
-        clearance[:, sphere] = gait.lift * np.sin(np.pi * swung) ** 2
-    tracking = [_TRACKING[joint.removeprefix("left_").removeprefix("right_")] for joint, axes in _ACTIVE for _ in axes]
+        swing_phase = np.clip((p - gait.toe[1]) / (1 - gait.toe[1]), 0, 1)
+        clearance[:, sphere] = gait.lift * np.sin(np.pi * swing_phase) ** 2
+    tracking = [
+        _TRACKING_WEIGHTS[joint.removeprefix("left_").removeprefix("right_")]
+        for joint, axes in _ACTIVE_DOFS
+        for _ in axes
+    ]
     return Task(
         duration=gait.period / 2, intervals=gait.intervals, embed=embed, mirror=embed.T @ reflection() @ embed,
-        speed=gait.speed, sketch=_sketch(gait, phase)[:, _COLUMNS], tracking=np.tile(tracking, (frames, 1)),
+        speed=gait.speed, sketch=_sketch(gait, phase)[:, _ACTIVE_COLUMNS], tracking=np.tile(tracking, (frames, 1)),
         stances=_stances(gait), clearance=clearance,
     )  # fmt: skip
 

@@ -1,12 +1,12 @@
 """Contact detection: which parts of the body touch the floor, robust to errors of some centimetres in captures.
 
-A part of the body that bears load is near the floor *and* at rest. Height alone does not suffice: the soles of runners
-clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which the
-figure lacks, so their height threshold is larger.
+A part of the body that bears load is near the floor *and* at rest. Height alone does not suffice: the swinging feet of
+runners clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which
+the figure lacks, so their height threshold is larger.
 
-Which feet of a motion stand is decided by one rule, here and in `preparation`: that of `standing_parts`. By errors of
-leg length the feet of captured runners slide while they stand; a foot rests where it stands and is slow. What touches
-is decided more leniently, lest a flight be found where something may bear load.
+One rule, `standing_parts`, decides which feet of a motion stand, here and in `preparation`. Because of errors of leg
+length, the feet of captured runners slide while they stand; a foot *rests* only where it stands and is slow. Whether a
+part *touches* is decided more leniently, so that no flight is found where something may bear load.
 """
 
 from typing import NamedTuple
@@ -19,29 +19,32 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACT
 from models.mocap.motion.clip import CLOSES, Clip
 from models.mocap.motion.spans import cleaned, spans
 
-# Height below which a part touches at any speed [m]: half or twice changes whether a body is supported in 0.8 % of the
-# frames of 17 captures.
-_CERTAIN = 0.005
+# Height below which a part touches at any speed [m]. Half or twice the value changes whether the body is supported in
+# 0.8 % of the frames of 17 captures.
+_CONTACT_HEIGHT = 0.005
 # Height above which it does not touch at any speed [m]: captured feet hover by 3 cm or more; hands lack fingers.
-# Half or twice of either changes whether a body is supported in 0.1 % of the frames of 17 captures.
-_NEAR, HAND_REACH = 0.06, 0.12
-# Speed below which a palm rests [m/s]. With 0.55 LAFAN's fall from 36 s, whose hands then stand more briefly, falls.
-_HAND_SLOW = 0.6
+# Half or twice either value changes whether the body is supported in 0.1 % of the frames of 17 captures.
+_MAX_CONTACT_HEIGHT, HAND_REACH = 0.06, 0.12
+# Speed below which a palm rests [m/s]. With 0.55 the stances of the hands in LAFAN's fall from 36 s are shorter, and
+# the physical figure falls.
+_MAX_HAND_SPEED = 0.6
 # Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures with a prototype: ±1 cm and
-# ±0.1 m/s move the residual of what is prepared by less than 1 point.
-_REACH, _SLOW = 0.045, 0.55
-# Share of the root's speed below which they stand, too, but do not rest: if they did, SNU's run, led, would have a
-# residual of 15 % of weight instead of 8, and the embedded run's soles would slide by 3.8 cm instead of 2.4.
-_SHARE = 0.3
-# Half or twice of each of the next numbers changes whether a sphere stands in 0.9 % or less of the frames of 19
-# captures (in one of them 9 %, with stances of up to 0.12 s dropped).
-_TOES, _STILL = 0.10, 0.15  # largest height [m] and speed [m/s] of toes that stand beside a standing heel
+# ±0.1 m/s change the residual of the prepared motions by less than 1 percentage point.
+_MAX_STANCE_HEIGHT, _MAX_STANCE_SPEED = 0.045, 0.55
+# Fraction of the root's speed below which they stand, too, but do not rest. If they rested, SNU's run in leading would
+# have a residual of 15 % of body weight instead of 8 %, and the embedded run's soles would slide by 3.8 cm instead of
+# 2.4 cm.
+_ROOT_SPEED_FRACTION = 0.3
+# Half or twice any of the next four values changes whether a sphere stands in at most 0.9 % of the frames of 19
+# captures (in one capture 9 %, if stances of up to 0.12 s are dropped).
+_MAX_TOE_HEIGHT, _MAX_TOE_SPEED = 0.10, 0.15  # [m], [m/s]: of toes that stand beside a standing heel
 GAP, SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
-# Largest height of a settled foot over the median of its stance [m]: half or twice of it moves led slides by 0.7 cm.
-_HIGHER = 0.005
-# A part below this height [m] and vertical speed [m/s] slides over the floor. Half of the first changes whether a body
-# is supported in 1.2 % of these frames, twice in 0.2 %; half or twice of the second in 0.6 %.
-_LOW, _LEVEL = 0.03, 0.25
+# Largest height of a settled foot above the median of its stance [m]. Half or twice the value changes the foot skate in
+# leading by 0.7 cm.
+_MAX_SETTLED_RISE = 0.005
+# A part below this height [m] and vertical speed [m/s] slides over the floor. Half the height changes whether the body
+# is supported in 1.2 % of these frames, twice the height in 0.2 %; half or twice the speed in 0.6 %.
+_MAX_SLIDING_HEIGHT, _MAX_VERTICAL_SPEED = 0.03, 0.25
 
 
 class Contacts(NamedTuple):
@@ -54,7 +57,7 @@ class Contacts(NamedTuple):
     touching : array of bool, shape (n, m)
         Whether a part is taken to bear load.
     resting : array of bool, shape (n, m)
-        Whether it does so at rest; a foot rests where it stands (`standing_parts`) and is slow.
+        Whether it bears load at rest; a foot rests where it stands (`standing_parts`) and is slow.
     """
 
     heights: Array
@@ -62,7 +65,7 @@ class Contacts(NamedTuple):
     resting: Mask
 
     def within(self, first: int, count: int) -> "Contacts":
-        """The contacts of `count` frames from the first on: of a part of a clip, with stances that began before it."""
+        """The contacts of `count` frames from frame `first` on; stances that began before it are kept."""
         frames = slice(first, first + count)
         return Contacts(self.heights[frames], self.touching[frames], self.resting[frames])
 
@@ -73,7 +76,7 @@ class Contacts(NamedTuple):
 
     @property
     def supported(self) -> Mask:
-        """Whether anything bears load, shape (n,)."""
+        """Whether any part bears load, shape (n,)."""
         return np.any(self.touching, axis=1)
 
     @property
@@ -94,7 +97,7 @@ class Contacts(NamedTuple):
             lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
             for start, end in spans(stands):
                 level = float(np.median(lowest[start:end]))
-                settled[start:end, foot] = lowest[start:end] < level + _HIGHER
+                settled[start:end, foot] = lowest[start:end] < level + _MAX_SETTLED_RISE
         return settled
 
 
@@ -116,26 +119,26 @@ def contacts(clip: Clip) -> Contacts:
         places[k, len(spheres) :, 2] -= np.einsum("gj,gj->g", np.abs(R[:, 2]), half)
     heights, feet = places[:, :, 2].copy(), len(FOOT_CONTACTS)
     heights[:, : len(spheres)] -= CONTACT_RADIUS
-    speeds = _slower_side(np.linalg.norm(np.diff(places, axis=0), axis=2) * clip.fps)
-    slides = _slower_side(np.abs(np.diff(heights, axis=0)) * clip.fps)
-    near = np.full(heights.shape[1], _NEAR)
-    near[feet : len(spheres)] = HAND_REACH
-    least = np.full(heights.shape[1], _SLOW)
-    least[feet : len(spheres)] = _HAND_SLOW
-    slow = (heights < near) & (speeds < least)
-    skids = (heights < _LOW) & (slides < _LEVEL)
-    rests = slow.copy()
+    speeds = _lower_one_sided_speed(np.linalg.norm(np.diff(places, axis=0), axis=2) * clip.fps)
+    vertical_speeds = _lower_one_sided_speed(np.abs(np.diff(heights, axis=0)) * clip.fps)
+    max_heights = np.full(heights.shape[1], _MAX_CONTACT_HEIGHT)
+    max_heights[feet : len(spheres)] = HAND_REACH
+    max_speeds = np.full(heights.shape[1], _MAX_STANCE_SPEED)
+    max_speeds[feet : len(spheres)] = _MAX_HAND_SPEED
+    slow = (heights < max_heights) & (speeds < max_speeds)
+    sliding = (heights < _MAX_SLIDING_HEIGHT) & (vertical_speeds < _MAX_VERTICAL_SPEED)
+    resting = slow.copy()
     stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSES))
-    rests[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
-    return Contacts(heights, (heights < _CERTAIN) | slow | skids, rests)
+    resting[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
+    return Contacts(heights, (heights < _CONTACT_HEIGHT) | slow | sliding, resting)
 
 
 def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) -> Mask:
     """Whether heel and toes of each foot stand on the floor z = 0, shape (n, 2 feet, 2 parts).
 
-    A part stands while its middle is lower than `_REACH` and slower than `_SLOW`, or than `_SHARE` of the root's speed;
-    toes stand beside a standing heel up to `_TOES`, if they are slower than `_STILL`. Gaps shorter than `GAP` are
-    filled, stances shorter than `SHORT` dropped.
+    A part stands while its middle is lower than `_MAX_STANCE_HEIGHT`, and slower than `_MAX_STANCE_SPEED` or than
+    `_ROOT_SPEED_FRACTION` of the root's speed. Toes stand beside a standing heel up to `_MAX_TOE_HEIGHT`, if they are
+    slower than `_MAX_TOE_SPEED`. Gaps shorter than `GAP` are filled, stances shorter than `SHORT` dropped.
 
     Parameters
     ----------
@@ -146,23 +149,25 @@ def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) 
     fps : float
         Frame rate [1/s].
     closed : bool
-        Whether the last frame is the first of the next lap, so that a stance may go on over the seam.
+        Whether the last frame is the first of the next lap, so that a stance may continue across the seam.
     """
     middles = soles.reshape(len(soles), 2, 2, 2, 3).mean(axis=3)
     heights, speeds, pace = middles[..., 2] - CONTACT_RADIUS, np.zeros(middles.shape[:3]), np.zeros(len(soles))
     if len(soles) > 1:
         speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
         pace = np.linalg.norm(np.gradient(root, axis=0), axis=1) * fps
-    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
-    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _TOES) & (speeds[:, :, 1] < _STILL)
+    stands = (heights < _MAX_STANCE_HEIGHT) & (
+        speeds < np.maximum(_MAX_STANCE_SPEED, _ROOT_SPEED_FRACTION * pace)[:, None, None]
+    )
+    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _MAX_TOE_HEIGHT) & (speeds[:, :, 1] < _MAX_TOE_SPEED)
     for foot in range(2):
         for part in range(2):
             stands[:, foot, part] = cleaned(stands[:, foot, part], round(GAP * fps), round(SHORT * fps), closed)
     return stands
 
 
-def _slower_side(speeds: Array) -> Array:
-    """Lower of the speeds before and after each of n frames: a sole rests before take-off, or after landing."""
+def _lower_one_sided_speed(speeds: Array) -> Array:
+    """The lower of the speeds before and after each of n frames: a sole rests before take-off, or after landing."""
     if len(speeds) == 0:
         return np.zeros((1, speeds.shape[1]))
     return np.minimum(np.vstack([speeds, speeds[-1:]]), np.vstack([speeds[:1], speeds]))

@@ -13,9 +13,9 @@ from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import pose_difference
 
-# Step of the finite differences for angular velocity and acceleration [s]. Half or twice moves the backflip's
-# velocities, of up to 10 rad/s, by 5e-5 or 2e-4, and its accelerations, of up to 116 rad/s², by 5e-4 or 2e-3.
-_DELTA = 1e-3
+# Step of the finite differences for angular velocity and acceleration [s]. Half or twice the step changes the
+# backflip's velocities (up to 10 rad/s) by 5e-5 or 2e-4, and its accelerations (up to 116 rad/s²) by 5e-4 or 2e-3.
+_TIME_STEP = 1e-3
 
 
 def coordinate(joint: str, axis: str) -> int:
@@ -62,9 +62,9 @@ def poses(coordinates: Array) -> Array:
 
 def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:
     """MuJoCo's qpos, qvel, qacc from coordinates and two time derivatives, (m, 57) ×3 → (m, 75), (m, 57) ×2."""
-    bend = 0.5 * _DELTA**2 * ddu
-    before, now, after = poses(u - _DELTA * du + bend), poses(u), poses(u + _DELTA * du + bend)
+    curvature = 0.5 * _TIME_STEP**2 * ddu
+    before, now, after = poses(u - _TIME_STEP * du + curvature), poses(u), poses(u + _TIME_STEP * du + curvature)
     velocity, acceleration = du.copy(), ddu.copy()
-    velocity[:, 3:] = pose_difference(before, after)[:, 3:] / (2 * _DELTA)
-    acceleration[:, 3:] = (pose_difference(now, after) - pose_difference(before, now))[:, 3:] / _DELTA**2
+    velocity[:, 3:] = pose_difference(before, after)[:, 3:] / (2 * _TIME_STEP)
+    acceleration[:, 3:] = (pose_difference(now, after) - pose_difference(before, now))[:, 3:] / _TIME_STEP**2
     return now, velocity, acceleration

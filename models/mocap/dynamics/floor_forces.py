@@ -18,14 +18,14 @@ from models.arrays import Array, Mask
 from models.floor import FRICTION
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT, figure_model
 
-_SHARE = 0.01  # ε, regularisation: makes the forces unique, shared between spheres, and continuous in the state
-_SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone
-EDGES = np.array([(x * _SLOPE, y * _SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
+_REGULARISATION = 0.01  # ε: makes the forces unique, shared between spheres, and continuous in the state
+_PYRAMID_SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone
+EDGES = np.array([(x * _PYRAMID_SLOPE, y * _PYRAMID_SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
 WITH_HANDS = FOOT_CONTACTS + HAND_CONTACTS
 
 
 class Carrier(NamedTuple):
-    """A segment whose joint the forces on some contact spheres load.
+    """A segment whose joint is loaded by the forces on some contact spheres.
 
     Attributes
     ----------
@@ -39,8 +39,8 @@ class Carrier(NamedTuple):
     spheres: slice
 
 
-def _carriers() -> tuple[Carrier, ...]:
-    """Legs, then trunk and arms, which carry what the palms bear."""
+def _all_carriers() -> tuple[Carrier, ...]:
+    """The carriers of the legs, then those of trunk and arms, which carry the load on the palms."""
     n, found = len(FOOT_CONTACTS), list[Carrier]()
     for part, spheres in (("left", slice(0, n // 2)), ("right", slice(n // 2, n))):
         found += [Carrier(BODIES.index(f"{part}_{name}"), spheres) for name in ("thigh", "shank", "foot")]
@@ -51,11 +51,11 @@ def _carriers() -> tuple[Carrier, ...]:
     return tuple(found)
 
 
-_CARRIERS = _carriers()
+_CARRIERS = _all_carriers()
 
 
 def carriers(spheres: int) -> tuple[Carrier, ...]:
-    """The segments whose joints the first 8 or all 10 contact spheres of `WITH_HANDS` load, 6 or 16."""
+    """The 6 or 16 segments whose joints are loaded by the first 8 or by all 10 contact spheres of `WITH_HANDS`."""
     return tuple(carrier for carrier in _CARRIERS if carrier.spheres.stop <= spheres)
 
 
@@ -95,10 +95,10 @@ class Demand(NamedTuple):
         m, k = self.spheres.shape[:2]
         soles = self.spheres - (0.0, 0.0, CONTACT_RADIUS)
         levers = np.zeros((*self.torque.shape, 4 * k))
-        for joint, (body, mine) in enumerate(carriers(k)):
-            moments = np.cross((soles[:, mine] - self.anchors[:, joint, None])[:, :, None], EDGES).reshape(m, -1, 3)
-            turned = np.einsum("mij,mei->mje", self.frames[:, joint], moments)
-            levers[:, 3 * (body - 1) : 3 * body, 4 * mine.start : 4 * mine.stop] = turned
+        for joint, (body, loading) in enumerate(carriers(k)):
+            moments = np.cross((soles[:, loading] - self.anchors[:, joint, None])[:, :, None], EDGES).reshape(m, -1, 3)
+            torques = np.einsum("mij,mei->mje", self.frames[:, joint], moments)
+            levers[:, 3 * (body - 1) : 3 * body, 4 * loading.start : 4 * loading.stop] = torques
         return levers
 
     def torque_on(self, grip: Array) -> Array:
@@ -106,8 +106,8 @@ class Demand(NamedTuple):
         m, k = self.spheres.shape[:2]
         soles, forces = self.spheres - (0.0, 0.0, CONTACT_RADIUS), grip.reshape(m, k, 4) @ EDGES
         torque = self.torque.copy()
-        for joint, (body, mine) in enumerate(carriers(k)):
-            moment = np.cross(soles[:, mine] - self.anchors[:, joint, None], forces[:, mine]).sum(axis=1)
+        for joint, (body, loading) in enumerate(carriers(k)):
+            moment = np.cross(soles[:, loading] - self.anchors[:, joint, None], forces[:, loading]).sum(axis=1)
             torque[:, 3 * (body - 1) : 3 * body] -= np.einsum("mij,mi->mj", self.frames[:, joint], moment)
         return torque
 
@@ -136,10 +136,10 @@ class Floor:
         m, k, c, d = len(q), len(self._geoms), len(self._bodies), self._data
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, k, 3)), np.empty((m, 3))
         anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 9))
-        moves = np.any(q[1:] != q[:-1], axis=1)  # states of one pose in a row share what depends on it alone
+        pose_changes = np.any(q[1:] != q[:-1], axis=1)  # consecutive states of one pose share its kinematics
         for i in range(m):
             d.qpos[:], d.qvel[:], d.qacc[:] = q[i], v[i], a[i]
-            if i > 0 and not moves[i - 1]:
+            if i > 0 and not pose_changes[i - 1]:
                 mujoco.mj_inverseSkip(self._model, d, mujoco.mjtStage.mjSTAGE_POS, 1)
                 force[i], spheres[i], com[i] = d.qfrc_inverse, spheres[i - 1], com[i - 1]
                 anchors[i], frames[i], root[i] = anchors[i - 1], frames[i - 1], root[i - 1]
@@ -159,22 +159,22 @@ class Floor:
         for k, stands in enumerate(standing):
             edges = np.flatnonzero(np.repeat(stands, 4))
             if len(edges):
-                system = np.concatenate([columns[k][:, edges], _SHARE * np.eye(len(edges))])
+                system = np.concatenate([columns[k][:, edges], _REGULARISATION * np.eye(len(edges))])
                 grip[k, edges] = nnls(system, np.concatenate([self._scale * demand.wrench[k], np.zeros(len(edges))]))[0]
         return grip
 
     def lacking(self, demand: Demand, standing: Mask) -> Array:
-        """‖S (w − A f*)‖: what contact forces of the spheres in `standing` (m, k) leave, shape (m,) [body weights]."""
-        missing = self._scale * residual(demand, self.grip(demand, standing))
-        return np.linalg.norm(missing, axis=1) / self.body_weight
+        """‖S (w − A f*)‖: residual under contact at the spheres in `standing` (m, k), shape (m,) [body weights]."""
+        weighted_residual = self._scale * residual(demand, self.grip(demand, standing))
+        return np.linalg.norm(weighted_residual, axis=1) / self.body_weight
 
     def answer(self, demand: Demand, grip: Array) -> Array:
-        """K: derivative of f* by the wrench with a fixed set of loaded edges, df* = K dw, shape (m, 4k, 6)."""
+        """K: derivative of f* by the wrench for a fixed set of loaded edges, df* = K dw, shape (m, 4k, 6)."""
         columns = (self._scale[:, None] * demand.columns()) * (grip > 0)[:, None]
-        inside = columns @ columns.transpose(0, 2, 1) + _SHARE**2 * np.eye(6)
-        return columns.transpose(0, 2, 1) @ np.linalg.solve(inside, np.broadcast_to(np.diag(self._scale), inside.shape))
+        gram = columns @ columns.transpose(0, 2, 1) + _REGULARISATION**2 * np.eye(6)
+        return columns.transpose(0, 2, 1) @ np.linalg.solve(gram, np.broadcast_to(np.diag(self._scale), gram.shape))
 
 
 def residual(demand: Demand, grip: Array) -> Array:
-    """Residual wrench r = w − A f that contact forces leave, shape (m, 6) [N, N m]."""
+    """Residual wrench r = w − A f under contact forces f, shape (m, 6) [N, N m]."""
     return demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)

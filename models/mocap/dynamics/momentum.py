@@ -29,7 +29,7 @@ class Momentum(NamedTuple):
 
 
 def momentum(clip: Clip) -> Momentum:
-    """Centre of mass, angular momentum and inertia of a clip on the default figure, velocities by differences."""
+    """Centre of mass, angular momentum and inertia of a clip on the default figure, by finite differences in time."""
     model = figure_model()
     data = mujoco.MjData(model)
     pelvis, bodies = model.body("pelvis").id, slice(1, model.nbody)

@@ -7,7 +7,7 @@ from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import global_rotations
 
-_REACH = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°
+_MAX_REACH_RATIO = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°
 _CHAINS = tuple(
     tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
 )
@@ -15,7 +15,7 @@ _CHAINS = tuple(
 
 def leg_lines(poses: Array) -> tuple[Array, float]:
     """Vectors from hips to ankles in the world [m], shape (n, 2, 3), and the length of a straight leg [m]."""
-    thigh, shank = _bones()
+    thigh, shank = _leg_bones()
     segments = global_rotations(poses)
     lines = [
         quaternions.rotated(segments[:, first], thigh) + quaternions.rotated(segments[:, second], shank)
@@ -34,15 +34,15 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
     shift : array, shape (n, 3)
         Displacement of the body [m].
     planted : array, shape (n, 2)
-        Share of the displacement that each foot, left and right, does not take: 1 keeps its place, 0 moves it with the
-        body. Its orientation in the world is kept in any case.
+        Fraction of the displacement that each foot, left and right, does not follow: 1 keeps its place, 0 moves it with
+        the body. Its orientation in the world is kept in any case.
 
     Returns
     -------
     array, shape (n, 75)
-        The new poses. An ankle that would be out of reach is moved along the line to the hip.
+        The new poses. An ankle that would be out of reach is moved towards the hip.
     """
-    thigh, shank = _bones()
+    thigh, shank = _leg_bones()
     a, b = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
     segments = global_rotations(poses)
     moved = poses.copy()
@@ -50,19 +50,22 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
     for leg, (first, second, third) in enumerate(_CHAINS):
         upper = quaternions.rotated(segments[:, first], thigh)
         lower = quaternions.rotated(segments[:, second], shank)
-        wanted = upper + lower - planted[:, leg, None] * shift
-        distance = np.minimum(np.linalg.norm(wanted, axis=1), _REACH * (a + b))
+        target = upper + lower - planted[:, leg, None] * shift
+        distance = np.minimum(np.linalg.norm(target, axis=1), _MAX_REACH_RATIO * (a + b))
         axis = np.cross(upper, lower)
         sine = np.linalg.norm(axis, axis=1)
         side = quaternions.rotated(segments[:, first], np.array([0.0, 1.0, 0.0]))
         # A straight knee defines no plane; it bends about the thigh's lateral axis.
         axis = np.where((sine > 0.03 * a * b)[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
-        now = np.arctan2(np.sum(np.cross(upper, lower) * axis, axis=1), np.sum(upper * lower, axis=1))
-        then = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
+        knee_angle = np.arctan2(np.sum(np.cross(upper, lower) * axis, axis=1), np.sum(upper * lower, axis=1))
+        target_knee_angle = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
         changed = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
-        bend = _turn(axis, np.where(changed, then - np.abs(now), 0.0))
-        now_at, wanted_at = upper + quaternions.rotated(bend, lower), np.where(changed[:, None], wanted, upper + lower)
-        swing = quaternions.arcs(_unit(now_at), _unit(wanted_at))
+        bend = _rotation_about(axis, np.where(changed, target_knee_angle - np.abs(knee_angle), 0.0))
+        bent, target_line = (
+            upper + quaternions.rotated(bend, lower),
+            np.where(changed[:, None], target, upper + lower),
+        )
+        swing = quaternions.arcs(_unit(bent), _unit(target_line))
         new_thigh = quaternions.product(swing, segments[:, first])
         new_shank = quaternions.product(swing, quaternions.product(bend, segments[:, second]))
         for body, parent, child in (
@@ -74,13 +77,13 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
     return moved
 
 
-def _bones() -> tuple[Array, Array]:
+def _leg_bones() -> tuple[Array, Array]:
     """Thigh and shank in their own frames [m]."""
     model = figure_model()
     return model.body("left_shank").pos, model.body("left_foot").pos
 
 
-def _turn(axis: Array, angle: Array) -> Array:
+def _rotation_about(axis: Array, angle: Array) -> Array:
     """Rotations about unit axes (n, 3) by angles (n,), shape (n, 4)."""
     half = angle[:, None] / 2.0
     return np.concatenate([np.cos(half), np.sin(half) * axis], axis=1)

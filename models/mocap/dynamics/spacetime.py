@@ -21,9 +21,9 @@ from models.mocap.dynamics.coordinates import states
 from models.mocap.dynamics.floor_forces import Demand, Floor, residual
 
 DEGREE = 5
-_STRONG = 0.8  # share of the torque limits beyond which effort is also strain: a fifth is left for the feedback
-LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
-MARGIN = 0.02  # kept from the joints' limits [rad]
+_STRAIN_THRESHOLD = 0.8  # fraction of the torque limits beyond which strain counts: a fifth is left for the feedback
+LAG = 0.012  # a sphere stands for this time before and after it bears load [s]: no force without contact
+MARGIN = 0.02  # distance kept from the joints' limits [rad]
 
 
 class Stance(NamedTuple):
@@ -53,13 +53,13 @@ class Weights(NamedTuple):
     force, moment : float
         Residual force, per body weight; residual moment, per body weight × metre.
     flight : float
-        Factor on both while nothing pushes.
+        Factor on both while no sphere bears load.
     slip, depth : float
         Displacement of a standing sphere, depth of a swinging one below its clearance [1/m].
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     effort, strain : float
-        Joint torque as a share of its limit; the excess of this share over 80 %.
+        Joint torque as a fraction of its limit; the excess of this fraction over 80 %.
     sway, jerk : float
         Third derivatives of the root's position [s³/m] and of rotation vectors [s³/rad].
     """
@@ -76,7 +76,7 @@ class Weights(NamedTuple):
     jerk: float = 5e-5
 
 
-_EVEN = Weights()
+_DEFAULT_WEIGHTS = Weights()
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Task:
     tracking: Array
     stances: Sequence[Stance]
     clearance: Array
-    weights: Weights = _EVEN
+    weights: Weights = _DEFAULT_WEIGHTS
 
     @property
     def times(self) -> Array:
@@ -145,7 +145,7 @@ class Errors(NamedTuple):
     demand: Demand
 
 
-class _Answer(NamedTuple):
+class _LinearForces(NamedTuple):
     """Linearised contact forces near the sampled states: f ≈ grip + gain × (change of the residual under that grip)."""
 
     grip: Array
@@ -185,25 +185,25 @@ class Motion:
         count = task.intervals + DEGREE
         knots = (np.arange(count + DEGREE + 1) - DEGREE) * task.duration / task.intervals
         self._basis = BSpline(knots, np.eye(count), DEGREE)
-        self._ends = np.zeros((count, n))
+        self._fixed_points = np.zeros((count, n))
         if task.mirror is None:
-            self._ends[:DEGREE], self._ends[-DEGREE:] = task.sketch[0], task.sketch[-1]
+            self._fixed_points[:DEGREE], self._fixed_points[-DEGREE:] = task.sketch[0], task.sketch[-1]
             self._expand = np.eye(count * n)[:, DEGREE * n : -DEGREE * n]
         else:
-            wrap = np.kron(np.eye(DEGREE, task.intervals), task.mirror)
-            self._expand = np.concatenate([np.eye(task.intervals * n), wrap])
+            periodic = np.kron(np.eye(DEGREE, task.intervals), task.mirror)
+            self._expand = np.concatenate([np.eye(task.intervals * n), periodic])
         designs = [np.kron(self._basis(task.times, order), np.eye(n)) for order in range(4)]
         self._maps = [(design @ self._expand).reshape(frames, n, -1) for design in designs]
-        self._offsets = [(design @ self._ends.ravel()).reshape(frames, n) for design in designs]
-        self._reach = [np.flatnonzero(np.any(rows, axis=0)) for rows in self._maps[0]]
-        self._standing, self._pushing = np.zeros((frames, 8), dtype=bool), np.zeros((frames, 8), dtype=bool)
+        self._offsets = [(design @ self._fixed_points.ravel()).reshape(frames, n) for design in designs]
+        self._local_unknowns = [np.flatnonzero(np.any(rows, axis=0)) for rows in self._maps[0]]
+        self._standing, self._loaded = np.zeros((frames, 8), dtype=bool), np.zeros((frames, 8), dtype=bool)
         self._places = np.full((frames, 8, 3), CONTACT_RADIUS)
         for stance in task.stances:
-            now = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
-            self._standing[now, stance.sphere] = True
-            firm = (task.times > stance.start + LAG) & (task.times < stance.end - LAG)
-            self._pushing[firm, stance.sphere] = True
-            self._places[now, stance.sphere, :2] = stance.place
+            in_stance = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
+            self._standing[in_stance, stance.sphere] = True
+            loaded = (task.times > stance.start + LAG) & (task.times < stance.end - LAG)
+            self._loaded[loaded, stance.sphere] = True
+            self._places[in_stance, stance.sphere, :2] = stance.place
         misfit = (task.sketch - self._offsets[0]).ravel()
         self.unknowns: Array = np.linalg.lstsq(self._maps[0].reshape(frames * n, -1), misfit, rcond=None)[0]
 
@@ -211,34 +211,34 @@ class Motion:
         """Free coordinates y, ẏ, ÿ at the sampled instants, shape (3, frames, n)."""
         return np.array([m @ unknowns + o for m, o in zip(self._maps[:3], self._offsets[:3], strict=True)])
 
-    def _errors(self, y: Array, frames: npt.NDArray[np.intp], answer: _Answer | None) -> Errors:
+    def _errors(self, y: Array, frames: npt.NDArray[np.intp], linear: _LinearForces | None) -> Errors:
         """Errors of states y (3, m, n) at the sampled instants `frames`.
 
-        With an `answer`, contact forces depend linearly on the demand, which takes a tenth of the time.
+        With `linear`, contact forces depend linearly on the demand, which takes a tenth of the time.
         """
         task, w = self.task, self.task.weights
         u, du, ddu = y @ task.embed.T
         u[:, 0] += task.speed * task.times[frames]
         du[:, 0] += task.speed
         demand = self.floor.demand(*states(u, du, ddu))
-        standing, pushing = self._standing[frames], self._pushing[frames]
-        if answer is None:
-            grip = self.floor.grip(demand, pushing)
+        standing, loaded = self._standing[frames], self._loaded[frames]
+        if linear is None:
+            grip = self.floor.grip(demand, loaded)
         else:
-            held = answer.grip[frames]
-            grip = held + np.einsum("mij,mj->mi", answer.gain[frames], residual(demand, held) - answer.residual[frames])
+            base = linear.grip[frames]
+            grip = base + np.einsum("mij,mj->mi", linear.gain[frames], residual(demand, base) - linear.residual[frames])
         missing = residual(demand, grip)
-        scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / self.floor.body_weight
+        scale = np.where(loaded.any(axis=1), 1.0, w.flight)[:, None] / self.floor.body_weight
         slip = w.slip * standing[:, :, None] * (demand.spheres - self._places[frames])
         low = demand.spheres[:, :, 2] - CONTACT_RADIUS - task.clearance[frames]
-        share = demand.torque_on(grip) / torque_limit()
+        effort = demand.torque_on(grip) / torque_limit()
         vectors, limits = u[:, 6:], joint_range().reshape(-1, 2)
         parts = [
             scale * w.force * missing[:, :3],
             scale * w.moment * missing[:, 3:],
             slip.reshape(len(u), 24),
             w.depth * np.where(standing, 0.0, np.minimum(low, 0.0)),
-            w.effort * share + w.strain * (share - np.clip(share, -_STRONG, _STRONG)),
+            w.effort * effort + w.strain * (effort - np.clip(effort, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)),
             w.limit * (vectors - np.clip(vectors, limits[:, 0] + MARGIN, limits[:, 1] - MARGIN)),
         ]
         return Errors(np.concatenate(parts, axis=1), grip, missing, demand)
@@ -247,55 +247,55 @@ class Motion:
         """All errors that are not linear in the unknowns, at every sampled instant."""
         return self._errors(self._states(unknowns), np.arange(len(self.task.sketch)), None)
 
-    def _linear(self) -> tuple[Array, Array]:
+    def _linear_errors(self) -> tuple[Array, Array]:
         """Tracking and jerk, linear in the unknowns: matrix and right-hand side of A x ≈ b."""
         task, w = self.task, self.task.weights
-        calm = np.where(np.any(task.embed[:3], axis=0), w.sway, w.jerk)
-        rows = [task.tracking[:, :, None] * self._maps[0], calm[:, None] * self._maps[3]]
-        wanted = [task.tracking * (task.sketch - self._offsets[0]), -calm * self._offsets[3]]
-        return np.concatenate(rows).reshape(-1, len(self.unknowns)), np.concatenate(wanted).ravel()
+        smoothness = np.where(np.any(task.embed[:3], axis=0), w.sway, w.jerk)
+        rows = [task.tracking[:, :, None] * self._maps[0], smoothness[:, None] * self._maps[3]]
+        target = [task.tracking * (task.sketch - self._offsets[0]), -smoothness * self._offsets[3]]
+        return np.concatenate(rows).reshape(-1, len(self.unknowns)), np.concatenate(target).ravel()
 
     def _normal_equations(self, errors: Errors) -> tuple[Array, Array]:
         """Gauss–Newton matrix and gradient of the nonlinear errors: differences by y, ẏ, ÿ, then the chain rule."""
         frames, n = self.task.sketch.shape
-        answer = _Answer(errors.grip, errors.residual, self.floor.answer(errors.demand, errors.grip))
-        which = np.repeat(np.arange(frames), n)
+        linear = _LinearForces(errors.grip, errors.residual, self.floor.answer(errors.demand, errors.grip))
+        frame_indices = np.repeat(np.arange(frames), n)
         changes: list[Array] = []
         for order, step in enumerate((1e-5, 1e-4, 1e-3)):
             moved = np.repeat(self._states(self.unknowns), n, axis=1)
             moved[order] += step * np.tile(np.eye(n), (frames, 1))
-            moved_errors = self._errors(moved, which, answer).weighted.reshape(frames, n, -1)
+            moved_errors = self._errors(moved, frame_indices, linear).weighted.reshape(frames, n, -1)
             changes.append((moved_errors - errors.weighted[:, None]) / step)
         matrix, gradient = np.zeros((len(self.unknowns),) * 2), np.zeros(len(self.unknowns))
-        for k, reach in enumerate(self._reach):
+        for k, local in enumerate(self._local_unknowns):
             jacobian = np.concatenate([change[k] for change in changes]).T @ np.concatenate(
-                [m[k][:, reach] for m in self._maps[:3]]
+                [m[k][:, local] for m in self._maps[:3]]
             )
-            matrix[np.ix_(reach, reach)] += jacobian.T @ jacobian
-            gradient[reach] += jacobian.T @ errors.weighted[k]
+            matrix[np.ix_(local, local)] += jacobian.T @ jacobian
+            gradient[local] += jacobian.T @ errors.weighted[k]
         return matrix, gradient
 
     def solve(self, iterations: int, tolerance: float = 1e-4) -> list[float]:
-        """Levenberg–Marquardt from the present unknowns, until a step lowers the cost by a share below `tolerance`.
+        """Levenberg–Marquardt from the present unknowns, until a step lowers the cost by a fraction below `tolerance`.
 
         Returns
         -------
         list of float
             The cost before and after every iteration.
         """
-        rows, wanted = self._linear()
+        rows, target = self._linear_errors()
         fixed = rows.T @ rows
         damping = 1e-3
         errors = self.errors(self.unknowns)
 
         def cost(errors: Errors, unknowns: Array) -> float:
-            return float(np.sum(errors.weighted**2) + np.sum((rows @ unknowns - wanted) ** 2))
+            return float(np.sum(errors.weighted**2) + np.sum((rows @ unknowns - target) ** 2))
 
         costs = [cost(errors, self.unknowns)]
         for _ in range(iterations):
             matrix, gradient = self._normal_equations(errors)
             matrix += fixed
-            gradient += rows.T @ (rows @ self.unknowns - wanted)
+            gradient += rows.T @ (rows @ self.unknowns - target)
             for _ in range(10):
                 trial = self.unknowns - np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient)
                 after = self.errors(trial)
@@ -313,7 +313,7 @@ class Motion:
 
     def coordinates(self, times: Array) -> Array:
         """The 57 coordinates at any times [s], shape (m, 57); a motion with a mirror is continued periodically."""
-        points = (self._expand @ self.unknowns).reshape(self._ends.shape) + self._ends
+        points = (self._expand @ self.unknowns).reshape(self._fixed_points.shape) + self._fixed_points
         if self.task.mirror is None:
             y = self._basis(times) @ points
         else:

@@ -1,4 +1,4 @@
-r"""Balance over the feet: zero-moment point, support polygon, and the sway that brings the one into the other.
+r"""Balance over the feet: zero-moment point, support polygon, and the sway that moves the former into the latter.
 
 The zero-moment point (Vukobratović & Borovac 2004) is the centre of pressure that a motion needs: with mass m, centre
 of mass c, angular momentum L about it and F = m (c̈ + g e_z),
@@ -60,9 +60,9 @@ def nearest_supported(point: Array, contacts: Array, touching: Mask, share: floa
     first, second = np.triu_indices(contacts.shape[-2], 1)
     start, along = corners[..., first, :], corners[..., second, :] - corners[..., first, :]
     length = np.maximum((along**2).sum(axis=-1), 1e-12)
-    at = start + np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)[..., None] * along
-    best = np.argmin((at**2).sum(axis=-1), axis=-1)[..., None, None]
-    return point + np.where(free[..., None], 0.0, np.take_along_axis(at, best, axis=-2)[..., 0, :])
+    candidates = start + np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)[..., None] * along
+    best = np.argmin((candidates**2).sum(axis=-1), axis=-1)[..., None, None]
+    return point + np.where(free[..., None], 0.0, np.take_along_axis(candidates, best, axis=-2)[..., 0, :])
 
 
 def sway_of(error: Array, height: float, lap: float, cutoff: float) -> Array:

@@ -15,10 +15,10 @@ from models.mocap.motion import quaternions
 CLOSES = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
 
-_TURNS_OVER = -0.5  # vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
+_UPSIDE_DOWN_COSINE = -0.5  # vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
 
 
-def _numbers(name: str, poses: npt.ArrayLike) -> Array:
+def _float_array(name: str, poses: npt.ArrayLike) -> Array:
     try:
         array = np.asarray(poses)
     except ValueError:  # rows of different lengths
@@ -30,7 +30,7 @@ def _numbers(name: str, poses: npt.ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class PlanarDisplacement:
-    """A planar displacement over the floor: rotation by `yaw` about the world's z, then translation.
+    """A displacement over the floor: rotation by `yaw` about the world's z, then translation.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Clip:
     def __post_init__(self) -> None:
         if not isinstance(cast(object, self.name), str):
             raise ModelError(f"the name of a clip is {self.name!r}; expected text")
-        poses = _numbers(self.name, self.poses)
+        poses = _float_array(self.name, self.poses)
         if poses.ndim != 2 or poses.shape[1] != N_POSE or len(poses) < 1:
             raise ModelError(f"clip {self.name!r}: poses have shape {poses.shape}; expected (frames ≥ 1, {N_POSE})")
         if not np.isfinite(poses).all():
@@ -133,7 +133,7 @@ class Clip:
     @property
     def turns_over(self) -> bool:
         """Whether the pelvis is upside down at some time, more than 120° from upright."""
-        return self.least_upright < _TURNS_OVER
+        return self.least_upright < _UPSIDE_DOWN_COSINE
 
     def resized(self, size: float) -> "Clip":
         """The motion of a figure with lengths `size` times as long: p′ = size p of the root, the same rotations."""
@@ -141,7 +141,7 @@ class Clip:
         return Clip(self.poses * lengths, self.fps, self.name)
 
     def closes(self, tolerance: float = 1e-6) -> bool:
-        """Whether the last frame is the first displaced over the floor, within `tolerance` [rad], [m] at the root."""
+        """Whether the last frame is the first one displaced over the floor, within `tolerance` [rad], root [m]."""
         if self.n_frames < 2:
             return False
         gap = pose_difference(self.displacement.moved(self.poses[0]), self.poses[-1])
@@ -149,7 +149,7 @@ class Clip:
         return bool(max(np.linalg.norm(gap[:3]), joints.max()) <= tolerance)
 
     def with_next_lap(self) -> "Clip":
-        """The clip, and once more from where it ends: of a closed one, in which a flight over the seam is whole."""
+        """A closed clip and its next lap, continued from where the first ends: a flight over the seam is then whole."""
         return Clip(np.vstack((self.poses, self.displacement.moved(self.poses[1:]))), self.fps, self.name)
 
     def velocities(self) -> Array:

@@ -1,7 +1,7 @@
 """Arrays of unit quaternions (wxyz): product, rotation of vectors, heading, exponential, logarithm, arcs, slerp.
 
-`scipy.spatial.transform.Rotation` gives the same to 6e-16, and its product takes 8 times as long for a hundred of them
-and 15 times and more for ten thousand.
+`scipy.spatial.transform.Rotation` agrees to 6e-16, but its product takes 8 times as long for a hundred rotations and at
+least 15 times as long for ten thousand.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from models.arrays import Array
 
 def product(q: Array, r: Array) -> Array:
     """Hamilton product q r: first the rotation r, then q; shapes (..., 4) broadcast."""
-    qw, qx, qy, qz = _parts(q)
-    rw, rx, ry, rz = _parts(r)
+    qw, qx, qy, qz = _components(q)
+    rw, rx, ry, rz = _components(r)
     result = np.empty(np.broadcast_shapes(q.shape, r.shape))
     result[..., 0] = qw * rw - qx * rx - qy * ry - qz * rz
     result[..., 1] = qw * rx + qx * rw + qy * rz - qz * ry
@@ -43,7 +43,7 @@ def about_axis(axis: int, angle: Array) -> Array:
 
 def heading(q: Array) -> Array:
     """Angle about z [rad] by which the x axis is turned in the plane, shape (...)."""
-    w, x, y, z = _parts(q)
+    w, x, y, z = _components(q)
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
@@ -65,7 +65,7 @@ def arcs(u: Array, v: Array) -> Array:
 
 def logarithm(q: Array) -> Array:
     """Rotation vectors [rad] of the shortest rotation, shape (..., 3)."""
-    return _vectors(np.where(q[..., :1] < 0.0, -q, q))
+    return _rotation_vectors(np.where(q[..., :1] < 0.0, -q, q))
 
 
 def continuous_logarithm(q: Array) -> Array:
@@ -73,10 +73,10 @@ def continuous_logarithm(q: Array) -> Array:
 
     Where they pass 2π, about changing axes, no rotation vector is continuous.
     """
-    return _vectors(sign_continuous(q[::-1])[::-1])
+    return _rotation_vectors(sign_continuous(q[::-1])[::-1])
 
 
-def _vectors(q: Array) -> Array:
+def _rotation_vectors(q: Array) -> Array:
     """Rotation vectors [rad], of angles from 0 to 2π."""
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     # Near zero, s is half the angle to first order, so the ratio of angle to s is 2.
@@ -98,9 +98,9 @@ def logarithm_derivative(v: Array) -> Array:
         Rotation vectors, shape (..., 3) [rad]; not only the shortest.
     """
     across = cross_matrix(v)
-    half = np.maximum(np.linalg.norm(v, axis=-1)[..., None, None], 2e-3) / 2.0  # below it the share is that of 0, 1/12
-    share = (1.0 - half / np.tan(half)) / (4.0 * half**2)
-    return np.eye(3) + across / 2.0 + share * (across @ across)
+    half = np.maximum(np.linalg.norm(v, axis=-1)[..., None, None], 2e-3) / 2.0  # the factor below is 1/12 at 0
+    factor = (1.0 - half / np.tan(half)) / (4.0 * half**2)
+    return np.eye(3) + across / 2.0 + factor * (across @ across)
 
 
 def cross_matrix(w: Array) -> Array:
@@ -129,7 +129,7 @@ def slerped(q: Array, r: Array, share: float | Array) -> Array:
     return product(q, exponential(share * logarithm(product(conjugate(q), r))))
 
 
-def _parts(q: Array) -> tuple[Array, Array, Array, Array]:
+def _components(q: Array) -> tuple[Array, Array, Array, Array]:
     return q[..., 0], q[..., 1], q[..., 2], q[..., 3]
 
 

@@ -8,23 +8,23 @@ from models.mocap.motion import quaternions
 
 
 def vectors_in_ranges(rotations: Array, low: Array, high: Array) -> Array:
-    """Rotation vectors [rad] by which rotations exceed ranges least, shape (n, 17, 3).
+    """Rotation vectors [rad], those that exceed the joints' ranges least, shape (n, 17, 3).
 
-    A rotation has two vectors of less than a turn, v and (1 - 2π/|v|) v. The shortest one leaps to the other side where
-    the angle passes π, as of an elbow that is bent and twisted, and would call a range of 155° exceeded by 143° there.
+    A rotation has two vectors of less than a turn, v and (1 - 2π/|v|) v. The shorter one changes sides where the angle
+    passes π, as in an elbow that is both bent and twisted; by it, a range of 155° would be exceeded by 143° there.
 
     Parameters
     ----------
     rotations : Array
         Joint rotations, shape (n, 17, 4).
     low, high : Array
-        Ranges of the components of the vectors, shape (17, 3) [rad].
+        Ranges of the vectors' components, shape (17, 3) [rad].
     """
     shortest = quaternions.logarithm(rotations)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
     longer = (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9)) * shortest
-    least, other = (np.linalg.norm(v - np.clip(v, low, high), axis=-1, keepdims=True) for v in (shortest, longer))
-    return np.where(other < least, longer, shortest)
+    excess, other = (np.linalg.norm(v - np.clip(v, low, high), axis=-1, keepdims=True) for v in (shortest, longer))
+    return np.where(other < excess, longer, shortest)
 
 
 def beyond_ranges(poses: Array) -> Array:

@@ -1,12 +1,13 @@
-"""Bounds of a well-formed clip, and how a measure beyond one is written. Without imports that take long."""
+"""Bounds of a well-formed clip, and the text of a measure that exceeds one. Without slow imports."""
 
 import numpy as np
 
-LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]; the prototype of preparation left 3 mm of penetration
+# Heights of soles in stance [m]; the preparation's prototype left a penetration of 3 mm.
+LOWEST, HIGHEST = -0.003, 0.005
 FLATTEST = np.deg2rad(2.0)  # largest tilt of soles in stance
-SKATE = 0.005  # [m] in a stance
-# RMS residual force [body weights]: of gaits and gestures, the bound of Hicks et al. (2015); of motions with flights,
-# what the prototype of preparation left to fighting and jumping jacks (11 and 12 %).
+SKATE = 0.005  # foot skate in a stance [m]
+# RMS residual force [body weights]. For gaits and gestures, the bound of Hicks et al. (2015); for motions with flights,
+# the residual that the preparation's prototype left in fighting and jumping jacks (11 and 12 %).
 RESIDUAL, FLYING = 0.05, 0.12
 SEAM = 0.3  # difference of the velocities at a closed clip's ends [rad/s, m/s]
 REST = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
@@ -15,6 +16,6 @@ FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity 
 
 
 def beyond(measure: float, bound: float) -> str:
-    """A measure greater than its bound, with as many decimals, one or more, as tell the two apart."""
+    """A measure greater than its bound as text, with as many decimals (at least one) as distinguish the two."""
     texts = (f"{measure:.{digits}f}" for digits in range(1, 17))
     return next((text for text in texts if float(text) > bound), str(measure))

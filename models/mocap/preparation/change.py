@@ -1,7 +1,7 @@
 r"""A small change of a motion, q(t) = q_ref(t) exp δ(t) with a quintic B-spline δ in the tangent, and normal equations.
 
-The spline of a closed motion is periodic, up to the lap's yaw (matrix W). An open motion rests at both ends, and so
-does its change: the outer five control points are equal, so that δ̇ = δ̈ = 0 there. A passage, part of a longer motion,
+The spline of a closed motion is periodic up to the lap's yaw (matrix W). An open motion rests at both ends, and so does
+its change: the outer five control points are equal, so that δ̇ = δ̈ = 0 there. A passage is part of a longer motion that
 is unchanged beyond its ends: the outer five control points are zero, so that δ = 0 as well. Each instant depends on six
 control points, so the normal equations are banded; those of a closed motion have a border for the last five points.
 """
@@ -20,12 +20,13 @@ from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.poses import around, plus
 
 DEGREE = 5
-# Step of the finite differences for velocities and accelerations [s]. Half or twice moves accelerations of up to 250
-# rad/s², of a kick with rough changes, by 1.7 or 4.2. SNU's run is prepared alike to 0.03° RMS, its walk with half
-# otherwise by 0.6° (it lacks 2.8 % of weight instead of 2.6), with twice by 0.02°.
-_STEP = 1e-3
-_HELD = DEGREE - 1  # outer control points at either end of an open motion that equal the first or last free one
-_MARGIN = 12  # frames beyond a closed clip's ends: their influence on its cubic spline decays by 0.27 a frame, to 1e-7
+# Step of the finite differences for velocities and accelerations [s]. Half or twice the step changes accelerations of
+# up to 250 rad/s², in a kick with rough changes, by 1.7 or 4.2 rad/s². Either changes SNU's prepared run by 0.03° RMS.
+# Half changes its prepared walk by 0.6° (residual of 2.8 % of body weight instead of 2.6 %), twice by 0.02°.
+_DIFFERENCE_STEP = 1e-3
+_TIED_COUNT = DEGREE - 1  # control points at either end of an open motion that equal the first or last free one
+# Frames beyond a closed clip's ends: their influence on its spline decays by 0.27 a frame, to 1e-7.
+_PERIODIC_MARGIN = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Change:
     passage : bool
         As given.
     outer : int
-        Number of control points at either end of an open clip that are not free.
+        Number of control points at either end of an open clip that are not unknowns.
     basis : list of 4 arrays, shape (m, 6)
         Weights of the six control points on which an instant depends, and their first three derivatives.
     first : array of int, shape (m,)
@@ -65,74 +66,77 @@ class Change:
 
     def __init__(self, clip: Clip, knot: float, step: float, passage: bool = False) -> None:
         self.clip, self.closed = clip, clip.closes() and not passage
-        self.passage, self._rests = passage, not self.closed and not passage
-        self.outer = 0 if self.closed else _HELD + int(passage)
+        self.passage, self._ends_at_rest = passage, not self.closed and not passage
+        self.outer = 0 if self.closed else _TIED_COUNT + int(passage)
         seconds = clip.duration
         self.intervals = max(2 * DEGREE, round(seconds / knot))
-        each = max(2, round(seconds / self.intervals / step))
-        count = self.intervals * each
+        per_interval = max(2, round(seconds / self.intervals / step))
+        count = self.intervals * per_interval
         self.times = np.arange(count + (not self.closed)) * seconds / count
         self.n_points = self.intervals if self.closed else self.intervals + DEGREE - 2 * self.outer
         spacing = seconds / self.intervals
         knots = (np.arange(self.intervals + 2 * DEGREE + 1) - DEGREE) * spacing
         self._spline = BSpline(knots, np.eye(self.intervals + DEGREE), DEGREE)
         self.first = np.minimum((self.times / spacing + 1e-9).astype(int), self.intervals - 1)
-        at = np.minimum(self.times, seconds - 1e-12)
-        which = self.first[:, None] + np.arange(DEGREE + 1)
-        self.basis = [np.take_along_axis(self._spline(at, order), which, axis=1) for order in range(4)]
+        times = np.minimum(self.times, seconds - 1e-12)
+        indices = self.first[:, None] + np.arange(DEGREE + 1)
+        self.basis = [np.take_along_axis(self._spline(times, order), indices, axis=1) for order in range(4)]
         self.wrap = np.eye(N_TANGENT)
-        there = clip.displacement
+        displacement = clip.displacement
         if self.closed:
-            c, s = np.cos(there.yaw), np.sin(there.yaw)
+            c, s = np.cos(displacement.yaw), np.sin(displacement.yaw)
             self.wrap[:2, :2] = [[c, -s], [s, c]]
-            poses, first = around(clip, _MARGIN)
+            poses, first = around(clip, _PERIODIC_MARGIN)
             self._reference = CubicSpline((np.arange(len(poses)) - first) / clip.fps, poses)
         else:
-            ends = "clamped" if self._rests else "not-a-knot"
+            ends = "clamped" if self._ends_at_rest else "not-a-knot"
             self._reference = CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses, bc_type=ends)
         self._end = seconds
         self.border = DEGREE * N_TANGENT if self.closed else 0
 
     def _reference_at(self, times: Array) -> Array:
-        poses = self._reference(np.clip(times, 0.0, self._end) if self._rests else times)
-        turns = poses[:, 3:].reshape(len(poses), -1, 4)
-        poses[:, 3:] = (turns / np.linalg.norm(turns, axis=2, keepdims=True)).reshape(len(poses), -1)
+        poses = self._reference(np.clip(times, 0.0, self._end) if self._ends_at_rest else times)
+        rotations = poses[:, 3:].reshape(len(poses), -1, 4)
+        poses[:, 3:] = (rotations / np.linalg.norm(rotations, axis=2, keepdims=True)).reshape(len(poses), -1)
         return poses
 
     def points(self, x: Array) -> Array:
         """All control points, including those that wrap around or are not free, shape (intervals + 5, 57)."""
         if not self.closed:
-            return np.pad(x, ((self.outer, self.outer), (0, 0)), mode="edge" if self._rests else "constant")
+            return np.pad(x, ((self.outer, self.outer), (0, 0)), mode="edge" if self._ends_at_rest else "constant")
         return np.vstack((x, x[:DEGREE] @ self.wrap.T))
 
     def free(self, interval: int) -> tuple[int, Array]:
-        """The control points of a knot interval of an open motion as combinations of free ones.
+        """The control points of a knot interval of an open motion as linear combinations of free ones.
 
-        Returns the index of the first of six consecutive free points, and the shares (6, 6) of these.
+        Returns the index of the first of six consecutive free points, and their coefficients (6, 6).
         """
         points = np.arange(interval, interval + DEGREE + 1) - self.outer
         inside = np.clip(points, 0, self.n_points - 1)
         first = min(int(inside[0]), self.n_points - DEGREE - 1)
-        shares = np.eye(DEGREE + 1)[inside - first]
-        shares[(inside != points) & self.passage] = 0.0
-        return first, shares
+        coefficients = np.eye(DEGREE + 1)[inside - first]
+        coefficients[(inside != points) & self.passage] = 0.0
+        return first, coefficients
 
     def states(self, x: Array, instants: npt.NDArray[np.intp] | slice = slice(None)) -> State:
         """States of the changed motion at the sampled instants, or at a subset of them."""
         points, times = self.points(x), self.times[instants]
-        which = self.first[instants, None] + np.arange(DEGREE + 1)
-        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[which]) for order in range(3))
+        indices = self.first[instants, None] + np.arange(DEGREE + 1)
+        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[indices]) for order in range(3))
         moments = [
-            plus(self._reference_at(times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
+            plus(
+                self._reference_at(times + o * _DIFFERENCE_STEP),
+                d + o * _DIFFERENCE_STEP * dd + 0.5 * _DIFFERENCE_STEP**2 * o * o * ddd,
+            )
             for o in (-1.0, 0.0, 1.0)
         ]
         before, now, after = moments
-        v = pose_difference(before, after) / (2 * _STEP)
-        a = (pose_difference(now, after) - pose_difference(before, now)) / _STEP**2
-        a[:, :3] = (after[:, :3] - 2 * now[:, :3] + before[:, :3]) / _STEP**2
-        if self._rests:
-            rests = (times <= 0.0) | (times >= self._end - 1e-9)
-            v[rests] = a[rests] = 0.0
+        v = pose_difference(before, after) / (2 * _DIFFERENCE_STEP)
+        a = (pose_difference(now, after) - pose_difference(before, now)) / _DIFFERENCE_STEP**2
+        a[:, :3] = (after[:, :3] - 2 * now[:, :3] + before[:, :3]) / _DIFFERENCE_STEP**2
+        if self._ends_at_rest:
+            at_rest = (times <= 0.0) | (times >= self._end - 1e-9)
+            v[at_rest] = a[at_rest] = 0.0
         return State(now, v, a)
 
     def changed(self, x: Array, fps: float) -> Clip:
@@ -147,8 +151,8 @@ class Change:
 
     def size(self, x: Array) -> Array:
         """The change δ at the sampled instants, shape (m, 57)."""
-        which = self.first[:, None] + np.arange(DEGREE + 1)
-        return np.einsum("mk,mkn->mn", self.basis[0], self.points(x)[which])
+        indices = self.first[:, None] + np.arange(DEGREE + 1)
+        return np.einsum("mk,mkn->mn", self.basis[0], self.points(x)[indices])
 
 
 class Normal:
@@ -171,18 +175,18 @@ class Normal:
 
     def copy(self) -> "Normal":
         """A copy to which more blocks can be added."""
-        twin = Normal(self._change)
-        twin.band, twin.side, twin.corner = self.band.copy(order="K"), self.side.copy(), self.corner.copy()
-        return twin
+        result = Normal(self._change)
+        result.band, result.side, result.corner = self.band.copy(order="K"), self.side.copy(), self.corner.copy()
+        return result
 
     def add(self, interval: int, block: Array) -> None:
         """Add a block (342, 342) that couples the six control points of a knot interval."""
         n, change = N_TANGENT, self._change
         if not change.closed:
-            interval, shares = change.free(interval)
-            if not np.array_equal(shares, np.eye(DEGREE + 1)):
+            interval, factors = change.free(interval)
+            if not np.array_equal(factors, np.eye(DEGREE + 1)):
                 parts = block.reshape(DEGREE + 1, n, DEGREE + 1, n)
-                block = np.einsum("ia,imjn,jb->ambn", shares, parts, shares, optimize=True).reshape(block.shape)
+                block = np.einsum("ia,imjn,jb->ambn", factors, parts, factors, optimize=True).reshape(block.shape)
         if not change.closed or interval + DEGREE < change.n_points - DEGREE:
             for column in range(self._width):
                 self.band[: self._width - column, interval * n + column] += block[column, column:]
@@ -240,22 +244,22 @@ class Normal:
         if not len(border):
             return cho_solve_banded((factor, True), inner, check_finite=False)
         first = cho_solve_banded((factor, True), inner, check_finite=False)
-        lowered = self._lowered(factor)
-        corner = self.corner + np.diag(damping * np.diag(self.corner) + 1e-9) - lowered.T @ lowered
+        solved_side = self._solve_side(factor)
+        corner = self.corner + np.diag(damping * np.diag(self.corner) + 1e-9) - solved_side.T @ solved_side
         last = cho_solve(cho_factor(corner), border - self.side.T @ first)
         return np.concatenate((cho_solve_banded((factor, True), inner - self.side @ last, check_finite=False), last))
 
-    def _lowered(self, factor: Array) -> Array:
-        """L⁻¹ times the side, in blocks as wide as the band: three times as fast as LAPACK by single columns."""
-        width, lowered = self._width, self.side.copy()
+    def _solve_side(self, factor: Array) -> Array:
+        """L⁻¹ times `side`, in blocks as wide as the band: three times as fast as LAPACK column by column."""
+        width, solved = self._width, self.side.copy()
         for start in range(0, self._inner, width):
-            here = slice(start, min(start + width, self._inner))
-            columns = np.arange(max(0, start - width), here.stop)
-            offsets = np.arange(start, here.stop)[:, None] - columns
+            rows = slice(start, min(start + width, self._inner))
+            columns = np.arange(max(0, start - width), rows.stop)
+            offsets = np.arange(start, rows.stop)[:, None] - columns
             inside = (offsets >= 0) & (offsets < width)
             lower = np.where(inside, factor[np.where(inside, offsets, 0), columns], 0.0)
             split = start - int(columns[0])
             if split:
-                lowered[here] -= lower[:, :split] @ lowered[columns[0] : start]
-            lowered[here] = solve_triangular(lower[:, split:], lowered[here], lower=True, check_finite=False)
-        return lowered
+                solved[rows] -= lower[:, :split] @ solved[columns[0] : start]
+            solved[rows] = solve_triangular(lower[:, split:], solved[rows], lower=True, check_finite=False)
+        return solved

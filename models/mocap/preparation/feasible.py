@@ -5,9 +5,9 @@ squares of
 
 - the residual wrench at the centre of mass, r = w − A f*, with f* the contact forces that best produce the required
   wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
-- the displacement of standing contact spheres from their places (foot skate), ever less beside the stance, and the
-  depth of the others below the floor;
-- the excess over joint limits, in proportion to it, and torques of the legs beyond three quarters of their limits;
+- the displacement of standing contact spheres from their places (foot skate), with a weight that fades out beside the
+  stance, and the depth of the others below the floor;
+- the excess over joint limits (its cost is linear) and the torques of the legs beyond three quarters of their limits;
 - the change itself, and its third derivative.
 
 Feet are planted together with the dynamics: planting them by inverse kinematics alone made tracking worse.
@@ -30,18 +30,22 @@ from models.mocap.preparation.change import DEGREE, Change, Normal
 from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
 
-_STRONG = 0.75  # share of the torque limits of the legs beyond which torque is penalised
-_KNOT, _STEP = 0.05, 0.0125  # spacing of knots and of instants [s]; 80 and 20 ms halve the time, but a run falls
-_TOLERANCE, _LAST = 0.01, 3  # iteration ends when the last 3 steps together lower the cost by less than 1 %
+_STRAIN_THRESHOLD = 0.75  # fraction of the legs' torque limits beyond which torque is penalised
+# Spacing of knots and of sampled instants [s]. With 80 and 20 ms preparation takes half the time, but the figure falls
+# in a run.
+_KNOT_SPACING, _INSTANT_SPACING = 0.05, 0.0125
+# Iteration ends when the last 3 steps together lower the cost by less than 1 %.
+_TOLERANCE, _CONVERGENCE_STEPS = 0.01, 3
 # Excess [rad] over a joint's range from which its cost is linear, an exact penalty (Nocedal & Wright 2006, ch. 17).
-# Where it is squared throughout, a captured ankle 100° beyond its range outweighs all else, and the motion found for
-# spinkick lacks 3.5 % of weight instead of 2.3. With 0.1, snu/backflip falls; with 0.03, a wrist of a later capture
-# passes its range by 67° for a moment.
-_EXACT = 0.05
-_GOOD = 0.25  # ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1)
+# If it is squared throughout, a captured ankle 100° beyond its range outweighs all other errors, and spinkick has a
+# residual of 3.5 % of body weight instead of 2.3 %. With 0.1 the figure falls in snu/backflip; with 0.03 a wrist in a
+# later capture exceeds its range by 67° for a moment.
+_LINEAR_EXCESS = 0.05
+# Ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1).
+_MIN_DECREASE_RATIO = 0.25
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
-_N, _W = 51, 57  # ends of the first blocks of errors: torques, wrench
+_TORQUE_END, _WRENCH_END = 51, 57  # ends of the first blocks of errors: torques, wrench
 
 
 @dataclass(frozen=True)
@@ -49,20 +53,21 @@ class FeasibleWeights:
     """Weights of the errors before squaring, per sampled instant.
 
     Chosen on three walks and a run of the tuning half (`docs/validation/preparation-choices.md`). The jerk's weight
-    matters: with a smaller one two walks needed 21 and 9 % instead of 7 and 5, and with 5e-5 the run stood.
+    matters: with a smaller one, two walks need 21 and 9 % of body weight instead of 7 and 5 %; with 5e-5 the figure
+    stays up in the run.
 
     Parameters
     ----------
     force, moment : float
         Residual force, per body weight; residual moment, per body weight × metre.
     flight : float
-        Factor on both while nothing pushes.
+        Factor on both while no sphere bears load.
     slip, depth : float
         Displacement of a standing sphere, depth of a swinging sphere below its clearance [1/m].
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     strain : float
-        Excess of a leg torque over three quarters of its limit, as a share of the limit.
+        Excess of a leg torque over three quarters of its limit, as a fraction of the limit.
     place, root, spine, head, arm, leg, ankle : float
         Change of the root's position [1/m], and of rotations [1/rad].
     sway, jerk : float
@@ -104,9 +109,9 @@ class Feasible(NamedTuple):
     residual : float
         RMS of the remaining residual force [body weights].
     moved, raised : float
-        RMS of the change of the root's place over the floor, and of its height [m].
+        RMS change of the root's position over the floor, and of its height [m].
     turned : float
-        RMS over joints and time of the change of rotations [rad].
+        RMS change of the rotations over joints and time [rad].
     costs : tuple of float
         Cost at first and after every iteration.
     """
@@ -133,20 +138,20 @@ class _Errors(NamedTuple):
     grip : array, shape (m, 4k)
         Contact forces along the edges of the friction pyramids [N].
     share : array, shape (m, 51)
-        Joint torques as shares of their limits.
+        Joint torques as fractions of their limits.
     """
 
     weighted: Array
     jacobian: Array | None
     residual: Array
     grip: Array
-    share: Array
+    torque_ratio: Array
 
 
 def feasible(
     clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, passage: bool = False
 ) -> Feasible:
-    """The motion nearest to a clip that is feasible with a given contact schedule, as far as it can be found.
+    """Local optimum: the motion nearest to a clip that is feasible with a given contact schedule.
 
     Parameters
     ----------
@@ -161,7 +166,7 @@ def feasible(
     passage : bool
         Whether the clip is a part of a longer motion that is unchanged beyond its ends.
     """
-    change = Change(clip, _KNOT, _STEP, passage)
+    change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
     problem = _Problem(change, schedule)
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
@@ -198,22 +203,24 @@ class _Problem:
         self.low, self.high = joint_range()[..., 0] + MARGIN, joint_range()[..., 1] - MARGIN
         self.fixed = Normal(change)
         tracking = self.w.tracking() ** 2
-        calm = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
+        smoothness = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
         for interval in range(change.intervals):
-            here = np.flatnonzero(change.first == interval)
-            blocks = [np.einsum("ma,mb->ab", basis[here], basis[here]) for basis in (change.basis[0], change.basis[3])]
-            self.fixed.add(interval, np.kron(blocks[0], np.diag(tracking)) + np.kron(blocks[1], np.diag(calm)))
+            inside = np.flatnonzero(change.first == interval)
+            blocks = [
+                np.einsum("ma,mb->ab", basis[inside], basis[inside]) for basis in (change.basis[0], change.basis[3])
+            ]
+            self.fixed.add(interval, np.kron(blocks[0], np.diag(tracking)) + np.kron(blocks[1], np.diag(smoothness)))
 
     def cost(self, errors: _Errors, x: Array) -> float:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from δ = 0, until `_LAST` steps together lower the cost by less than `_TOLERANCE`."""
+        """Levenberg–Marquardt from δ = 0, until `_CONVERGENCE_STEPS` steps lower the cost by less than `_TOLERANCE`."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
         costs = [self.cost(self.errors(x, False), x)]
         for _ in range(iterations):
-            system, g = self._linearised(x)
+            system, g = self._linearise(x)
             for _ in range(12):
                 step = system.solve(g, damping)
                 if (cost := self.cost(self.errors(x - step, False), x - step)) < costs[-1]:
@@ -222,15 +229,15 @@ class _Problem:
             else:
                 break
             # g·step is the decrease that the linearisation predicts; where contacts change, it holds only nearby.
-            good = costs[-1] - cost > _GOOD * (g @ step)
-            damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
+            predicted = costs[-1] - cost > _MIN_DECREASE_RATIO * (g @ step)
+            damping = max(damping / 8.0, 1e-8) if predicted else max(8.0 * damping, 1e-4)
             x = x - step
             costs.append(cost)
-            if len(costs) > _LAST and costs[-1 - _LAST] - cost < _TOLERANCE * cost:
+            if len(costs) > _CONVERGENCE_STEPS and costs[-1 - _CONVERGENCE_STEPS] - cost < _TOLERANCE * cost:
                 break
         return x, costs
 
-    def _linearised(self, x: Array) -> tuple[Normal, Array]:
+    def _linearise(self, x: Array) -> tuple[Normal, Array]:
         """Normal equations and half the gradient of the cost."""
         change = self.change
         system, parts = self.fixed.copy(), np.zeros((change.intervals, (DEGREE + 1) * N_TANGENT))
@@ -243,17 +250,17 @@ class _Problem:
                 system.add(interval, block)
         return system, system.gradient(parts) + self.fixed.times(x)
 
-    def _block(self, errors: _Errors, instants: npt.NDArray[np.intp], here: Mask) -> tuple[Array, Array]:
+    def _block(self, errors: _Errors, instants: npt.NDArray[np.intp], in_interval: Mask) -> tuple[Array, Array]:
         """JᵀJ and Jᵀe for the six control points of an interval, summed over its instants.
 
         With J = Σ_o b_o ⊗ J_o over the orders o of δ's derivatives, JᵀJ = Σ_op (b_o b_pᵀ) ⊗ (J_oᵀ J_p).
         """
         assert errors.jacobian is not None
-        jacobian, weighted = errors.jacobian[here], errors.weighted[here]
-        basis = np.stack([self.change.basis[order][instants[here]] for order in range(3)], axis=1)
-        moving = jacobian[:, :, :_W]  # only torques and wrench depend on velocity and acceleration
-        inner = moving.transpose(0, 1, 3, 2)[:, :, None] @ moving[:, None]
-        inner[:, 0, 0] += jacobian[:, 0, _W:].transpose(0, 2, 1) @ jacobian[:, 0, _W:]
+        jacobian, weighted = errors.jacobian[in_interval], errors.weighted[in_interval]
+        basis = np.stack([self.change.basis[order][instants[in_interval]] for order in range(3)], axis=1)
+        dynamic = jacobian[:, :, :_WRENCH_END]  # only torques and wrench depend on velocity and acceleration
+        inner = dynamic.transpose(0, 1, 3, 2)[:, :, None] @ dynamic[:, None]
+        inner[:, 0, 0] += jacobian[:, 0, _WRENCH_END:].transpose(0, 2, 1) @ jacobian[:, 0, _WRENCH_END:]
         pairs = np.einsum("koa,kpb->abkop", basis, basis).reshape((DEGREE + 1) ** 2, -1)
         block = (pairs @ inner.reshape(-1, N_TANGENT**2)).reshape(DEGREE + 1, DEGREE + 1, N_TANGENT, N_TANGENT)
         size = (DEGREE + 1) * N_TANGENT
@@ -274,56 +281,60 @@ class _Problem:
         scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / weight
         scale = scale * np.repeat([w.force, w.moment], 3)
         slip = w.slip * pinned * (demand.spheres - self.places[instants])
-        low = w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance[instants], 0.0) * ~grounded
+        depth = (
+            w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance[instants], 0.0) * ~grounded
+        )
         vectors = vectors_in_ranges(state.q[:, 7:].reshape(m, 17, 4), self.low, self.high)
         excess = vectors - np.clip(vectors, self.low, self.high)
-        beyond = np.maximum(np.abs(excess), _EXACT)
-        # Its square is 2 e |excess| - e² beyond e = _EXACT.
-        root = np.sqrt(2.0 * _EXACT * beyond - _EXACT**2)
-        limited = excess / beyond * root
-        share = demand.torque_on(grip) / torque_limit()
-        strain = share - np.clip(share, -_STRONG, _STRONG)
-        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), low, w.limit * limited.reshape(m, 51)]
+        magnitude = np.maximum(np.abs(excess), _LINEAR_EXCESS)
+        # The penalty's square is 2 e |excess| - e² beyond e = _LINEAR_EXCESS.
+        penalty_root = np.sqrt(2.0 * _LINEAR_EXCESS * magnitude - _LINEAR_EXCESS**2)
+        penalty = excess / magnitude * penalty_root
+        torque_ratio = demand.torque_on(grip) / torque_limit()
+        strain = torque_ratio - np.clip(torque_ratio, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)
+        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, 51)]
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
-            return _Errors(weighted, None, residual, grip, share)
+            return _Errors(weighted, None, residual, grip, torque_ratio)
         jacobian = np.zeros((m, 3, weighted.shape[1], N_TANGENT))
         self._differentiate_forces(jacobian, dynamics, grip, scale, strain)
-        slips, depths = slice(_W, _W + 3 * k), slice(_W + 3 * k, _W + 4 * k)
+        slips, depths = slice(_WRENCH_END, _WRENCH_END + 3 * k), slice(_WRENCH_END + 3 * k, _WRENCH_END + 4 * k)
         jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
-        jacobian[:, 0, depths] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        slope = w.limit * _EXACT / root * (excess != 0)
+        jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * dynamics.spheres[:, :, 2]
+        slope = w.limit * _LINEAR_EXCESS / penalty_root * (excess != 0)
         rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
         for joint in range(17):
-            of = slice(3 * joint, 3 * joint + 3)
-            jacobian[:, 0, depths.stop :][:, of, 6:][:, :, of] = rates[:, joint]
-        return _Errors(weighted, jacobian, residual, grip, share)
+            axes = slice(3 * joint, 3 * joint + 3)
+            jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = rates[:, joint]
+        return _Errors(weighted, jacobian, residual, grip, torque_ratio)
 
     def _differentiate_forces(
         self, jacobian: Array, dynamics: InverseDynamics, grip: Array, scale: Array, strain: Array
     ) -> None:
-        """Write the rows of torques and residual wrench; the contact forces follow the wrench by `Floor.answer`."""
-        demand, moving = dynamics.demand, dynamics.wrench
-        answer = self.floor.answer(demand, grip)
-        projection = np.eye(6) - demand.columns() @ answer
-        pushes = grip.reshape(len(grip), -1, 4) @ EDGES
+        """Write the rows of torques and residual wrench; `Floor.answer` gives how contact forces follow the wrench."""
+        demand, wrench_rows = dynamics.demand, dynamics.wrench
+        force_gain = self.floor.answer(demand, grip)
+        projection = np.eye(6) - demand.columns() @ force_gain
+        forces = grip.reshape(len(grip), -1, 4) @ EDGES
         arms = np.zeros((len(grip), 6, N_TANGENT))
         for sphere in range(len(self.contacts)):
             # Moments of the contact forces change with their lever arms.
-            arms[:, 3:] -= quaternions.cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
-        moving[:, 0] -= arms
-        jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
-        hot = np.flatnonzero(np.any(strain != 0, axis=1))
-        if len(hot):
-            gain = self.w.strain * (strain[hot] != 0) / torque_limit()
-            follows = demand.levers()[hot] @ answer[hot]
-            torque = dynamics.torque[hot] - np.einsum("mti,moin->motn", follows, moving[hot])
-            torque[:, 0] -= dynamics.leaning(pushes, hot)
-            jacobian[hot, :, :_N] = gain[:, None, :, None] * torque
+            arms[:, 3:] -= quaternions.cross_matrix(forces[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
+        wrench_rows[:, 0] -= arms
+        jacobian[:, :, _TORQUE_END:_WRENCH_END] = scale[:, None, :, None] * np.einsum(
+            "mij,mojn->moin", projection, wrench_rows
+        )
+        strained = np.flatnonzero(np.any(strain != 0, axis=1))
+        if len(strained):
+            gain = self.w.strain * (strain[strained] != 0) / torque_limit()
+            force_response = demand.levers()[strained] @ force_gain[strained]
+            torque = dynamics.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
+            torque[:, 0] -= dynamics.leaning(forces, strained)
+            jacobian[strained, :, :_TORQUE_END] = gain[:, None, :, None] * torque
 
 
 class Borne(NamedTuple):
-    """What contact forces give to a clip.
+    """Contact forces of a clip, the force that they leave, and the largest joint torque.
 
     Attributes
     ----------
@@ -332,9 +343,9 @@ class Borne(NamedTuple):
     loads : array, shape (n, k)
         Vertical force on each contact sphere, frame by frame [body weights].
     strain : float
-        Largest torque of a joint, as a share of its limit.
+        Largest torque of a joint, as a fraction of its limit.
     joint : str
-        The joint of this torque.
+        The joint with this torque.
     """
 
     residual: float
@@ -345,13 +356,13 @@ class Borne(NamedTuple):
 
 def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
-    change = Change(clip, _KNOT, _STEP, passage)
+    change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
     problem = _Problem(change, schedule)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
     weight = problem.floor.body_weight
-    pushes = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight
+    forces = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight
     frames = np.arange(clip.n_frames) / clip.fps
-    loads = np.column_stack([np.interp(frames, change.times, push) for push in pushes.T])
-    shares = np.abs(errors.share).max(axis=0)
+    loads = np.column_stack([np.interp(frames, change.times, force) for force in forces.T])
+    torque_ratios = np.abs(errors.torque_ratio).max(axis=0)
     residual = _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
-    return Borne(residual, loads, float(shares.max()), JOINTS[int(shares.argmax()) // 3])
+    return Borne(residual, loads, float(torque_ratios.max()), JOINTS[int(torque_ratios.argmax()) // 3])

@@ -1,4 +1,4 @@
-"""Distance of a prepared clip from the capture that it was made of, moment by moment of the part that was used."""
+"""Distance between a prepared clip and its capture, frame by frame over the part of the capture that was used."""
 
 from typing import NamedTuple
 
@@ -12,15 +12,15 @@ from models.mocap.preparation.bounds import beyond
 from models.mocap.preparation.looping import Looped
 from models.mocap.preparation.poses import resampled
 
-# Largest RMS distances of joints of a gait and of another motion [rad], and of the root [m]: in a prototype of the
-# preparation gaits moved by 1.7 to 3°, fighting and a punch by 7 to 8°, roots by 2.3 to 6.6 cm.
+# Largest RMS distances of the joints, for a gait and for another motion [rad], and of the root [m]. In a prototype of
+# the preparation, joints changed by 1.7 to 3° in gaits and by 7 to 8° in fighting and a punch, roots by 2.3 to 6.6 cm.
 GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
-# Distance of the points to the left of a root that fix its heading [m], an arm's length: half or twice moves the roots
-# of the 28 captures of docs/validation/prepared-captures.md by 0.8 cm at most.
-_LEFT = 0.7
-_Y = np.array([0.0, 1.0, 0.0])
-_LISTED = 5  # joints listed
-_TRAVELS = 0.4  # way of a lap beyond which a closed clip that does not turn over is a gait [m]
+# Distance from the root of the points to its left that determine its heading [m], an arm's length. Half or twice the
+# value changes the distances of the roots by at most 0.8 cm in the 28 captures of docs/validation/prepared-captures.md.
+_HEADING_LEVER = 0.7
+_Y_AXIS = np.array([0.0, 1.0, 0.0])
+_LISTED_COUNT = 5  # number of joints in `Fidelity.extremes`
+_MIN_GAIT_TRAVEL = 0.4  # displacement of a lap beyond which a closed clip that does not turn over is a gait [m]
 
 
 class Extreme(NamedTuple):
@@ -53,7 +53,7 @@ class Fidelity(NamedTuple):
     extremes : tuple of Extreme
         The five joints that differ most, the largest first.
     gait : bool
-        Whether the clip is a gait, of which less change is accepted.
+        Whether the clip is a gait, for which the bound is tighter.
     """
 
     joints: float
@@ -84,8 +84,8 @@ class Fidelity(NamedTuple):
 def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
     """Compare a prepared clip with the calibrated capture.
 
-    Frames that the capture does not have (the mirror image of half a stride, the way back of a gesture, the way to and
-    from rest of an open clip) are not compared.
+    Frames that the capture does not have (the mirror image of half a stride, the way back of a gesture, the transitions
+    from and to rest of an open clip) are not compared.
 
     Parameters
     ----------
@@ -96,34 +96,35 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
     part : Looped
         The part of the paced capture from which the clip was made.
     pace : float
-        How many times as fast as captured the clip is played.
+        Playback speed of the clip, relative to the capture's.
     """
     original = resampled(Clip(captured.poses, captured.fps * pace, captured.name), clip.fps)
-    shown, shows = common_frames(clip, captured, part, pace)
-    ours, theirs = clip.poses[shown], original.poses[shows]
-    level = _apart(ours, theirs)
-    height = theirs[:, 2] - ours[:, 2]
-    angles = np.linalg.norm(pose_difference(ours, theirs)[:, 6:].reshape(len(ours), -1, 3), axis=2)
-    instants = (shown.start + angles.argmax(axis=0)) / clip.fps
-    most = np.argsort(-angles.max(axis=0))[:_LISTED]
+    clip_frames, capture_frames = common_frames(clip, captured, part, pace)
+    clip_poses, capture_poses = clip.poses[clip_frames], original.poses[capture_frames]
+    over_floor = _root_distances(clip_poses, capture_poses)
+    height = capture_poses[:, 2] - clip_poses[:, 2]
+    angles = np.linalg.norm(pose_difference(clip_poses, capture_poses)[:, 6:].reshape(len(clip_poses), -1, 3), axis=2)
+    instants = (clip_frames.start + angles.argmax(axis=0)) / clip.fps
+    largest = np.argsort(-angles.max(axis=0))[:_LISTED_COUNT]
     return Fidelity(
-        float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(level**2 + height**2))),
-        tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in most),
-        clip.closes() and not clip.turns_over and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _TRAVELS),
+        float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(over_floor**2 + height**2))),
+        tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in largest),
+        clip.closes() and not clip.turns_over
+        and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _MIN_GAIT_TRAVEL),
     )  # fmt: skip
 
 
-def _apart(ours: Array, theirs: Array) -> Array:
+def _root_distances(clip_poses: Array, capture_poses: Array) -> Array:
     """Distances of two roots over the floor after the best displacement of one of them [m], from poses (n, 75).
 
-    Its rotation about the vertical and its translation minimise the distances of the roots and of points to the left
-    of them. The path alone of a body that stays about its place would be laid upon the other with the body turned away.
+    The displacement, a rotation about the vertical and a translation, minimises the distances of the roots and of
+    points to the left of them. For a body that stays in place, the path alone would not determine the heading.
     """
     places, left = [], []
-    for poses in (ours, theirs):
+    for poses in (clip_poses, capture_poses):
         place = poses[:, :2] @ (1, 1j)
         places.append(place - place.mean())
-        left.append(_LEFT * (rotated(poses[:, 3:7], _Y)[:, :2] @ (1, 1j)))
+        left.append(_HEADING_LEVER * (rotated(poses[:, 3:7], _Y_AXIS)[:, :2] @ (1, 1j)))
     (a, b), (c, d) = places, left
     turn = np.exp(-1j * np.angle(np.sum(a.conj() * b + c.conj() * d)))
     return np.abs(b * turn - a)
@@ -132,7 +133,7 @@ def _apart(ours: Array, theirs: Array) -> Array:
 def common_frames(clip: Clip, captured: Clip, part: Looped, pace: float) -> tuple[slice, slice]:
     """Frames of a prepared clip, and of the paced capture at the clip's rate, that show the same moments.
 
-    Those that the capture does not have are in neither; parameters as of `fidelity`.
+    Moments that the capture does not have are in neither. The parameters are those of `fidelity`.
     """
     first, last = round(part.start * clip.fps), round(part.end * clip.fps)
     begin, frames = max(first, 0), int(captured.duration / pace * clip.fps + 1e-9) + 1

@@ -14,8 +14,8 @@ from models.mocap.dynamics.floor_forces import Demand, carriers
 from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
 
-# Steps of the finite differences [rad], [rad/s]: half or twice of either moves derivatives by 6e-6 of them at most.
-_ANGLE, _RATE = 1e-5, 1e-4
+# Steps of the finite differences [rad], [rad/s]: half or twice either changes the derivatives by at most 6e-6 of them.
+_ANGLE_STEP, _RATE_STEP = 1e-5, 1e-4
 
 
 class InverseDynamics:
@@ -33,7 +33,7 @@ class InverseDynamics:
     Attributes
     ----------
     demand : Demand
-        Wrench that the floor must give, and the geometry of the contacts.
+        Wrench that contact forces must produce, and the geometry of the contacts.
     wrench : array, shape (m, 3, 6, 57)
         Derivatives of the wrench about the centre of mass by position, velocity, acceleration.
     torque : array, shape (m, 3, 51, 57)
@@ -50,10 +50,10 @@ class InverseDynamics:
         m, c = len(state.q), len(bodies)
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, len(geoms), 3)), np.empty((m, 3))
         anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 3, 3))
-        many = m if with_jacobian else 0
-        by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
-        self.spheres, self.com = np.zeros((many, len(geoms), 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
-        self.anchors, self.turns = np.zeros((2, many, c, 3, N_TANGENT))
+        count = m if with_jacobian else 0
+        partials = np.zeros((count, 3, N_TANGENT, N_TANGENT))
+        self.spheres, self.com = np.zeros((count, len(geoms), 3, N_TANGENT)), np.zeros((count, 3, N_TANGENT))
+        self.anchors, self.turns = np.zeros((2, count, c, 3, N_TANGENT))
         for k in range(m):
             d.qpos[:], d.qvel[:], d.qacc[:] = state.q[k], state.v[k], state.a[k]
             mujoco.mj_kinematics(model, d)
@@ -69,32 +69,34 @@ class InverseDynamics:
             for i, body in enumerate(bodies):
                 mujoco.mj_jac(model, d, self.anchors[k, i], self.turns[k, i], anchors[k, i], body)
             mujoco.mj_jacSubtreeCom(model, d, self.com[k], 1)
-            _differentiate(model, d, force[k], by[k])
+            _differentiate(model, d, force[k], partials[k])
         arm = com - state.q[:, :3]
         moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
         wrench = np.concatenate((force[:, :3], moment), axis=1)
         self.demand = Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
         if with_jacobian:
-            self._complete(state, by, force, root, arm)
+            self._assemble_derivatives(state, partials, force, root, arm)
 
-    def _complete(self, state: State, by: Array, force: Array, root: Array, arm: Array) -> None:
+    def _assemble_derivatives(self, state: State, partials: Array, force: Array, root: Array, arm: Array) -> None:
         """Derivatives of the wrench about the centre of mass and of the joint torques."""
         m = len(arm)
-        turning = cross_matrix(state.v[:, 3:].reshape(m, 18, 3))
-        spinning = cross_matrix(state.a[:, 3:].reshape(m, 18, 3))
+        velocity_cross = cross_matrix(state.v[:, 3:].reshape(m, 18, 3))
+        acceleration_cross = cross_matrix(state.a[:, 3:].reshape(m, 18, 3))
         for j in range(18):
             # Tangents are in the segment's own frame, so a rotation of it also rotates its velocity and acceleration.
             c = slice(3 + 3 * j, 6 + 3 * j)
-            by[:, 0, :, c] += by[:, 1, :, c] @ turning[:, j] + by[:, 2, :, c] @ spinning[:, j]
-            by[:, 1, :, c] += by[:, 2, :, c] @ turning[:, j]
+            partials[:, 0, :, c] += (
+                partials[:, 1, :, c] @ velocity_cross[:, j] + partials[:, 2, :, c] @ acceleration_cross[:, j]
+            )
+            partials[:, 1, :, c] += partials[:, 2, :, c] @ velocity_cross[:, j]
         self.wrench = np.empty((m, 3, 6, N_TANGENT))
-        self.wrench[:, :, :3] = by[:, :, :3]
-        self.wrench[:, :, 3:] = root[:, None] @ by[:, :, 3:6] - cross_matrix(arm)[:, None] @ by[:, :, :3]
+        self.wrench[:, :, :3] = partials[:, :, :3]
+        self.wrench[:, :, 3:] = root[:, None] @ partials[:, :, 3:6] - cross_matrix(arm)[:, None] @ partials[:, :, :3]
         self.wrench[:, 0, 3:, 3:6] -= root @ cross_matrix(force[:, 3:6])
-        shifted = self.com.copy()
-        shifted[:, :, :3] -= np.eye(3)
-        self.wrench[:, 0, 3:] += cross_matrix(force[:, :3]) @ shifted
-        self.torque = by[:, :, 6:]
+        relative = self.com.copy()
+        relative[:, :, :3] -= np.eye(3)
+        self.wrench[:, 0, 3:] += cross_matrix(force[:, :3]) @ relative
+        self.torque = partials[:, :, 6:]
 
     def leaning(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
         """Derivative by position of the joint torques of constant contact forces, d(Jᵀ)/dx f: shape (n, 51, 57).
@@ -108,46 +110,51 @@ class InverseDynamics:
         """
         demand, leaning = self.demand, np.zeros((len(states), 51, N_TANGENT))
         soles = demand.spheres[states] - (0.0, 0.0, CONTACT_RADIUS)
-        for joint, (body, mine) in enumerate(carriers(soles.shape[1])):
-            force, anchor = pushes[states, mine], demand.anchors[states, joint]
-            moment = np.cross(soles[:, mine] - anchor[:, None], force).sum(1)
-            moved = self.spheres[states, mine] - self.anchors[states, joint, None]
+        for joint, (body, loading) in enumerate(carriers(soles.shape[1])):
+            force, anchor = pushes[states, loading], demand.anchors[states, joint]
+            moment = np.cross(soles[:, loading] - anchor[:, None], force).sum(1)
+            moved = self.spheres[states, loading] - self.anchors[states, joint, None]
             change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, joint]
             leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, joint].transpose(0, 2, 1) @ change
         return leaning
 
 
-def _differentiate(model: mujoco.MjModel, d: mujoco.MjData, force: Array, by: Array) -> None:
+def _differentiate(model: mujoco.MjModel, d: mujoco.MjData, force: Array, partials: Array) -> None:
     """Write the derivatives of generalised forces (57,) by position, velocity and acceleration, shape (3, 57, 57)."""
-    changed, full = np.zeros(N_TANGENT), np.empty((N_TANGENT, N_TANGENT))
-    # Bound once: this loop calls them a hundred times for each of some hundred states in an iteration.
-    kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
+    changed_force, full = np.zeros(N_TANGENT), np.empty((N_TANGENT, N_TANGENT))
+    # Looked up once: these loops call them a hundred times for each of some hundred states in an iteration.
+    kinematics, com_position, com_velocity, inverse = (
+        mujoco.mj_kinematics,
+        mujoco.mj_comPos,
+        mujoco.mj_comVel,
+        mujoco.mj_rne,
+    )
     mujoco.mj_crb(model, d)
-    _full_mass(model, d, full)
-    by[2] = full
+    _write_mass_matrix(model, d, full)
+    partials[2] = full
     qvel, qpos = d.qvel, d.qpos
-    here, speed, moved, step = qpos.copy(), qvel.copy(), np.zeros(model.nq), np.zeros(N_TANGENT)
+    pose, velocity, moved, step = qpos.copy(), qvel.copy(), np.zeros(model.nq), np.zeros(N_TANGENT)
     for i in range(3, N_TANGENT):
-        qvel[i] += _RATE
-        rates(model, d)
-        inverse(model, d, 1, changed)
-        qvel[i] = speed[i]
-        by[1, :, i] = (changed - force) / _RATE
+        qvel[i] += _RATE_STEP
+        com_velocity(model, d)
+        inverse(model, d, 1, changed_force)
+        qvel[i] = velocity[i]
+        partials[1, :, i] = (changed_force - force) / _RATE_STEP
     for i in range(3, N_TANGENT):
-        step[i] = _ANGLE
-        moved[:] = here
+        step[i] = _ANGLE_STEP
+        moved[:] = pose
         mujoco.mj_integratePos(model, moved, step, 1.0)
         step[i] = 0.0
         qpos[:] = moved
         kinematics(model, d)
-        places(model, d)
-        rates(model, d)
-        inverse(model, d, 1, changed)
-        by[0, :, i] = (changed - force) / _ANGLE
+        com_position(model, d)
+        com_velocity(model, d)
+        inverse(model, d, 1, changed_force)
+        partials[0, :, i] = (changed_force - force) / _ANGLE_STEP
 
 
-def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
-    """The mass matrix M as a full matrix; the signature of mj_fullM differs between versions of MuJoCo."""
+def _write_mass_matrix(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
+    """Write the mass matrix M to `full`; the signature of mj_fullM differs between versions of MuJoCo."""
     try:
         mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
     except TypeError:

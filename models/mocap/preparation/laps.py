@@ -7,7 +7,7 @@ The distance of two frames i < j is
           + \tau^2 \|\omega_i - \omega_j\|^2 + \tau^2 \|v_i - v_j\|^2/r^2\bigr)
 
 with the rotations of root (without its heading) and joints, the root's height, and their velocities relative to the
-heading (Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair of least distance among those between
+heading (Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair of least distance among the pairs between
 which the figure travels and both feet step.
 """
 
@@ -20,14 +20,14 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSES, Clip
 
-# Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ decides: half of it loops two of them otherwise and
-# moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
-_TIME, _LENGTH = 0.1, 0.5
-_SHORTEST = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44; half changes none of 17 captures
-# [m], change of heading [rad] of a lap; `controllers.haptic_map.led` asks for the same. Half or twice of the first, and
-# twice of the second, change no lap of 17 captures; with 15° a hop on the spot is none.
+# Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ matters: half the value loops two of them differently
+# and moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
+_TIME_SCALE, _LENGTH_SCALE = 0.1, 0.5
+_MIN_LAP_DURATION = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44; half changes none of 17 captures
+# Least travel of a lap [m] and largest change of heading in it [rad]; `controllers.haptic_map.led` requires the same.
+# Half or twice the first, and twice the second, change no lap of 17 captures; with 15° a hop on the spot has none.
 LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
-_MOST_FRAMES = 1200  # frames that are compared with each other, at most: a matrix of them takes 12 MB
+_MAX_COMPARED_FRAMES = 1200  # largest number of frames that are compared with each other: their matrix takes 12 MB
 
 
 class Lap(NamedTuple):
@@ -54,37 +54,39 @@ def lap_of(clip: Clip) -> Lap:
     whole = Lap(clip, 0.0, clip.duration, 0.0)
     if clip.closes(CLOSES) or clip.n_frames < 3:
         return whole
-    every = -(-clip.n_frames // _MOST_FRAMES)
-    frames = np.arange(0, clip.n_frames, every)
-    apart, headings = likeness(clip, frames)
+    frame_step = -(-clip.n_frames // _MAX_COMPARED_FRAMES)
+    frames = np.arange(0, clip.n_frames, frame_step)
+    distances, headings = likeness(clip, frames)
     travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
     turn = np.abs(headings[:, None] - headings)
     later = frames[None, :] - frames[:, None]
-    lap = (later >= _SHORTEST * clip.fps) & (travel >= LEAST_TRAVEL) & (turn <= LARGEST_TURN)
+    lap = (later >= _MIN_LAP_DURATION * clip.fps) & (travel >= LEAST_TRAVEL) & (turn <= LARGEST_TURN)
     planted = contacts(clip).planted
     for foot in range(planted.shape[1]):
-        stood = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]
-        between = stood[None, :] - stood[:, None]
+        stance_frames = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]
+        between = stance_frames[None, :] - stance_frames[:, None]
         lap &= (between > 0) & (between < later)
     if not lap.any():
         return whole
-    i, j = np.unravel_index(int(np.argmin(np.where(lap, apart, np.inf))), lap.shape)
+    i, j = np.unravel_index(int(np.argmin(np.where(lap, distances, np.inf))), lap.shape)
     first, last = int(frames[i]), int(frames[j])
     part = Clip(clip.poses[first : last + 1], clip.fps, clip.name)
-    return Lap(part, first / clip.fps, last / clip.fps, float(apart[i, j]))
+    return Lap(part, first / clip.fps, last / clip.fps, float(distances[i, j]))
 
 
 def likeness(clip: Clip, frames: IntArray) -> tuple[Array, Array]:
     """Distances d between frames [rad], shape (n, n), and unwrapped headings [rad], shape (n,)."""
     poses, velocities = clip.poses[frames], clip.velocities()[frames]
     heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])
-    back = quaternions.about_axis(2, -heading)
-    turns = poses[:, 3:].reshape(len(poses), -1, 4).copy()
-    turns[:, 0] = quaternions.product(back, turns[:, 0])
-    turns = quaternions.sign_continuous(turns).reshape(len(poses), -1)
+    turn = quaternions.about_axis(2, -heading)
+    rotations = poses[:, 3:].reshape(len(poses), -1, 4).copy()
+    rotations[:, 0] = quaternions.product(turn, rotations[:, 0])
+    rotations = quaternions.sign_continuous(rotations).reshape(len(poses), -1)
     # The angle between nearby rotations is twice the distance of their quaternions.
-    parts = [2.0 * turns, poses[:, 2:3] / _LENGTH, _TIME * velocities[:, 3:]]
-    features = np.concatenate([*parts, _TIME / _LENGTH * quaternions.rotated(back, velocities[:, :3])], axis=1)
+    parts = [2.0 * rotations, poses[:, 2:3] / _LENGTH_SCALE, _TIME_SCALE * velocities[:, 3:]]
+    features = np.concatenate(
+        [*parts, _TIME_SCALE / _LENGTH_SCALE * quaternions.rotated(turn, velocities[:, :3])], axis=1
+    )
     squares = (features**2).sum(axis=1)
     distance = np.maximum(squares[:, None] + squares - 2.0 * features @ features.T, 0.0)
-    return np.sqrt(distance / turns.shape[1] * 4.0), np.unwrap(heading)
+    return np.sqrt(distance / rotations.shape[1] * 4.0), np.unwrap(heading)

@@ -5,9 +5,9 @@ accelerations by σ², so a clip whose flights fall with acceleration a is right
 
 .. math:: \sigma = \sqrt{g / a} .
 
-Files may have a wrong frame rate, and performers of another size another time scale. A motion keeps its character at
-another pace, which it does not if its flights are bent to gravity one by one. Only clips that fall too fast are slowed:
-nothing can pull a body down, but one that falls too slowly may be carried by a foot that was captured too high. Over
+Files may have a wrong frame rate, and performers of another size have another time scale. A motion keeps its character
+at another pace, but not if its flights are adapted to gravity one by one. Only clips that fall too fast are slowed:
+nothing can pull a body down, but one that falls too slowly may be supported by a foot that was captured too high. Over
 several flights of durations T the acceleration is averaged with weights T⁴, since the error of a parabola's
 acceleration goes with T⁻².
 """
@@ -24,16 +24,16 @@ from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import FLIGHT
 from models.mocap.preparation.poses import contact_points
 
-# Least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand. Half of it slows
+# Least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand. Half the value slows
 # SNU's run to 0.85 of its pace; twice changes no pace of 17 captures by more than 0.03.
-_HIGH = 0.03
-# Height that all of them exceed once in a flight [m]: dancers' feet hover higher than walkers'. Half of it changes
-# the pace of none of 19 captures, twice finds no flight in DeepMimic's run.
-_CLEAR = 0.08
-# Least duration of a flight from which acceleration is estimated [s]: half of it slows SNU's run to 0.80 of its pace,
-# and twice finds no flight in DeepMimic's run; the other 17 of 19 captures keep their pace.
-_SHORT = 0.09
-_SLOWEST = 0.35  # least pace; a slower one would be due to another fault: SNU's backflip needs 0.40, all others more
+_MIN_FLIGHT_HEIGHT = 0.03
+# Height that all of them exceed at some time in a flight [m]: dancers' feet hover higher than walkers'. Half the value
+# changes the pace of none of 19 captures, twice finds no flight in DeepMimic's run.
+_MIN_PEAK_HEIGHT = 0.08
+# Least duration of a flight from which the acceleration is estimated [s]. Half the value slows SNU's run to 0.80 of its
+# pace, and twice finds no flight in DeepMimic's run; the other 17 of 19 captures keep their pace.
+_MIN_FLIGHT_DURATION = 0.09
+_MIN_PACE = 0.35  # least pace; a slower one would be due to another fault: SNU's backflip needs 0.40, all others more
 
 
 class Paced(NamedTuple):
@@ -55,9 +55,9 @@ class Paced(NamedTuple):
 
 
 def paced(clip: Clip) -> Paced:
-    """The clip at the pace at which its flights are ballistic; unchanged if none exist or `FLIGHT` allows theirs."""
+    """The clip at the pace that makes its flights ballistic; unchanged without any, or if `FLIGHT` allows theirs."""
     falls = falling(clip)
-    if falls is None or falls < GRAVITY + FLIGHT or falls > GRAVITY / _SLOWEST**2:
+    if falls is None or falls < GRAVITY + FLIGHT or falls > GRAVITY / _MIN_PACE**2:
         return Paced(clip, 1.0, falls)
     pace = float(np.sqrt(GRAVITY / falls))
     return Paced(Clip(clip.poses, clip.fps * pace, clip.name), pace, falls)
@@ -66,11 +66,13 @@ def paced(clip: Clip) -> Paced:
 def falling(clip: Clip) -> float | None:
     """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None.
 
-    By heights alone, unlike `contacts`, since the rate in doubt is that of all speeds.
+    Flights are found by heights alone, unlike in `contacts`, since all speeds depend on the rate in doubt.
     """
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     flights = [
-        (a, b) for a, b in spans(heights > _HIGH) if b - a >= max(4, _SHORT * clip.fps) and heights[a:b].max() > _CLEAR
+        (a, b)
+        for a, b in spans(heights > _MIN_FLIGHT_HEIGHT)
+        if b - a >= max(4, _MIN_FLIGHT_DURATION * clip.fps) and heights[a:b].max() > _MIN_PEAK_HEIGHT
     ]
     if not flights:
         return None

@@ -9,19 +9,21 @@ from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 
-_CORNER = 8.0  # cut-off of the low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in eight captures
-# A second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off, (√2 − 1)^¼ (Winter).
-_PASSES = 0.802
+# Cut-off of the low-pass [Hz]; with 6 and 15 Hz the residuals of eight captures are the same to 2 percentage points.
+_CUTOFF_FREQUENCY = 8.0
+# −3 dB point of a second-order Butterworth filter that is run forwards and backwards, over its cut-off: (√2 − 1)^¼
+# (Winter).
+_TWO_PASS_RATIO = 0.802
 
 
 def plus(poses: Array, tangents: Array) -> Array:
     """Poses plus tangents, (..., 75) and (..., 57) → (..., 75): mj_integratePos over a unit of time."""
-    carried = np.array(poses, dtype=np.float64)
-    carried[..., :3] += tangents[..., :3]
+    moved = np.array(poses, dtype=np.float64)
+    moved[..., :3] += tangents[..., :3]
     turn = quaternions.exponential(tangents[..., 3:].reshape(*tangents.shape[:-1], 18, 3))
     rotations = poses[..., 3:].reshape(*poses.shape[:-1], 18, 4)
-    carried[..., 3:] = quaternions.product(rotations, turn).reshape(*poses.shape[:-1], 72)
-    return carried
+    moved[..., 3:] = quaternions.product(rotations, turn).reshape(*poses.shape[:-1], 72)
+    return moved
 
 
 def resampled(clip: Clip, fps: float) -> Clip:
@@ -34,11 +36,11 @@ def resampled(clip: Clip, fps: float) -> Clip:
 
 def smoothed(clip: Clip) -> Clip:
     """The motion low-passed at 8 Hz without phase lag; a closed clip is extended periodically."""
-    if clip.n_frames < 8 or 0.4 * clip.fps <= _CORNER:
+    if clip.n_frames < 8 or 0.4 * clip.fps <= _CUTOFF_FREQUENCY:
         return clip
-    from scipy.signal import butter, sosfiltfilt  # imported late: loads scipy.stats, slow for a run
+    from scipy.signal import butter, sosfiltfilt  # imported late: it loads scipy.stats, which is slow
 
-    sections = np.asarray(butter(2, _CORNER / (clip.fps / 2.0) / _PASSES, output="sos"))
+    sections = np.asarray(butter(2, _CUTOFF_FREQUENCY / (clip.fps / 2.0) / _TWO_PASS_RATIO, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():
         poses, first = around(clip, pad)
@@ -54,25 +56,25 @@ def around(clip: Clip, margin: int) -> tuple[Array, int]:
 
     The signs of its quaternions are continuous.
     """
-    lap, there = clip.poses[:-1], clip.displacement
-    back = there.inverse()
+    lap, displacement = clip.poses[:-1], clip.displacement
+    inverse = displacement.inverse()
     rows, first = [clip.poses], 0
     before, after = lap, clip.poses
     while first < margin:
-        before = back.moved(before)
+        before = inverse.moved(before)
         rows.insert(0, before)
         first += len(lap)
     while sum(map(len, rows)) < first + clip.n_frames + margin:
-        after = there.moved(after)
+        after = displacement.moved(after)
         rows.append(after[1:])
     poses = np.concatenate(rows)[first - margin : first + clip.n_frames + margin].copy()
-    turns = poses[:, 3:].reshape(len(poses), -1, 4)
-    poses[:, 3:] = quaternions.sign_continuous(turns).reshape(len(poses), -1)
+    rotations = poses[:, 3:].reshape(len(poses), -1, 4)
+    poses[:, 3:] = quaternions.sign_continuous(rotations).reshape(len(poses), -1)
     return poses, margin
 
 
 def with_neighbours(clip: Clip, smooth: Clip) -> tuple[Array, Array, int]:
-    """Poses of a clip and of the same clip low-passed, closed ones with a lap before and after, and the first frame."""
+    """Poses of a clip and of its low-passed version, with a lap before and after if closed, and the clip's start."""
     if not clip.closes():
         return clip.poses, smooth.poses, 0
     poses, first = around(clip, clip.n_frames)

@@ -1,6 +1,6 @@
 """Pipeline from a motion file to a well-formed clip.
 
-Load, correct the pace, loop, carry the root so that supporting feet rest, low-pass, detect stances, optimise.
+Load, correct the pace, loop, shift the root so that supporting feet rest, low-pass, detect stances, optimise.
 """
 
 from pathlib import Path
@@ -28,14 +28,14 @@ from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 # RMS change of joints [rad] and of the root's height [m] beyond which the result counts as another motion. Of nine
-# captures that change by 5 to 24°, six are in pictures the same motion, and the figure follows none of the nine worse
-# than the capture; what is more than 30° away lacks 27 % of weight or more, too. How far the root is moved over the
-# floor does not count, as captures drift.
-_TURNED, _RAISED = 0.5, 0.15
-# How much further beyond its range than in the capture a joint may be [rad]: of 177 prepared captures those that are
-# followed have 1° at most, and runs that are cut at full speed come to rest 50 to 80° further beyond.
-_FURTHER = float(np.deg2rad(20.0))
-_LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
+# captures that change by 5 to 24°, six look like the same motion in pictures, and the figure tracks none of the nine
+# worse than the capture; results more than 30° away also have a residual of 27 % of body weight or more. The root's
+# displacement over the floor does not count, as captures drift.
+_MAX_ROTATION_CHANGE, _MAX_HEIGHT_CHANGE = 0.5, 0.15
+# How much further beyond its range a joint may be than in the capture [rad]. Of 177 prepared captures, those that are
+# tracked have 1° at most; runs that are cut at full speed come to rest 50 to 80° further beyond.
+_MAX_ADDED_EXCESS = float(np.deg2rad(20.0))
+_MAX_DURATION = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
 
 class HandLoad(NamedTuple):
@@ -46,7 +46,7 @@ class HandLoad(NamedTuple):
     seconds : float
         Time in which a hand bears load [s].
     moved : float
-        Largest distance of a bearing palm in the capture from its place on the floor [m].
+        Largest distance between a load-bearing palm in the capture and its place on the floor [m].
     """
 
     seconds: float
@@ -69,9 +69,9 @@ class Prepared(NamedTuple):
     looped : Looped
         Result of looping, before optimisation.
     carried : float
-        Largest displacement over the floor by which a supporting foot was kept from sliding (`root_path`) [m].
+        Largest displacement of the root over the floor that keeps a supporting foot from sliding (`root_path`) [m].
     hands : HandLoad
-        How long hands bear load, and how far their palms were moved to the floor; zeros where dynamics are as captured.
+        How long hands bear load, and how far their palms were moved to the floor; zeros if not `near`.
     feasible : Feasible
         Result of the optimisation.
     fidelity : Fidelity
@@ -80,7 +80,7 @@ class Prepared(NamedTuple):
         Processor time [s].
     near : bool
         Whether a feasible motion was found near the capture. If not, as where flights are not ballistic at the file's
-        rate, `clip` is the capture looped and low-passed only, and its measures show the faults.
+        rate, `clip` is only the looped and low-passed capture, and its measures show the faults.
     """
 
     clip: Clip
@@ -107,60 +107,60 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     loop : str
         ``auto``, ``open``, or ``START:END`` of the cycle, in seconds from the first frame that is kept.
     mirror : bool
-        Go on with the mirror image of half a stride, or of START:END.
+        Continue half a stride, or START:END, by its mirror image.
     hints : Hints or None
-        What a person knows of the file.
+        Facts about the file that the user states.
 
     Raises
     ------
     MotionFileError
         If the file cannot be read, or contradicts itself.
     ModelError
-        If the motion has a single frame, its frames are so long that it lasts longer than two minutes, what is taken
-        of it does, or the loop is not within it.
+        If the motion has a single frame, lasts longer than two minutes because of a coarse frame rate, if the part that
+        is used lasts longer than that, or if the loop is not within the motion.
     """
     began = process_time()
     loaded = load(path, hints)
     captured = loaded.clip
     if captured.n_frames < 2:
-        raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_LONGEST:.0f} s")
-    if captured.fps < COARSE and captured.duration > _LONGEST:
+        raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_MAX_DURATION:.0f} s")
+    if captured.fps < COARSE and captured.duration > _MAX_DURATION:
         what = f"lasts {captured.duration:.0f} s, since a frame lasts {two_digits(1.0 / captured.fps)} s"
         raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
     timed = paced(resampled(captured, FPS))
-    even = resampled(timed.clip, FPS)
+    even_clip = resampled(timed.clip, FPS)
     for within in (False, True):
-        # Joints stop within their ranges only where that is needed: stopped sooner, a backflip lacks 27 % instead of 8.
-        cycle = looped(even, loop, loaded.loops, mirror, within)
-        if (lasts := cycle.clip.duration) > _LONGEST:
+        # Joints stop within their ranges only if needed: otherwise a backflip has a residual of 27 % instead of 8 %.
+        cycle = looped(even_clip, loop, loaded.loops, mirror, within)
+        if (lasts := cycle.clip.duration) > _MAX_DURATION:
             part = "or a part of it by `hvf prepare --loop START:END`"
-            raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_LONGEST:.0f} s, {part}")
-        calm = smoothed(cycle.clip)
-        held = on_resting_support(cycle.clip, calm)
-        smooth = smoothed(held)
-        schedule = rested(stances(held, smooth), held)
-        made = feasible(smooth, schedule, fps=FPS)
-        near = made.turned < _TURNED and made.raised < _RAISED and made.residual < FLYING
-        near = near and _excess(made.clip) < max(_excess(even), 0.0) + _FURTHER
+            raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_MAX_DURATION:.0f} s, {part}")
+        smooth_cycle = smoothed(cycle.clip)
+        planted = on_resting_support(cycle.clip, smooth_cycle)
+        smooth = smoothed(planted)
+        schedule = rested(stances(planted, smooth), planted)
+        result = feasible(smooth, schedule, fps=FPS)
+        near = result.turned < _MAX_ROTATION_CHANGE and result.raised < _MAX_HEIGHT_CHANGE and result.residual < FLYING
+        near = near and _range_excess(result.clip) < max(_range_excess(even_clip), 0.0) + _MAX_ADDED_EXCESS
         if near or cycle.kind != "open":
             break
-    carried = float(np.linalg.norm((held.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
-    taken = made.clip if near else calm
-    clip = Clip(taken.poses, taken.fps, captured.name)
-    kept = fidelity(clip, captured, cycle, timed.pace)
-    hands = _hand_load(held, schedule) if near and schedule.hands.any() else HandLoad(0.0, 0.0)
+    carried = float(np.linalg.norm((planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
+    chosen = result.clip if near else smooth_cycle
+    clip = Clip(chosen.poses, chosen.fps, captured.name)
+    distance = fidelity(clip, captured, cycle, timed.pace)
+    hands = _hand_load(planted, schedule) if near and schedule.hands.any() else HandLoad(0.0, 0.0)
     return Prepared(
-        clip, captured, loaded.report, timed, cycle, carried, hands, made, kept, process_time() - began, near
+        clip, captured, loaded.report, timed, cycle, carried, hands, result, distance, process_time() - began, near
     )
 
 
-def _excess(clip: Clip) -> float:
+def _range_excess(clip: Clip) -> float:
     """Largest excess of a joint over its range [rad], negative within it."""
     return float(beyond_ranges(clip.poses).max())
 
 
 def _hand_load(clip: Clip, schedule: Stances) -> HandLoad:
-    """Hands that bear load in a clip by its contact schedule."""
-    bears = schedule.hands
-    away = contact_points(clip.poses, HAND_CONTACTS) - schedule.places[:, -bears.shape[1] :]
-    return HandLoad(float(bears.any(axis=1).sum()) / clip.fps, float(np.linalg.norm(away, axis=2)[bears].max()))
+    """Load on the hands in a clip, by its contact schedule."""
+    bearing = schedule.hands
+    offsets = contact_points(clip.poses, HAND_CONTACTS) - schedule.places[:, -bearing.shape[1] :]
+    return HandLoad(float(bearing.any(axis=1).sum()) / clip.fps, float(np.linalg.norm(offsets, axis=2)[bearing].max()))

@@ -10,10 +10,11 @@ from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import Stances
 
-# Half or twice of the first names other faults in 6 and 3 of nine embedded clips and 17 captures, of the others none.
-AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
-_UNLOADED = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
-_ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
+# Half or twice the first of these bounds changes the faults found in 6 and 3 of 26 clips (nine embedded clips and 17
+# captures); half or twice the others changes none.
+AT_REST = 0.2  # speed above which a part of a sole rolls on or off the floor, and is not on it [m/s]
+_MIN_LOAD = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
+_MAX_FLOOR_HEIGHT = 0.015  # height above which a contact point does not skate [m]
 
 
 def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
@@ -30,12 +31,12 @@ def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
     schedule : Stances
         Its contact schedule.
     loads : Array, shape (n, k)
-        Vertical forces that its contact points bear [body weights], of `feasible.borne`.
+        Vertical forces on its contact points [body weights], from `feasible.borne`.
     """
     points, speeds = moving_points(clip, schedule)
-    low = points[:, :, 2] - CONTACT_RADIUS < _ON_FLOOR
-    swings = (loads < _UNLOADED) & (speeds > AT_REST)
-    return stance_slides(points, schedule.standing & low & ~swings)
+    low = points[:, :, 2] - CONTACT_RADIUS < _MAX_FLOOR_HEIGHT
+    swinging = (loads < _MIN_LOAD) & (speeds > AT_REST)
+    return stance_slides(points, schedule.standing & low & ~swinging)
 
 
 def moving_points(clip: Clip, schedule: Stances) -> tuple[Array, Array]:
@@ -51,6 +52,6 @@ def stance_slides(points: Array, standing: Mask) -> Array:
     slides = [0.0]
     for sphere, mask in enumerate(standing.T):
         for start, end in spans(mask):
-            stand = points[start:end, sphere, :2]
-            slides.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
+            places = points[start:end, sphere, :2]
+            slides.append(float(np.linalg.norm(places - np.median(places, axis=0), axis=1).max()))
     return np.array(slides if len(slides) == 1 else slides[1:])

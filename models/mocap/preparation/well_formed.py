@@ -33,9 +33,9 @@ from models.mocap.preparation.poses import around, resampled, smoothed
 from models.mocap.preparation.skate import AT_REST, moving_points, skates
 from models.mocap.preparation.stances import stances
 
-# Half or twice of either finds no other frame in the nine embedded clips and 17 captures.
-_STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
-_JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
+# Half or twice either value finds the same outliers in the nine embedded clips and 17 captures.
+_OUTLIER_RATIO = 8.0  # of an outlier's acceleration to the median of the half second around: steps of walkers reach 4
+_MIN_OUTLIER_ACCELERATION = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class WellFormed:
         Largest distance of a contact point, hands included, from its median place in a stance, 95th percentile over
         stances [m].
     slid : float
-        The same, of all stances [m].
+        The same, largest over all stances [m].
     outliers : int
         Number of frames with outlying acceleration.
     closed : bool
@@ -68,11 +68,11 @@ class WellFormed:
     excess : float
         Largest excess of a joint over its range [rad].
     residual : float
-        RMS of the force that contact cannot give, by inverse dynamics of the clip [body weights].
+        RMS of the force that contact cannot provide, by inverse dynamics of the clip [body weights].
     strain : float
-        Largest torque of a joint by inverse dynamics, as a share of its limit.
+        Largest torque of a joint by inverse dynamics, as a fraction of its limit.
     joint : str
-        The joint of this torque.
+        The joint with this torque.
     """
 
     seconds: float
@@ -142,8 +142,8 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
     clip : Clip
         A motion on the floor.
     flights : sequence of (float, float)
-        Time of the last contact before each flight and of the first one after it [s]; that is in the next lap where a
-        closed clip flies over its seam.
+        Time of the last contact before each flight and of the first one after it [s]; the latter is in the next lap if
+        a closed clip is in flight at its seam.
     """
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
     closed = clip.closes(CLOSES)
@@ -153,14 +153,14 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
     standing = schedule.standing & (speeds < AT_REST)
     soles = standing[:, : len(FOOT_CONTACTS)]
     low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
-    given = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
-    slides = skates(clip, schedule, given.loads)
+    forces = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
+    slides = skates(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), _tilt(clip, soles), float(np.quantile(slides, 0.95)),
+        clip.duration, float(low), float(high), _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
         float(slides.max()), outliers(clip), closed,
-        _seam(clip, closed), len(flights), _falling(clip, flights),
+        _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
         float(beyond_ranges(clip.poses).max()),
-        given.residual, given.strain, given.joint,
+        forces.residual, forces.strain, forces.joint,
     )  # fmt: skip
 
 
@@ -172,22 +172,22 @@ def outliers(clip: Clip) -> int:
     steps = pose_difference(poses[:-1], poses[1:])[:, 3:]
     accelerations = np.sqrt(np.mean((np.diff(steps, axis=0) * clip.fps**2) ** 2, axis=1))
     width = max(3, round(clip.fps / 4.0))
-    usual = np.array([np.median(accelerations[max(0, k - width) : k + width]) for k in range(len(accelerations))])
-    return int(np.sum((accelerations > _STANDS_OUT * usual) & (accelerations > _JERKY)))
+    medians = np.array([np.median(accelerations[max(0, k - width) : k + width]) for k in range(len(accelerations))])
+    return int(np.sum((accelerations > _OUTLIER_RATIO * medians) & (accelerations > _MIN_OUTLIER_ACCELERATION)))
 
 
-def _tilt(clip: Clip, resting: Mask) -> float:
+def _sole_tilt(clip: Clip, resting: Mask) -> float:
     angles: list[Array] = []
-    turned = global_rotations(clip.poses)
+    rotations = global_rotations(clip.poses)
     for foot, side in enumerate(("left", "right")):
         flat = resting[:, 4 * foot : 4 * foot + 4].all(axis=1)
-        up = quaternions.rotated(turned[flat, BODIES.index(f"{side}_foot")], np.array([0.0, 0.0, 1.0]))
+        up = quaternions.rotated(rotations[flat, BODIES.index(f"{side}_foot")], np.array([0.0, 0.0, 1.0]))
         angles.append(np.arccos(np.clip(up[:, 2], -1.0, 1.0)))
-    every = np.concatenate(angles)
-    return float(np.quantile(every, 0.95)) if len(every) else 0.0
+    all_angles = np.concatenate(angles)
+    return float(np.quantile(all_angles, 0.95)) if len(all_angles) else 0.0
 
 
-def _seam(clip: Clip, closed: bool) -> float:
+def _seam_velocity(clip: Clip, closed: bool) -> float:
     if clip.n_frames < 3:
         return 0.0
     steps = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 6:] * clip.fps
@@ -197,16 +197,16 @@ def _seam(clip: Clip, closed: bool) -> float:
     return float(max(np.sqrt(np.mean(first**2)), np.sqrt(np.mean(last**2))))
 
 
-def _falling(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:
+def _gravity_deviation(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:
     if not flights:
         return 0.0
     com = momentum(clip.with_next_lap() if flights[-1][1] > clip.duration else clip).com
     squares: list[float] = []
     for start, end in flights:
-        aloft = com[round(start * clip.fps) + 1 : round(end * clip.fps)]
-        if len(aloft) < 4:
+        flight = com[round(start * clip.fps) + 1 : round(end * clip.fps)]
+        if len(flight) < 4:
             continue
         # A parabola's leading coefficient is half the acceleration, without the noise of second differences.
-        acceleration = 2.0 * np.polyfit(np.arange(len(aloft)) / clip.fps, aloft, 2)[0]
+        acceleration = 2.0 * np.polyfit(np.arange(len(flight)) / clip.fps, flight, 2)[0]
         squares.append(float(np.sum((acceleration + np.array([0.0, 0.0, GRAVITY])) ** 2)))
     return float(np.sqrt(np.mean(squares))) if squares else 0.0

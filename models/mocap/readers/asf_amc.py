@@ -1,6 +1,6 @@
 """Reader for ASF/AMC, Acclaim's pair of skeleton and motion files, in the dialect of CMU's database.
 
-A bone's rotation is given about axes of its own, C = R_z R_y R_x for `axis … XYZ`: its local rotation in the file's
+A bone's rotation is given about the bone's own axes, C = R_z R_y R_x for `axis … XYZ`: its local rotation in the file's
 axes is C M C⁻¹ with M composed of the bone's degrees of freedom in the same order (Lander, *Working with motion capture
 file formats*, 1998). The files state no frame rate: CMU recorded at 120 frames per second.
 """
@@ -26,10 +26,10 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
-FPS = 120.0  # [1/s], CMU's: an AMC file does not say its own
+FPS = 120.0  # [1/s], CMU's: AMC files do not state theirs
 _INCH = 0.0254  # [m]
 _FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
-_Row: TypeAlias = dict[str, list[float]]  # a frame: the values of each bone's freedoms
+_Row: TypeAlias = dict[str, list[float]]  # a frame: the values of each bone's degrees of freedom
 
 
 @dataclass
@@ -78,9 +78,9 @@ def read_amc(path: Path) -> SourceMotion:
         bone = skeleton.bones[joint]
         values = dict(zip(bone.freedoms, frames[:, column : column + len(bone.freedoms)].T, strict=True))
         column += len(bone.freedoms)
-        own = _euler(bone.order, dict(zip(("rx", "ry", "rz"), np.array(bone.axis), strict=True)), skeleton.degrees, 1)
+        axes = _euler(bone.order, dict(zip(("rx", "ry", "rz"), np.array(bone.axis), strict=True)), skeleton.degrees, 1)
         turn = _euler(bone.order, values, degrees, len(frames))
-        rotations[:, index] = quaternions.product(quaternions.product(own, turn), quaternions.conjugate(own))
+        rotations[:, index] = quaternions.product(quaternions.product(axes, turn), quaternions.conjugate(axes))
         for axis, freedom in enumerate(("tx", "ty", "tz")):
             if freedom in values:
                 translations[:, index, axis] += values[freedom]
@@ -91,7 +91,7 @@ def read_amc(path: Path) -> SourceMotion:
 
 
 def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array:
-    """Rotations about fixed axes, the first of `order` first, shape (n, 4)."""
+    """Rotations about fixed axes, applied in the order of `order`, shape (n, 4)."""
     q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
     for letter in order:
         if (angle := values.get(f"r{letter}")) is not None:
@@ -121,15 +121,15 @@ def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
             yield line, fields
 
 
-def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - a section of the file a branch
+def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - one branch per section of the file
     """Parse an ASF file."""
     root = _Bone("root")
     skeleton = _Skeleton({"root": root}, {}, [0.0, 0.0, 0.0], True, 1.0)
-    section, bone, text = "", None, False
+    section, bone, in_bone = "", None, False
     for line, fields in _fields(path):
         keyword = fields[0].lower()
         if keyword.startswith(":"):
-            section, bone, text = keyword[1:], None, False
+            section, bone, in_bone = keyword[1:], None, False
             if section not in ("version", "name", "units", "documentation", "root", "bonedata", "hierarchy", "skin"):
                 raise MotionFileError(
                     path, line, f"section {quoted(fields[0])}", ":units, :root, :bonedata, :hierarchy"
@@ -145,32 +145,32 @@ def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - a section of the file a 
             _read_root_line(skeleton, fields, path, line)
         elif section == "bonedata":
             if keyword == "begin":
-                bone, text = None, True
+                bone, in_bone = None, True
             elif keyword == "end":
-                text = False
-            elif keyword == "name" and text:
+                in_bone = False
+            elif keyword == "name" and in_bone:
                 bone = _new_bone(skeleton, fields, path, line)
             elif bone is not None:
                 _read_bone_line(bone, fields, path, line)
         elif section == "hierarchy" and keyword not in ("begin", "end"):
             _read_children(skeleton, fields, path, line)
     if len(skeleton.parents) != len(skeleton.bones) - 1 or not skeleton.parents:
-        lost = next((name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone")
-        raise MotionFileError(path, 0, f"{quoted(lost)} is not in the hierarchy", "a parent for every bone")
-    return _from_root(skeleton, path)
+        stray = next((name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone")
+        raise MotionFileError(path, 0, f"{quoted(stray)} is not in the hierarchy", "a parent for every bone")
+    return _order_from_root(skeleton, path)
 
 
-def _from_root(skeleton: _Skeleton, path: Path) -> _Skeleton:
+def _order_from_root(skeleton: _Skeleton, path: Path) -> _Skeleton:
     """The skeleton with every bone after its parent, whatever the order of its hierarchy's lines."""
-    ordered, left = dict[str, str](), skeleton.parents
-    while left:
+    ordered, remaining = dict[str, str](), skeleton.parents
+    while remaining:
         waiting = dict[str, str]()
-        for bone, parent in left.items():
+        for bone, parent in remaining.items():
             (ordered if parent == "root" or parent in ordered else waiting)[bone] = parent
-        if len(waiting) == len(left):
-            what = f"{quoted(next(iter(left)))} is below itself in the hierarchy"
+        if len(waiting) == len(remaining):
+            what = f"{quoted(next(iter(remaining)))} is below itself in the hierarchy"
             raise MotionFileError(path, 0, what, "a hierarchy that begins at the root")
-        left = waiting
+        remaining = waiting
     return replace(skeleton, parents=ordered)
 
 
@@ -243,64 +243,66 @@ def _read_children(skeleton: _Skeleton, fields: list[str], path: Path, line: int
 
 
 def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array, tuple[str, ...]]:
-    """Whether angles are in degrees, the frames, and remarks; a frame is a row of all freedoms in the joints' order."""
+    """Whether angles are in degrees, the frames, and remarks; a frame is a row of values in the joints' order."""
     moving = {name: skeleton.bones[name] for name in ("root", *skeleton.parents) if skeleton.bones[name].freedoms}
     degrees, values = True, array("d")
-    shown: list[int] = []  # the numbers of the frames
+    frame_numbers: list[int] = []  # the numbers of the frames
     first: _Row = {}
-    row, begin, line = first, 0, 0
+    row, first_line, line = first, 0, 0
     for line, fields in _fields(path):
         if fields[0].startswith(":"):
             degrees = degrees and fields[0].lower() != ":radians"
         elif len(fields) == 1:
-            next_number = _frame_number(fields[0], shown, path, line)
-            if shown:
-                _append(values, row, first, moving, path, begin)
+            next_number = _frame_number(fields[0], frame_numbers, path, line)
+            if frame_numbers:
+                _append_frame(values, row, first, moving, path, first_line)
                 row = {}
-            shown.append(next_number)
-            begin = line
-            check_size(len(shown), len(skeleton.bones), len(values), path, line)
+            frame_numbers.append(next_number)
+            first_line = line
+            check_size(len(frame_numbers), len(skeleton.bones), len(values), path, line)
         else:
             bone = moving.get(fields[0])
-            if bone is None or not shown or fields[0] in row:
+            if bone is None or not frame_numbers or fields[0] in row:
                 raise MotionFileError(path, line, f"found {quoted(fields[0])}", "each moving bone once a frame")
             if len(fields) - 1 != len(bone.freedoms):
                 what = f"{quoted(bone.name)} has {len(fields) - 1} numbers"
                 raise MotionFileError(path, line, what, f"{len(bone.freedoms)}: {' '.join(bone.freedoms)}")
             row[bone.name] = numbers(fields[1:], path, line)
-    if not shown:
+    if not frame_numbers:
         raise MotionFileError(path, line, "no frames", "frame numbers, each followed by its bones")
-    _append(values, row, first, moving, path, begin)
-    remarks = tuple(_absent([name for name in moving if name not in first]))
-    return degrees, np.array(values).reshape(len(shown), -1), remarks
+    _append_frame(values, row, first, moving, path, first_line)
+    remarks = tuple(_absent_bone_remarks([name for name in moving if name not in first]))
+    return degrees, np.array(values).reshape(len(frame_numbers), -1), remarks
 
 
-def _absent(names: list[str]) -> Iterator[str]:
-    """Remark on bones that no frame mentions."""
+def _absent_bone_remarks(names: list[str]) -> Iterator[str]:
+    """A remark on bones that no frame mentions."""
     if names:
-        told = ", ".join(map(quoted, names[:8])) + (", …" if len(names) > 8 else "")
+        listed = ", ".join(map(quoted, names[:8])) + (", …" if len(names) > 8 else "")
         has, are = ("has", "it is") if len(names) == 1 else ("have", "they are")
-        yield f"{told} {has} no values in any frame: {are} taken as not turned"
+        yield f"{listed} {has} no values in any frame: {are} taken as not turned"
 
 
-def _frame_number(word: str, shown: list[int], path: Path, line: int) -> int:
-    """The number of the frame after those with the numbers `shown`; where it jumps, frames are lost."""
+def _frame_number(word: str, frame_numbers: list[int], path: Path, line: int) -> int:
+    """The number of the frame after those numbered `frame_numbers`; raises if it jumps, since frames are lost then."""
     if not (word.isascii() and word.isdigit() and len(word) <= 12):
         raise MotionFileError(path, line, f"found {quoted(word)}", "the number of a frame")
     found = int(word)
-    if shown:
-        step = max((shown[1] if len(shown) > 1 else found) - shown[0], 1)
-        if found != shown[-1] + step:
-            expected = f"{shown[-1] + step}: frame numbers rise by a constant step"
-            raise MotionFileError(path, line, f"frame {found} after frame {shown[-1]}", expected)
+    if frame_numbers:
+        step = max((frame_numbers[1] if len(frame_numbers) > 1 else found) - frame_numbers[0], 1)
+        if found != frame_numbers[-1] + step:
+            expected = f"{frame_numbers[-1] + step}: frame numbers rise by a constant step"
+            raise MotionFileError(path, line, f"frame {found} after frame {frame_numbers[-1]}", expected)
     return found
 
 
-def _append(values: "array[float]", row: _Row, first: _Row, moving: dict[str, _Bone], path: Path, line: int) -> None:
-    """Append the row of a frame that begins at `line`: bones that no frame mentions have angles 0, but not the root."""
+def _append_frame(
+    values: "array[float]", row: _Row, first: _Row, moving: dict[str, _Bone], path: Path, line: int
+) -> None:
+    """Append the row of a frame that begins at `line`; bones (not the root) that no frame mentions have angles 0."""
     for name, bone in moving.items():
         if (name in row) != (name in first or name == "root"):
-            odd = quoted(name)
-            what = f"frame with {odd}, which none before it has" if name in row else f"frame without {odd}"
+            bone_name = quoted(name)
+            what = f"frame with {bone_name}, which none before it has" if name in row else f"frame without {bone_name}"
             raise MotionFileError(path, line, what, "the root and the same bones in every frame")
         values.extend(row.get(name) or [0.0] * len(bone.freedoms))

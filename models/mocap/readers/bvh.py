@@ -24,11 +24,12 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
-_NIL = 1e-3  # largest place of a joint, as a share of its OFFSET, that is none
-# Median difference of a bone from the length of its OFFSET, as a share of it, from which places are none from a parent,
-# and up to which they are such in the world: 4.6 to 8.4 and 0.03 to 0.16 in 19 captures of one laboratory; in some 300
-# others the first is at most 0.1, but for one, in which the second is 14.
-_FAR, _NEAR = 1.0, 0.5
+_MAX_ZERO_RATIO = 1e-3  # largest displacement of a joint, as a fraction of its OFFSET, that counts as zero
+# Median relative difference of bones from the lengths of their OFFSETs: above the first value, positions are not given
+# from the parent; below the second, if they are read as positions in the world, they are that. The differences are 4.6
+# to 8.4 and 0.03 to 0.16 in 19 captures of one laboratory; in some 300 others the first is at most 0.1, except in one,
+# where the second is 14.
+_MIN_PARENT_MISFIT, _MAX_WORLD_MISFIT = 1.0, 0.5
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 
@@ -48,13 +49,13 @@ class _Joint:
 def read_bvh(path: Path) -> SourceMotion:
     """Read a BVH file.
 
-    Position channels replace the joint's OFFSET, on any joint, unless they are displacements from it (`_displaced`) or
-    places in the world (`_in_world`); each joint may have its own channels in its own order.
+    Position channels of any joint replace its OFFSET, unless they are displacements from it (`_has_displacements`) or
+    positions in the world (`_from_world_positions`); each joint may have its own channels in its own order.
 
     Raises
     ------
     MotionFileError
-        If the file is not a BVH, or breaks off, or its counts do not agree.
+        If the file is not a BVH, is truncated, or its counts do not agree.
     """
     lines = numbered_lines(path)
     joints, n_columns = _read_hierarchy(lines, path)
@@ -65,7 +66,7 @@ def read_bvh(path: Path) -> SourceMotion:
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
     rotations = np.zeros((len(frames), len(joints), 4))
     rotations[..., 0] = 1.0
-    displaced = _displaced(joints, frames)
+    displaced = _has_displacements(joints, frames)
     for index, joint in enumerate(joints):
         for axis, column in joint.positions:
             start = offsets[index, axis] if displaced and index else 0.0
@@ -75,58 +76,58 @@ def read_bvh(path: Path) -> SourceMotion:
             rotations[:, index] = quaternions.product(rotations[:, index], turn)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
     placed = [k for k, joint in enumerate(joints) if k and len(joint.positions) == 3 and offsets[k].any()]
-    # A frame of zeros is a lost one: its joints are where they are in a file without such channels.
+    # A frame of zeros is a lost frame: its joints are placed as in a file without position channels.
     lost = np.flatnonzero(~translations[:, placed].any(axis=(1, 2)))
     for k in placed:
         translations[lost, k] = offsets[k]
-    if placed and not displaced and _lengths_off(translations, offsets, placed) > _FAR:
-        local = _in_world(translations, rotations, parents, placed)
-        if _lengths_off(local, offsets, placed) < _NEAR:
+    if placed and not displaced and _length_misfit(translations, offsets, placed) > _MIN_PARENT_MISFIT:
+        local = _from_world_positions(translations, rotations, parents, placed)
+        if _length_misfit(local, offsets, placed) < _MAX_WORLD_MISFIT:
             translations = local
-            told = ", ".join(names[k] for k in placed)
-            remarks = (*remarks, f"the places of {told} are given in the world, not from their parents: read so")
+            listed = ", ".join(names[k] for k in placed)
+            remarks = (*remarks, f"the places of {listed} are given in the world, not from their parents: read so")
     return SourceMotion(
         path, names, parents, offsets, tips, rotations, translations, fps, None, remarks=remarks, further_tips=further
     )
 
 
-def _displaced(joints: list[_Joint], frames: Array) -> bool:
+def _has_displacements(joints: list[_Joint], frames: Array) -> bool:
     """Whether position channels below the root are displacements from OFFSET.
 
-    Most programs write the place itself, which is as far from the parent as OFFSET is. MakeHuman writes none at all.
+    Most programs write the position itself, which is as far from the parent as OFFSET is. MakeHuman writes zeros.
     """
-    told: list[bool] = []
+    are_zero: list[bool] = []
     for joint in joints[1:]:
         length = float(np.linalg.norm(joint.offset or ()))
         if len(joint.positions) == 3 and length > 0.0:
             places = frames[:, [column for _, column in joint.positions]]
-            told.append(bool(np.abs(places).max() < _NIL * length))
-    return sum(told) > len(told) / 2
+            are_zero.append(bool(np.abs(places).max() < _MAX_ZERO_RATIO * length))
+    return sum(are_zero) > len(are_zero) / 2
 
 
-def _lengths_off(translations: Array, offsets: Array, placed: list[int]) -> float:
-    """Median difference of bones from the lengths of their OFFSETs, as a share of these."""
-    given = np.linalg.norm(offsets[placed], axis=-1)
-    return float(np.median(np.abs(np.linalg.norm(translations[:, placed], axis=-1) - given) / given))
+def _length_misfit(translations: Array, offsets: Array, placed: list[int]) -> float:
+    """Median relative difference of bones from the lengths of their OFFSETs."""
+    lengths = np.linalg.norm(offsets[placed], axis=-1)
+    return float(np.median(np.abs(np.linalg.norm(translations[:, placed], axis=-1) - lengths) / lengths))
 
 
-def _in_world(translations: Array, rotations: Array, parents: tuple[int, ...], placed: list[int]) -> Array:
-    """Translations in the parents' axes, if those of the joints `placed` are places in the world."""
-    local, turned, places = translations.copy(), rotations.copy(), translations.copy()
+def _from_world_positions(translations: Array, rotations: Array, parents: tuple[int, ...], placed: list[int]) -> Array:
+    """Translations in the parents' axes, if those of the joints `placed` are positions in the world."""
+    local, orientations, places = translations.copy(), rotations.copy(), translations.copy()
     for k, parent in enumerate(parents):
         if parent < 0:
             continue
-        turned[:, k] = quaternions.product(turned[:, parent], rotations[:, k])
+        orientations[:, k] = quaternions.product(orientations[:, parent], rotations[:, k])
         if k in placed:
-            away = places[:, k] - places[:, parent]
-            local[:, k] = quaternions.rotated(quaternions.conjugate(turned[:, parent]), away)
+            vector = places[:, k] - places[:, parent]
+            local[:, k] = quaternions.rotated(quaternions.conjugate(orientations[:, parent]), vector)
         else:
-            places[:, k] = places[:, parent] + quaternions.rotated(turned[:, parent], translations[:, k])
+            places[:, k] = places[:, parent] + quaternions.rotated(orientations[:, parent], translations[:, k])
     return local
 
 
 class _Tokens:
-    """Words of the hierarchy with the lines they stand on."""
+    """Words of the hierarchy, with the line of the last one."""
 
     def __init__(self, lines: Iterator[tuple[int, str]], path: Path) -> None:
         self.path = path
@@ -142,7 +143,7 @@ class _Tokens:
         return word
 
     def name(self) -> str:
-        """Words up to the opening brace: names such as `Bip01 L Thigh` have blanks."""
+        """Words up to the opening brace: names such as `Bip01 L Thigh` contain blanks."""
         words: list[str] = []
         while (word := self.next("a name and {")) != "{":
             words.append(word)
@@ -153,7 +154,7 @@ class _Tokens:
         return " ".join(words)
 
     def joint(self, parent: int) -> _Joint:
-        """A joint whose ROOT or JOINT is the last word."""
+        """A new joint, after the word ROOT or JOINT was read."""
         line = self.line
         if not (name := self.name()):
             raise MotionFileError(self.path, line, "joint without a name", "a name after ROOT or JOINT")
@@ -168,7 +169,7 @@ class _Tokens:
         return MotionFileError(self.path, self.line, what, expected)
 
 
-def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:  # noqa: C901 - a keyword of the file a branch
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:  # noqa: C901 - one branch per keyword
     """Joints in the file's order and number of channels; leaves the lines after MOTION."""
     tokens = _Tokens(lines, path)
     if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
@@ -208,7 +209,7 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
 
 
 def _read_channels(tokens: _Tokens, joint: _Joint, column: int) -> int:
-    """Note which columns drive which axes of a joint; returns the next free column."""
+    """Record which columns drive which axes of a joint; returns the next free column."""
     for _ in range(count(tokens.next("a number of channels"), 6, "number of channels", tokens.path, tokens.line)):
         word = tokens.next("a channel such as Xrotation")
         match = _CHANNEL.fullmatch(word)
@@ -238,8 +239,8 @@ def _read_frames(
 ) -> tuple[Array, float, tuple[str, ...]]:
     """The frames' channels, shape (frames, channels), their rate, and a remark if there is one more than declared.
 
-    Exporters miscount by one, or write a reference pose in front that they do not count: no line then tells which frame
-    is not meant, so all are read. More lines than that mean a damaged file.
+    Exporters miscount by one, or write a reference pose in front that they do not count. The file does not say which
+    frame is the extra one, so all are read. More lines than that mean a damaged file.
     """
     rest = ((line, text) for line, text in lines if text.strip())
     line, text = next(rest, (0, ""))
@@ -258,7 +259,7 @@ def _read_frames(
         tokens = text.split()
         found += 1
         if found > n_frames + 1 or (found > n_frames and len(tokens) != n_columns):
-            what = f"more lines than the {_frames(n_frames)} declared"
+            what = f"more lines than the {_frame_count_text(n_frames)} declared"
             raise MotionFileError(path, line, what, "as many as Frames says")
         if len(tokens) != n_columns:
             raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
@@ -266,10 +267,12 @@ def _read_frames(
     # The frames of a skeleton without channels are empty lines, which are skipped.
     if found < n_frames and n_columns:
         raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
-    told = f"the file has {_frames(found)}, one more than the {n_frames} it declares: the last one is read, too"
+    note = (
+        f"the file has {_frame_count_text(found)}, one more than the {n_frames} it declares: the last one is read, too"
+    )
     frames = np.array(values).reshape(max(found, n_frames), n_columns)
-    return frames, fps, (told,) if found > n_frames else ()
+    return frames, fps, (note,) if found > n_frames else ()
 
 
-def _frames(n: int) -> str:
+def _frame_count_text(n: int) -> str:
     return f"{n} frame{'s' * (n != 1)}"

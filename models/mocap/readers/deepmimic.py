@@ -25,7 +25,7 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
-_WIDTH = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
+_VALUE_COUNTS = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
 _JSON_LIMIT = 16_000_000  # bytes: parsed, a malicious file takes some thirty times its size
 
 
@@ -90,7 +90,7 @@ def read_deepmimic(path: Path) -> SourceMotion:
         frame = int(np.argmin(norms.min(axis=(1, 2))))
         raise MotionFileError(path, _line_of_row(text, frame), "a quaternion is near zero", "unit quaternions")
     rotations = quaternions.sign_continuous(rotations / norms)
-    translations, rotations, fps = _at_equal_steps(durations, translations, rotations, path)
+    translations, rotations, fps = _resample(durations, translations, rotations, path)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
     loop = document.get("Loop")
     loops = loop == "wrap" if isinstance(loop, str) else None
@@ -134,7 +134,7 @@ def _line_of_row(text: str, row: int) -> int:
 
 def _read_rows(text: str, document: dict[str, object], joints: tuple[_Joint, ...], path: Path) -> tuple[Array, Array]:
     """Durations [s], shape (rows,), and all the numbers, shape (rows, width)."""
-    width = 1 + sum(_WIDTH[joint.kind] for joint in joints)
+    width = 1 + sum(_VALUE_COUNTS[joint.kind] for joint in joints)
     if not isinstance(rows := document.get("Frames"), list) or not rows:
         raise MotionFileError(path, 1, "no list of Frames", '"Frames": [[duration, x, y, z, …], …]')
     rows = cast("list[object]", rows)
@@ -155,7 +155,7 @@ def _read_rows(text: str, document: dict[str, object], joints: tuple[_Joint, ...
     return table[:, 0], table
 
 
-def _at_equal_steps(durations: Array, translations: Array, rotations: Array, path: Path) -> tuple[Array, Array, float]:
+def _resample(durations: Array, translations: Array, rotations: Array, path: Path) -> tuple[Array, Array, float]:
     """Translations, rotations and rate resampled to equal steps; the last row's duration is not used."""
     steps = durations[:-1]
     if len(steps) == 0:
@@ -167,11 +167,11 @@ def _at_equal_steps(durations: Array, translations: Array, rotations: Array, pat
     times = np.append(0.0, np.cumsum(steps))
     n_frames = int(times[-1] * fps + 1e-6) + 1
     check_size(n_frames, rotations.shape[1], n_frames, path, 1)
-    at = np.arange(n_frames) / fps
-    before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(steps) - 1)
-    share = ((at - times[before]) / steps[before])[:, None, None]
-    translations = (1.0 - share) * translations[before] + share * translations[before + 1]
-    rotations = (1.0 - share) * rotations[before] + share * rotations[before + 1]
+    new_times = np.arange(n_frames) / fps
+    before = np.clip(np.searchsorted(times, new_times, side="right") - 1, 0, len(steps) - 1)
+    fraction = ((new_times - times[before]) / steps[before])[:, None, None]
+    translations = (1.0 - fraction) * translations[before] + fraction * translations[before + 1]
+    rotations = (1.0 - fraction) * rotations[before] + fraction * rotations[before + 1]
     return translations, rotations / np.linalg.norm(rotations, axis=2, keepdims=True), fps
 
 
@@ -187,9 +187,9 @@ def _read_character(path: Path) -> tuple[_Joint, ...]:
         entry = cast("dict[str, object]", item) if isinstance(item, dict) else {}
         name, kind, parent = entry.get("Name"), entry.get("Type"), entry.get("Parent")
         attach = tuple(entry.get(f"Attach{axis}", 0.0) for axis in "XYZ")
-        if not isinstance(name, str) or not isinstance(kind, str) or kind not in _WIDTH:
+        if not isinstance(name, str) or not isinstance(kind, str) or kind not in _VALUE_COUNTS:
             what = f"joint {index} has Name {quoted(str(name))} and Type {quoted(str(kind))}"
-            raise MotionFileError(path, 1, what, f"a name and one of {', '.join(_WIDTH)}")
+            raise MotionFileError(path, 1, what, f"a name and one of {', '.join(_VALUE_COUNTS)}")
         if (
             type(parent) is not int
             or not (-1 if index == 0 else 0) <= parent < index

@@ -54,7 +54,7 @@ def read_text(path: Path, limit: int = FILE_LIMIT, kind: str = "motion file") ->
     limit : int
         Largest size [bytes].
     kind : str
-        What it should be, for errors.
+        What the file should be, for error messages.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read_text(path: Path, limit: int = FILE_LIMIT, kind: str = "motion file") ->
 
 
 def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Lines of a text file, numbered from 1; one at a time, since a list of all words takes ten times the file's size.
+    """Lines of a text file, numbered from 1, one at a time: a list of all words would take ten times the file's size.
 
     Raises
     ------
@@ -114,15 +114,15 @@ def number(token: str, path: Path, line: int) -> float:
 
 
 def numbers(tokens: list[str], path: Path, line: int) -> list[float]:
-    """Plain decimal numbers: `number` of each token, quickly."""
+    """Plain decimal numbers: a fast version of `number` for each token."""
     try:
         values = [float(token) for token in tokens]
     except ValueError:
         return [number(token, path, line) for token in tokens]
-    # float() also takes underscores, the digits of other scripts, "nan" and "infinity": `number` refuses those.
+    # float() also accepts underscores, digits of other scripts, "nan" and "infinity": `number` refuses those.
     text = "".join(tokens)
-    odd = "_" in text or "n" in text or "N" in text or not text.isascii()
-    if odd or max(map(abs, values), default=0.0) > MAGNITUDE_LIMIT:
+    suspicious = "_" in text or "n" in text or "N" in text or not text.isascii()
+    if suspicious or max(map(abs, values), default=0.0) > MAGNITUDE_LIMIT:
         return [number(token, path, line) for token in tokens]
     return values
 

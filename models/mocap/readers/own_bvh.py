@@ -17,11 +17,12 @@ from models.mocap.motion.clip import Clip
 from models.mocap.readers.source_motion import SourceMotion
 
 _CENTIMETRES = 100.0  # in a metre: the file's unit of length, as is usual for BVH
-_ROUNDED = 1e-6  # a file's bones have six digits after the point [cm], in a skeleton of 1 m
+# Tolerance of the skeleton's size: bones of a skeleton of 1 m have six digits after the point [cm].
+_SIZE_TOLERANCE = 1e-6
 _TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
          "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
 _TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
-_AXES = {
+_FILE_AXES = {
     "own": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "Blender's": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),  # Z up, facing −Y
 }
@@ -80,12 +81,12 @@ def write_bvh_blocks(
     blocks : iterable of array (k, 75)
         Poses, in order.
     stature : float
-        Of the figure whose poses they are [m]; the bones are its.
+        Stature of the figure [m], which determines the bones.
 
     Raises
     ------
     ModelError
-        If the blocks have not n_frames frames in all.
+        If the blocks do not have n_frames frames in all.
     OSError
         If the file cannot be written.
     """
@@ -94,7 +95,7 @@ def write_bvh_blocks(
         header = [*_hierarchy(stature), "MOTION", f"Frames: {n_frames}", f"Frame Time: {1.0 / fps!r}"]
         file.write("\n".join(header) + "\n")
         for poses in blocks:
-            angles = _angles(poses, last)
+            angles = _joint_angles(poses, last)
             rows = np.hstack((poses[:, _TO_FILE] * _CENTIMETRES, np.rad2deg(angles)))
             file.writelines(" ".join(f"{value:.9f}" for value in row) + "\n" for row in rows)
             written, last = written + len(poses), angles[-1:]
@@ -102,8 +103,8 @@ def write_bvh_blocks(
         raise ModelError(f"{path}: {written} frames were given; expected {n_frames}")
 
 
-def _angles(poses: Array, last: Array | None) -> Array:
-    """Angles of all joints [rad], shape (k, 54), unwrapped; `last` (1, 54) are those of the frame before, if any."""
+def _joint_angles(poses: Array, last: Array | None) -> Array:
+    """Angles of all joints [rad], shape (k, 54), unwrapped; `last` (1, 54): those of the previous frame, if any."""
     columns: list[Array] = []
     for index, segment in enumerate(SEGMENTS):
         quaternion = poses[:, 3 + 4 * index : 7 + 4 * index]
@@ -142,9 +143,9 @@ def _vector(world: Array) -> str:
 
 
 def own_clip(motion: SourceMotion) -> Clip | None:
-    """The clip, if `write_bvh` wrote the file or Blender exported it again (same joints and bones); else None.
+    """The clip, if `write_bvh` wrote the file or Blender re-exported it (same joints and bones); else None.
 
-    Of a figure of another stature, whose bones are all in one proportion, it is the same motion of the default figure.
+    If the bones are those of a figure of another stature, it is the same motion on the default figure.
     """
     if motion.joints != tuple(segment.joint for segment in SEGMENTS):
         return None
@@ -153,8 +154,8 @@ def own_clip(motion: SourceMotion) -> Clip | None:
     model = figure_model()
     bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:] * _CENTIMETRES
     size = float(np.linalg.norm(motion.offsets[1:]) / np.linalg.norm(bones))
-    size = 1.0 if abs(size - 1.0) < _ROUNDED else size
-    for turn in _AXES.values():
+    size = 1.0 if abs(size - 1.0) < _SIZE_TOLERANCE else size
+    for turn in _FILE_AXES.values():
         if np.abs(motion.offsets[1:] @ turn.T - size * bones).max() <= 1e-4:
             quaternion = np.concatenate((motion.rotations[..., :1], motion.rotations[..., 1:] @ turn.T), axis=-1)
             position = motion.translations[:, 0] @ turn.T / (_CENTIMETRES * size)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from models.arrays import Array
 from models.mocap.motion import quaternions
 
-_UNTURNED = 1e-4  # half an angle [rad] that files with four decimals write for zero
+_MAX_ZERO_ROTATION = 1e-4  # half the largest angle [rad] that counts as zero: files have four decimals
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ class SourceMotion:
     timed : bool
         Whether the file states its frame rate.
     remarks : tuple of str
-        What the reader found amiss in the file and read nevertheless.
+        Faults of the file that did not prevent reading it.
     further_tips : mapping from joint to array of shape (m, 3)
-        Further ends of a segment, as of a foot with heel and toes.
+        Further ends of a segment, such as those of a foot with heel and toes.
     """
 
     path: Path
@@ -73,12 +73,12 @@ class SourceMotion:
         return len(self.rotations)
 
     def at_rest(self, joints: Sequence[int]) -> npt.NDArray[np.bool_]:
-        """Frames in which no one of these joints is rotated, though some are in others: the zero pose; shape (n,)."""
-        turned = np.abs(self.rotations[:, list(joints), 1:]).max(axis=2, initial=0.0) > _UNTURNED
+        """Frames in the zero pose: none of these joints is rotated, though some are in other frames; shape (n,)."""
+        turned = np.abs(self.rotations[:, list(joints), 1:]).max(axis=2, initial=0.0) > _MAX_ZERO_ROTATION
         return ~turned.any(axis=1) & turned.any()
 
     def of_joints(self, kept: Sequence[int]) -> "SourceMotion":
-        """The motion of some joints, in their order, each with its parent."""
+        """The motion of some joints in the given order; each joint's parent must be among them."""
         new = {-1: -1} | {joint: k for k, joint in enumerate(kept)}
         chosen = list(kept)
         return replace(

@@ -1,7 +1,7 @@
 """Anatomical joint positions of a captured body in every frame, and the lines between them.
 
-Everything here comes from joint positions during the motion, so it does not depend on how a rig is set up: on its rest
-pose, its joint frames, or extra joints in between.
+Everything here comes from joint positions during the motion, so it does not depend on how a rig is set up: neither on
+its rest pose, nor on its joint frames, nor on extra joints in between.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,12 @@ from models.mocap.retargeting.skeleton_roles import Roles
 
 SIDES = ("left", "right")
 AT_REST = 0.3  # speed up to which a joint is at rest [leg lengths/s]: a walker's swinging foot has 3
-_UNMOVED = 1e-6  # step of a joint that does not move, by rounding [leg lengths]: files have four decimals or more
-_FILLED = 0.5  # least time for which nothing moves of a motion that is filled up [s]: no living body stands so still
-# Shares of a motion's usual step between which it is under way where it is held: 0.2 to 1.7 in motions that are filled
-# up, below 0.08 in those that end at rest, above 6 in those that end in another pose.
-_UNDER_WAY = (0.15, 3.0)
-_TOES = np.sin(np.deg2rad(30.0))  # least median sine of toes to the shank: 50 to 90° off it in captures
+_MAX_STILL_STEP = 1e-6  # step of a joint at rest, due to rounding [leg lengths]: files have four decimals or more
+_MIN_PADDING_TIME = 0.5  # least time without any movement in padding [s]: no living body stands so still
+# Step just before or after the padding over the motion's median step, between which the motion was cut while moving:
+# 0.2 to 1.7 in padded motions, below 0.08 in those that end at rest, above 6 in those that end in another pose.
+_MOVING_STEP_RATIOS = (0.15, 3.0)
+_MIN_TOE_SINE = np.sin(np.deg2rad(30.0))  # least median sine between toes and shank: 50 to 90° in captures
 
 
 class BodyLines(NamedTuple):
@@ -31,13 +31,13 @@ class BodyLines(NamedTuple):
     Attributes
     ----------
     hips, knees, ankles, shoulders, elbows, wrists, toes : array of shape (n, 2, 3)
-        Joints, left and right; NaN where the skeleton has none.
+        Joints, left and right; NaN if the skeleton does not have them.
     top : array of shape (n, 3)
-        Upper end of the trunk: the middle of the shoulders, or of what there is instead (head, chest).
+        Upper end of the trunk: the middle of the shoulders or, without arms, the head or the chest.
     has_arms : bool
         Whether `top` is the middle of the shoulders.
     leg : float
-        Length of thigh and shank, mean of both sides and median over time; of the thigh alone where ankles lack.
+        Length of thigh and shank, mean of both sides and median over time; of the thigh alone without ankles.
     """
 
     hips: Array
@@ -80,21 +80,21 @@ class BodyLines(NamedTuple):
         return np.cross(unit(self.elbows - self.shoulders), unit(self.wrists - self.elbows))
 
     def filled(self, fps: float) -> Mask:
-        """Frames that fill a motion up at its ends, without the one that is held, shape (n,).
+        """Padding: frames at the ends that repeat the motion's first or last frame, without that frame, shape (n,).
 
-        Nothing moves in them, for `_FILLED` at least, though the motion is under way: a body that has come to rest, or
-        jumps into another pose, tells something.
+        Nothing moves in them, for at least `_MIN_PADDING_TIME`, although the motion was cut while moving. A body that
+        has come to rest, or that jumps into another pose, is no padding.
         """
         parts = (self.hips, self.knees, self.ankles, self.toes, self.shoulders, self.elbows, self.wrists)
         paths = np.concatenate([part for part in parts if not np.isnan(part).any()], axis=1)
         steps = np.linalg.norm(np.diff(paths, axis=0), axis=2).mean(axis=1)
-        moves = np.flatnonzero(steps >= _UNMOVED * self.leg)
+        moves = np.flatnonzero(steps >= _MAX_STILL_STEP * self.leg)
         result = np.zeros(len(steps) + 1, dtype=np.bool_)
         if len(moves):
-            first, last = int(moves[0]), int(moves[-1]) + 1  # the held frame in front, and that after the end
-            slow, fast = np.multiply(_UNDER_WAY, np.median(steps[moves]))
-            result[:first] = first > _FILLED * fps and slow < steps[first] < fast
-            result[last + 1 :] = len(steps) - last > _FILLED * fps and slow < steps[last - 1] < fast
+            first, last = int(moves[0]), int(moves[-1]) + 1  # the frames that padding repeats, at start and end
+            slow, fast = np.multiply(_MOVING_STEP_RATIOS, np.median(steps[moves]))
+            result[:first] = first > _MIN_PADDING_TIME * fps and slow < steps[first] < fast
+            result[last + 1 :] = len(steps) - last > _MIN_PADDING_TIME * fps and slow < steps[last - 1] < fast
         return result
 
 
@@ -112,17 +112,17 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     MotionFileError
         If hips and trunk have no extent, or the legs no length.
     """
-    nowhere = np.full((len(positions), 3), np.nan)
+    missing = np.full((len(positions), 3), np.nan)
 
-    def paired(part: str, end: bool = False) -> Array:
+    def pair(part: str, end: bool = False) -> Array:
         table = roles.ends if end else roles.segments
         names = [f"{side}_{part}" for side in SIDES]
-        return np.stack([positions[:, table[name]] if name in table else nowhere for name in names], axis=1)
+        return np.stack([positions[:, table[name]] if name in table else missing for name in names], axis=1)
 
-    def either(part: str, child: str, chosen: Callable[[list[Array], int], Array] = lambda tips, k: tips[0]) -> Array:
+    def ends_of(part: str, child: str, chosen: Callable[[list[Array], int], Array] = lambda tips, k: tips[0]) -> Array:
         """Positions at which a segment ends: its end joint, or else the joint of the next segment, or its own tip."""
-        end = paired(part, end=True)
-        end = np.where(np.isnan(end), paired(child), end)
+        end = pair(part, end=True)
+        end = np.where(np.isnan(end), pair(child), end)
         for k, side in enumerate(SIDES):
             joint = roles.segments.get(f"{side}_{part}")
             if joint is not None and np.isnan(end[:, k]).any() and np.any(motion.tips[joint]):
@@ -130,27 +130,27 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
                 end[:, k] = chosen([positions[:, joint] + quaternions.rotated(rotations[:, joint], t) for t in tips], k)
         return end
 
-    shoulders = paired("upper_arm")
+    shoulders = pair("upper_arm")
     has_arms = not np.isnan(shoulders).any()
-    other = roles.segments.get("head", roles.segments.get("chest"))
-    hips, knees, ankles = paired("thigh"), either("thigh", "shank"), either("shank", "foot")
+    substitute = roles.segments.get("head", roles.segments.get("chest"))
+    hips, knees, ankles = pair("thigh"), ends_of("thigh", "shank"), ends_of("shank", "foot")
     if has_arms:
         top = shoulders.mean(axis=1)
-    elif other is not None:
-        top = positions[:, other]
+    elif substitute is not None:
+        top = positions[:, substitute]
     else:
         # Legs alone: the trunk is taken to continue the thighs.
         top = hips.mean(axis=1) + (hips - knees).mean(axis=1)
-    toes = either("foot", "toe", lambda tips, k: _foremost(tips, hips[:, k], knees[:, k], ankles[:, k]))
+    toes = ends_of("foot", "toe", lambda tips, k: _foremost(tips, hips[:, k], knees[:, k], ankles[:, k]))
     for k in range(len(SIDES)):
-        # What just continues the shank, as programs make up tips, points nowhere.
-        if not np.median(_sine(toes[:, k] - ankles[:, k], ankles[:, k] - knees[:, k])) > _TOES:
+        # A tip that merely continues the shank, as programs invent them, gives no direction.
+        if not np.median(_sine(toes[:, k] - ankles[:, k], ankles[:, k] - knees[:, k])) > _MIN_TOE_SINE:
             toes[:, k] = np.nan
     parts = [np.linalg.norm(knees - hips, axis=2)]
     if not np.isnan(ankles).any():
         parts.append(np.linalg.norm(ankles - knees, axis=2))
     leg = float(np.median(np.sum(parts, axis=0).mean(axis=1)))
-    lines = BodyLines(hips, knees, ankles, shoulders, either("upper_arm", "forearm"), either("forearm", "hand"), toes,
+    lines = BodyLines(hips, knees, ankles, shoulders, ends_of("upper_arm", "forearm"), ends_of("forearm", "hand"), toes,
                       top, has_arms, leg)  # fmt: skip
     extent = (lines.leg, *(float(np.median(np.linalg.norm(v, axis=1))) for v in (lines.left, lines.trunk)))
     if extent[0] < 1e-9:
@@ -161,7 +161,7 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
 
 
 def _foremost(tips: list[Array], hip: Array, knee: Array, ankle: Array) -> Array:
-    """Of the ends of a foot, such as its heel and its toes, that towards which the knee bends; all of shape (n, 3)."""
+    """Of the ends of a foot (heel, toes), the one furthest in the direction of the knee's bend; all of shape (n, 3)."""
     left = np.cross(knee - hip, ankle - knee)
     ahead = np.cross(left, hip - ankle)
     return max(tips, key=lambda tip: float(np.median(np.sum((tip - ankle) * ahead, axis=1))))

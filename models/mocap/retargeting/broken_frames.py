@@ -1,6 +1,6 @@
-"""Repair of frames that a capture has lost: where a joint jumps away and, within a tenth of a second, jumps back.
+"""Repair of lost frames of a capture: where a joint jumps away and, within a tenth of a second, jumps back.
 
-At the end of a file, where nothing comes back, one frame that jumps away is left out.
+At the end of a file, where it cannot jump back, one frame that jumps away is left out.
 """
 
 from collections.abc import Callable
@@ -17,27 +17,27 @@ from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
-_LONGEST = 0.1  # longest gap that is interpolated [s]
+_MAX_GAP_TIME = 0.1  # longest gap that is interpolated [s]
 # Least ratio of a gap's jumps to the 95th percentile of the joint's steps, and of a single frame's distance from the
-# middle of its neighbours to the 95th percentile of such distances. Of the captures of
+# middle of its neighbours to the 95th percentile of such distances. In the captures of
 # docs/validation/prepared-captures.md and the embedded clips, at their own rates and down to 15 Hz, joints that turn
-# out and back by `_TURN` have at most 4.9; but for a hand of CMU 16_09, whose markers flip for a frame.
-_TIMES = 5.5
-# Half or twice of `_LONGEST` or of the next numbers changes none of the 17 captures of the tuning half, but for half of
-# `_TURN`, which changes one by 0.3° RMS.
-_TURN = np.deg2rad(15.0)  # least jump of a joint [rad]
-_WAY = 0.25  # least jump of the root [thigh lengths]
-_BACK = 0.3  # largest step across a gap, as a share of the lesser jump
-# Least step before a turning point of a motion there and back, as a share of the next, 0.31 to 0.9 in two captures, and
-# largest distance between before and after, as a share of it.
-_CAME, _ALIKE = 0.3, 0.1
-_JOINTS = 0.25  # least share of the joints that jump at once where the whole pose does
+# out and back by `_MIN_JUMP_ANGLE` have at most 4.9, except a hand in CMU 16_09, whose markers flip for a frame.
+_MIN_JUMP_RATIO = 5.5
+# Half or twice `_MAX_GAP_TIME` or any of the next values changes none of the 17 captures of the tuning half, except
+# that half of `_MIN_JUMP_ANGLE` changes one by 0.3° RMS.
+_MIN_JUMP_ANGLE = np.deg2rad(15.0)  # least jump of a joint [rad]
+_MIN_ROOT_JUMP = 0.25  # least jump of the root [thigh lengths]
+_MAX_GAP_STEP_RATIO = 0.3  # largest step across a gap, as a fraction of the smaller jump
+# At a turning point of a motion that is played forwards and backwards: least ratio of the step before it to the next
+# one (0.31 to 0.9 in two captures), and largest distance between before and after, relative to the former.
+_MIN_APPROACH_RATIO, _MAX_RETURN_RATIO = 0.3, 0.1
+_MIN_JOINT_FRACTION = 0.25  # least fraction of the joints that jump at once if the whole pose jumps
 FEWEST = 10  # least number of frames that define usual steps
-_BESIDE = 3  # frames on either side of a gap through which it is interpolated
+_NEIGHBOUR_COUNT = 3  # frames on either side of a gap from which it is interpolated
 
 
 class JointJump(NamedTuple):
-    """A joint, by its index, that turns by an angle [rad] in the step after a frame, and not in the steps beside."""
+    """A joint (its index) that turns by an angle [rad] in the step after a frame, but not in the adjacent steps."""
 
     frame: int
     joint: int
@@ -54,12 +54,12 @@ class Repaired(NamedTuple):
     frames : tuple of int
         Those frames.
     jumps : tuple of int
-        Frames after which the whole pose or its place jumps nevertheless: a calibration pose in front, a longer gap, or
-        a cut between two takes.
+        Frames after which the whole pose or its place still jumps: because of a leading calibration pose, a longer gap,
+        or a cut between two takes.
     shortened : bool
         Whether the last frame is left out.
     joints : tuple of JointJump
-        Single joints that jump for good while the rest of the body does not, as with markers that are exchanged.
+        Single joints that jump without return while the rest of the body does not, as when markers are swapped.
     """
 
     motion: SourceMotion
@@ -72,24 +72,24 @@ class Repaired(NamedTuple):
 def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
     """Interpolate short gaps whose neighbours agree with each other but not with the frames between.
 
-    Both jumps of a gap are large beside the usual steps of a joint, and the step across it is a small part of them: no
-    joint turns so far in a frame and back within `_LONGEST`. Joints that no segment of the figure follows do not count.
-    The last step of a motion is large beside the usual ones only where the last frame is broken; it stays if it is
-    `rest`, a frame that is stated to show the rest pose.
+    Both jumps of a gap are large compared with the usual steps of a joint, and the step across it is small compared
+    with them: no joint turns so far in a frame and back within `_MAX_GAP_TIME`. Joints that no segment of the figure
+    follows do not count. If the last step of a motion is that large, the last frame is broken and is left out, unless
+    it is `rest`, a frame that is stated to show the rest pose.
     """
     broken = np.zeros(motion.n_frames, dtype=bool)
     if motion.n_frames < FEWEST:
         return Repaired(motion, (), (), False, ())
     used = used_joints(motion, roles)
-    longest = max(1, int(_LONGEST * motion.fps))
+    longest = max(1, int(_MAX_GAP_TIME * motion.fps))
     lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
-    edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _TURN))
+    edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _MIN_JUMP_ANGLE))
     for before, last in pairwise(edges):
         # Programs write zeros for a frame without data.
         broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
-    motion = _interpolated(motion, broken)
+    motion = _interpolate(motion, broken)
 
-    # Shorter gaps first: between two of them, the frames that are right would look like a gap.
+    # Shorter gaps first: otherwise the good frames between two of them would look like a gap.
     tracks: tuple[_Track, ...] = ()
     for length in range(1, longest + 1):
         tracks = tracks or _tracks(motion, roles)
@@ -97,31 +97,33 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
         for k in found:
             broken[k + 1 : k + 1 + length] = True
         if len(found):
-            motion, tracks = _interpolated(motion, broken), ()
-    shortened = rest != motion.n_frames - 1 and any(track.ends_off() for track in tracks or _tracks(motion, roles))
+            motion, tracks = _interpolate(motion, broken), ()
+    shortened = rest != motion.n_frames - 1 and any(
+        track.ends_with_jump() for track in tracks or _tracks(motion, roles)
+    )
     if shortened:
         motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
     steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
-    left = (steps > np.maximum(_limits(steps, 2), _TURN)).mean(axis=1) >= _JOINTS
+    jumping = (steps > np.maximum(_jump_limits(steps, 2), _MIN_JUMP_ANGLE)).mean(axis=1) >= _MIN_JOINT_FRACTION
     lost = motion.at_rest(used)
-    left |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _TURN)
-    root = _root(motion, roles)[:, 0]
-    left |= _cuts(_ways(root[:-1], root[1:]), _WAY * _thigh(motion, roles))
-    single = np.argwhere(_cuts(steps, _TURN) & ~left[:, None])
+    jumping |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _MIN_JUMP_ANGLE)
+    root = _root_positions(motion, roles)[:, 0]
+    jumping |= _lasting_jumps(_distances(root[:-1], root[1:]), _MIN_ROOT_JUMP * _thigh_length(motion, roles))
+    single = np.argwhere(_lasting_jumps(steps, _MIN_JUMP_ANGLE) & ~jumping[:, None])
     joints = tuple(JointJump(int(k), used[i], float(steps[k, i])) for k, i in single)
-    return Repaired(motion, _indices(broken), _indices(left), shortened, joints)
+    return Repaired(motion, _indices(broken), _indices(jumping), shortened, joints)
 
 
 def begins_off(motion: SourceMotion, roles: Roles) -> bool:
-    """Whether a joint or the root leaves the first frame by a step that is large beside its usual ones and the next.
+    """Whether the first step of a joint or the root is large compared with its usual steps and with the second.
 
-    Of some 220 captures of other people such a step is in those alone that have a calibration pose in front.
+    Of some 220 captures by other people, only those with a leading calibration pose have such a step.
     """
-    return motion.n_frames >= FEWEST and any(track.begins_off() for track in _tracks(motion, roles))
+    return motion.n_frames >= FEWEST and any(track.begins_with_jump() for track in _tracks(motion, roles))
 
 
 def used_joints(motion: SourceMotion, roles: Roles) -> list[int]:
-    """Joints that segments of the figure follow, and those above them."""
+    """Joints that segments of the figure follow, and their ancestors."""
     return sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
 
 
@@ -132,118 +134,128 @@ class _Track:
     ----------
     values : array
         Rotations or positions.
-    least : float
+    min_jump : float
         Least jump.
-    apart, off : callable
-        Distance of two values, and of a value from the middle of those before and after it.
+    distance, deviation : callable
+        Distance between two values, and of a value from the middle of the previous and the next one.
     """
 
     def __init__(
-        self, values: Array, least: float, apart: Callable[[Array, Array], Array], off: Callable[[Array], Array]
+        self,
+        values: Array,
+        min_jump: float,
+        distance: Callable[[Array, Array], Array],
+        deviation: Callable[[Array], Array],
     ) -> None:
-        self.values, self.least, self.apart, self.off = values, least, apart, off
-        self.steps = apart(values[:-1], values[1:])
-        self.limits = _limits(self.steps, 2)
+        self.values, self.min_jump, self.distance, self.deviation = values, min_jump, distance, deviation
+        self.steps = distance(values[:-1], values[1:])
+        self.limits = _jump_limits(self.steps, 2)
 
-    def ends_off(self) -> bool:
-        """Whether the last step is large beside the usual ones and the one before it, which a fast start is not."""
-        return self._is_off(self.steps[::-1])
+    def ends_with_jump(self) -> bool:
+        """Whether the last step is large compared with the usual ones and the previous one."""
+        return self._is_jump(self.steps[::-1])
 
-    def begins_off(self) -> bool:
-        """Whether the first step is so beside the usual ones and the next."""
-        return self._is_off(self.steps)
+    def begins_with_jump(self) -> bool:
+        """Whether the first step is large compared with the usual ones and the next one."""
+        return self._is_jump(self.steps)
 
-    def _is_off(self, steps: Array) -> bool:
-        return bool(np.any(steps[0] > np.maximum(np.maximum(self.limits, self.least), _TIMES * steps[1])))
+    def _is_jump(self, steps: Array) -> bool:
+        return bool(np.any(steps[0] > np.maximum(np.maximum(self.limits, self.min_jump), _MIN_JUMP_RATIO * steps[1])))
 
     def gaps(self, length: int) -> npt.NDArray[np.intp]:
-        """Frames before the gaps of a length."""
+        """Last good frames before the gaps of a given length."""
         values = self.values
-        lesser = np.minimum(self.steps[:-length], self.steps[length:])
-        odd = lesser > self.limits
+        smaller_jump = np.minimum(self.steps[:-length], self.steps[length:])
+        is_gap = smaller_jump > self.limits
         if length == 1:
-            off = self.off(values)
-            odd |= off > _limits(off, 3)
-        odd &= lesser > self.least
-        first = np.flatnonzero(odd.any(axis=1))
-        across = self.apart(values[first], values[first + length + 1])
-        gap = odd[first] & (across < _BACK * lesser[first]) & ~self._returns(first, first + length + 1, lesser[first])
+            deviations = self.deviation(values)
+            is_gap |= deviations > _jump_limits(deviations, 3)
+        is_gap &= smaller_jump > self.min_jump
+        first = np.flatnonzero(is_gap.any(axis=1))
+        across = self.distance(values[first], values[first + length + 1])
+        gap = (
+            is_gap[first]
+            & (across < _MAX_GAP_STEP_RATIO * smaller_jump[first])
+            & ~self._is_turning_point(first, first + length + 1, smaller_jump[first])
+        )
         return first[gap.any(axis=1)]
 
-    def _returns(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], lesser: Array) -> Mask:
-        """Whether the motion goes back from `last` by the way it came to `first`, as when it is played there and back.
+    def _is_turning_point(self, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp], smaller_jump: Array) -> Mask:
+        """Whether the motion returns from `last` the way it came to `first`, as when it is played backwards after that.
 
-        The step before is no small part of the jump then, but as usual, and what is two steps apart agrees, too.
+        Then the step before is of the usual size and not small compared with the jump, and the values before `first`
+        and after `last` agree, too.
         """
         within = (first > 0) & (last < len(self.values) - 1)
         before, after = np.where(within, first - 1, 0), np.where(within, last + 1, 0)
-        came = self.steps[before]
-        same = self.apart(self.values[before], self.values[after]) < _ALIKE * came
-        return within[:, None] & (came > _CAME * lesser) & (came <= self.limits) & same
+        approach = self.steps[before]
+        agrees = self.distance(self.values[before], self.values[after]) < _MAX_RETURN_RATIO * approach
+        return within[:, None] & (approach > _MIN_APPROACH_RATIO * smaller_jump) & (approach <= self.limits) & agrees
 
 
 def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:
-    """Rotations of the joints, and places of the root."""
+    """Tracks of the joints' rotations and of the root's position."""
     rotations = motion.rotations[:, used_joints(motion, roles)]
-    return (_Track(rotations, _TURN, _angles, _turned_off),
-            _Track(_root(motion, roles), _WAY * _thigh(motion, roles), _ways, _moved_off))  # fmt: skip
+    return (_Track(rotations, _MIN_JUMP_ANGLE, _angles, _angle_to_middle),
+            _Track(_root_positions(motion, roles), _MIN_ROOT_JUMP * _thigh_length(motion, roles),
+                   _distances, _distance_to_middle))  # fmt: skip
 
 
-def _root(motion: SourceMotion, roles: Roles) -> Array:
+def _root_positions(motion: SourceMotion, roles: Roles) -> Array:
     return motion.translations[:, ancestry(roles.segments["pelvis"], motion.parents)].sum(axis=1, keepdims=True)
 
 
-def _thigh(motion: SourceMotion, roles: Roles) -> float:
+def _thigh_length(motion: SourceMotion, roles: Roles) -> float:
     return float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
 
 
-def _limits(measures: Array, own: int) -> Array:
-    """What a joint's measures exceed in a gap only; the `own` largest, which a gap itself causes, are not counted."""
-    return _TIMES * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
+def _jump_limits(measures: Array, own: int) -> Array:
+    """Bounds that measures exceed only in a gap; the `own` largest, which a gap itself causes, do not count."""
+    return _MIN_JUMP_RATIO * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
 
 
-def _cuts(steps: Array, least: float) -> Mask:
-    """Which steps (n − 1, …) are large beside the usual ones and beside both that are next to them."""
-    still = np.zeros_like(steps[:1])
-    beside = np.maximum(np.concatenate((still, steps[:-1])), np.concatenate((steps[1:], still)))
-    return (steps > least) & (steps > _limits(steps, 2)) & (steps > _TIMES * beside)
+def _lasting_jumps(steps: Array, min_step: float) -> Mask:
+    """Which steps (n − 1, …) are large compared with the usual ones and with both adjacent ones."""
+    zero = np.zeros_like(steps[:1])
+    adjacent = np.maximum(np.concatenate((zero, steps[:-1])), np.concatenate((steps[1:], zero)))
+    return (steps > min_step) & (steps > _jump_limits(steps, 2)) & (steps > _MIN_JUMP_RATIO * adjacent)
 
 
 def _indices(chosen: Mask) -> tuple[int, ...]:
     return tuple(int(k) for k in np.flatnonzero(chosen))
 
 
-def _dots(ours: Array, theirs: Array) -> Array:
-    return np.einsum("...i,...i", ours, theirs)
+def _dot_products(first: Array, second: Array) -> Array:
+    return np.einsum("...i,...i", first, second)
 
 
-def _angles(ours: Array, theirs: Array) -> Array:
-    return 2.0 * np.arccos(np.minimum(np.abs(_dots(ours, theirs)), 1.0))
+def _angles(first: Array, second: Array) -> Array:
+    return 2.0 * np.arccos(np.minimum(np.abs(_dot_products(first, second)), 1.0))
 
 
-def _turned_off(q: Array) -> Array:
+def _angle_to_middle(q: Array) -> Array:
     before, after = q[:-2], q[2:]
-    middle = before + np.copysign(1.0, _dots(before, after))[..., None] * after
+    middle = before + np.copysign(1.0, _dot_products(before, after))[..., None] * after
     return _angles(q[1:-1], middle / np.linalg.norm(middle, axis=-1, keepdims=True))
 
 
-def _ways(ours: Array, theirs: Array) -> Array:
-    return np.linalg.norm(theirs - ours, axis=-1)
+def _distances(first: Array, second: Array) -> Array:
+    return np.linalg.norm(second - first, axis=-1)
 
 
-def _moved_off(p: Array) -> Array:
-    return _ways(p[1:-1], (p[:-2] + p[2:]) / 2.0)
+def _distance_to_middle(p: Array) -> Array:
+    return _distances(p[1:-1], (p[:-2] + p[2:]) / 2.0)
 
 
-def _interpolated(motion: SourceMotion, broken: Mask) -> SourceMotion:
-    """The motion with its broken frames on cubic splines through the frames beside them."""
+def _interpolate(motion: SourceMotion, broken: Mask) -> SourceMotion:
+    """The motion with broken frames interpolated by cubic splines through the frames beside them."""
     if not broken.any():
         return motion
     rotations, translations = motion.rotations.copy(), motion.translations.copy()
-    good = np.flatnonzero(~broken)
+    intact = np.flatnonzero(~broken)
     for frames in np.split(np.flatnonzero(broken), np.flatnonzero(np.diff(np.flatnonzero(broken)) > 1) + 1):
-        at = np.searchsorted(good, frames[0])
-        beside = good[max(0, at - _BESIDE) : at + _BESIDE]
+        position = np.searchsorted(intact, frames[0])
+        beside = intact[max(0, position - _NEIGHBOUR_COUNT) : position + _NEIGHBOUR_COUNT]
         between = CubicSpline(beside, quaternions.sign_continuous(motion.rotations[beside]))(frames)
         rotations[frames] = between / np.linalg.norm(between, axis=-1, keepdims=True)
         translations[frames] = CubicSpline(beside, motion.translations[beside])(frames)

@@ -15,7 +15,7 @@ C_S comes from anatomical frames T_S(t) built of joint positions alone:
 - the head is level on average; clavicles and hands, which many rigs do not define by positions, have on average the
   orientation of their parents.
 
-Another set-up of the same rig (joint frames G_J D, another rest pose) changes C_S to D⁻¹ C_S, and R_S not at all.
+Another set-up of the same rig (joint frames G_J D, another rest pose) changes C_S to D⁻¹ C_S, but not R_S.
 """
 
 from typing import NamedTuple
@@ -32,16 +32,17 @@ from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 from models.mocap.retargeting.sole_calibration import calibrated_foot, flat_frames
 
 _Z = np.array([0.0, 0.0, 1.0])
-# Standard deviation of the weight w over the angle between trunk and thighs: half of it turns the joints of 19
+# Standard deviation of the weight w over the angle between trunk and thighs: half the value turns the joints of 19
 # captures by 1.2° RMS, twice by 0.8° (5.7 and 3.0° in one of them).
-_STRAIGHT = np.deg2rad(20.0)
-_BEND = np.sin(np.deg2rad(12.0))  # least bend that defines a plane: knees of straight legs are up to 12° off the line
-# Weight of the parent's axis beside the hinge axis: that of a bend by 15°; half or twice turns joints by 0.3° RMS.
-_UNBENT = 0.01
-# Inclination of the chest up to which a head can be level: 25° turns the joints of a dance by 11° RMS, 80° those of
-# four of 17 captures by up to 1.3°.
-_UPRIGHT = np.cos(np.deg2rad(50.0))
-_ROUNDS = 5  # iterations for the trunk line: each leaves a third of the error, as the pelvis is a third of the line
+_STRAIGHTNESS_SD = np.deg2rad(20.0)
+_MIN_BEND_SINE = np.sin(np.deg2rad(12.0))  # least bend that defines a plane: knees of straight legs bend by up to 12°
+# Weight of the parent's axis relative to the hinge axis: that of a bend of 15°; half or twice turns joints by 0.3° RMS.
+_PARENT_AXIS_WEIGHT = 0.01
+# Inclination of the chest up to which the head is taken to be level: 25° turns the joints of a dance by 11° RMS, 80°
+# those of four of 17 captures by up to 1.3°.
+_MIN_UPRIGHT_COSINE = np.cos(np.deg2rad(50.0))
+# Iterations for the trunk line: each leaves a third of the error, since the pelvis is a third of the line.
+_ITERATION_COUNT = 5
 
 
 class Calibration(NamedTuple):
@@ -85,49 +86,49 @@ def calibrate(
     rest_frame : int or None
         A frame in which the body stands upright with level feet; without one, frames are weighted as above.
     """
-    body, (least, straight) = _Body(roles, parents, rotations), _straightness(lines, rest_frame)
-    # A pose that is held, as programs fill a motion up, counts once.
-    counted = np.where(lines.filled(fps), 0.0, 1.0)
-    straight = straight if rest_frame is not None else straight * counted
-    _put_trunk(body, lines, straight)
-    _put_head(body, up, straight)
+    body, (min_bend, straight) = _Body(roles, parents, rotations), _straightness(lines, rest_frame)
+    # A pose that is repeated as padding counts once.
+    weights = np.where(lines.filled(fps), 0.0, 1.0)
+    straight = straight if rest_frame is not None else straight * weights
+    _set_trunk(body, lines, straight)
+    _set_head(body, up, straight)
     if lines.has_arms:
-        clavicled = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
-        _set_lines(body.segments, unit(lines.trunk), _across(lines)[1], clavicled)
-        if "head" not in roles.segments:  # it goes with the chest, as that is now
-            body.put("head", body.of("chest"))
+        has_clavicles = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
+        _align_trunk(body.segments, unit(lines.trunk), _left_directions(lines)[1], has_clavicles)
+        if "head" not in roles.segments:  # the head follows the chest, which has just been aligned
+            body.set("head", body.segment("chest"))
     counts: list[int] = []
     for k in range(len(SIDES)):
-        _put_limbs(body, lines, k, counted)
-        foot = body.joint(f"{SIDES[k]}_foot")
+        _set_limbs(body, lines, k, weights)
+        foot = body.source(f"{SIDES[k]}_foot")
         if foot is None:
-            body.put(f"{SIDES[k]}_foot", body.of(f"{SIDES[k]}_shank"))
+            body.set(f"{SIDES[k]}_foot", body.segment(f"{SIDES[k]}_shank"))
             counts.append(0)
             continue
         flat = flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
-        shank = body.of(f"{SIDES[k]}_shank")
+        shank = body.segment(f"{SIDES[k]}_shank")
         sole, used = calibrated_foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
-        body.put(f"{SIDES[k]}_foot", sole)
+        body.set(f"{SIDES[k]}_foot", sole)
         counts.append(used)
-    return Calibration(body.segments, least, (counts[0], counts[1]))
+    return Calibration(body.segments, min_bend, (counts[0], counts[1]))
 
 
 class _Body:
-    """Rotations of the figure's segments (n, 18, 4) as they are found, and those of the file's joints."""
+    """Rotations of the figure's segments (n, 18, 4), filled in one by one, and those of the file's joints."""
 
     def __init__(self, roles: Roles, parents: tuple[int, ...], rotations: Array) -> None:
         self.segments = np.empty((len(rotations), len(SEGMENTS), 4))
         self.roles, self._parents, self._rotations = roles, parents, rotations
 
-    def put(self, body: str, turned: Array) -> None:
+    def set(self, body: str, rotations: Array) -> None:
         """Set the rotations of a segment."""
-        self.segments[:, BODIES.index(body)] = turned
+        self.segments[:, BODIES.index(body)] = rotations
 
-    def of(self, body: str) -> Array:
-        """Rotations of a segment that was put."""
+    def segment(self, body: str) -> Array:
+        """Rotations of a segment that was set."""
         return self.segments[:, BODIES.index(body)]
 
-    def joint(self, body: str) -> Array | None:
+    def source(self, body: str) -> Array | None:
         """Global rotations of a segment's source: the last joint before its end, since twist joints may lie between."""
         index = self.roles.segments.get(body)
         if index is None:
@@ -139,67 +140,71 @@ class _Body:
 
 
 def _straightness(lines: BodyLines, rest_frame: int | None) -> tuple[float, Array]:
-    """Least angle between trunk and thighs [rad], and the weight (n,) of each frame by how near it is to that."""
+    """Least angle between trunk and thighs [rad], and weights (n,) that fall as a frame's angle exceeds it."""
     trunk, thighs = unit(lines.trunk), unit(unit(lines.knees - lines.hips).sum(axis=1))
     bend = np.arccos(np.clip(-np.sum(trunk * thighs, axis=1), -1.0, 1.0))
-    least = float(np.min(bend, where=np.isfinite(bend), initial=np.pi))
+    min_bend = float(np.min(bend, where=np.isfinite(bend), initial=np.pi))
     if rest_frame is not None:
-        straight = np.zeros(len(bend))
-        straight[rest_frame] = 1.0
-        return least, straight
-    return least, np.exp(-(((np.nan_to_num(bend, nan=np.pi) - least) / _STRAIGHT) ** 2) / 2.0)
+        weights = np.zeros(len(bend))
+        weights[rest_frame] = 1.0
+        return min_bend, weights
+    return min_bend, np.exp(-(((np.nan_to_num(bend, nan=np.pi) - min_bend) / _STRAIGHTNESS_SD) ** 2) / 2.0)
 
 
-def _across(lines: BodyLines) -> tuple[Array, Array]:
+def _left_directions(lines: BodyLines) -> tuple[Array, Array]:
     """Directions to the left of the hips and of the shoulders; without arms, of the hips twice."""
     hips = unit(lines.left)
     return hips, unit(lines.shoulders[:, 0] - lines.shoulders[:, 1]) if lines.has_arms else hips
 
 
-def _put_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
+def _set_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
     """Pelvis, abdomen, chest and clavicles: along the trunk line and across hips and shoulders, on average."""
-    trunk, (hips, shoulders), own_trunk = unit(lines.trunk), _across(lines), _own_trunk(lines.has_arms)
+    trunk, (hips, shoulders), own_trunk = (
+        unit(lines.trunk),
+        _left_directions(lines),
+        _figure_trunk_frame(lines.has_arms),
+    )
     for name, left in (("pelvis", hips), ("abdomen", unit(hips + shoulders)), ("chest", shoulders)):
-        source = body.joint(name)
+        source = body.source(name)
         if source is None:
-            body.put(name, body.of("pelvis"))
+            body.set(name, body.segment("pelvis"))
             continue
-        wanted = quaternions.product(frames(left, trunk), quaternions.conjugate(own_trunk))
-        turned = carried(source, wanted, straight)
+        target = quaternions.product(frames(left, trunk), quaternions.conjugate(own_trunk))
+        rotations = carried(source, target, straight)
         if name == "pelvis":
             # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
-            side = quaternions.rotated(turned, np.array([0.0, 1.0, 0.0]))
-            turned = quaternions.product(quaternions.arcs(side, hips), turned)
-        body.put(name, turned)
+            side = quaternions.rotated(rotations, np.array([0.0, 1.0, 0.0]))
+            rotations = quaternions.product(quaternions.arcs(side, hips), rotations)
+        body.set(name, rotations)
     if "abdomen" not in body.roles.segments:
-        body.put("abdomen", quaternions.slerped(body.of("pelvis"), body.of("chest"), 0.5))
-    chest = body.of("chest")
+        body.set("abdomen", quaternions.slerped(body.segment("pelvis"), body.segment("chest"), 0.5))
+    chest = body.segment("chest")
     for name in ("left_clavicle", "right_clavicle"):
-        source = body.joint(name)
-        body.put(name, chest if source is None else carried(source, chest, straight))
+        source = body.source(name)
+        body.set(name, chest if source is None else carried(source, chest, straight))
 
 
-def _put_head(body: _Body, up: Array, straight: Array) -> None:
-    """The head: on average of the upright frames level, with the heading of the chest.
+def _set_head(body: _Body, up: Array, straight: Array) -> None:
+    """The head: level on average over the upright frames, with the heading of the chest.
 
     People keep the eyes level whatever the trunk does (Pozzo et al. 1990). The head of a body that is never upright
     has the orientation of the chest on average.
     """
-    source, chest = body.joint("head"), body.of("chest")
+    source, chest = body.source("head"), body.segment("chest")
     if source is None:
-        body.put("head", chest)
+        body.set("head", chest)
         return
-    upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
+    upright = straight * (quaternions.rotated(chest, _Z) @ up > _MIN_UPRIGHT_COSINE)
     if upright.sum() < 1e-6:
-        body.put("head", carried(source, chest, straight))
+        body.set("head", carried(source, chest, straight))
         return
     left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
     left = unit(left - (left @ up)[:, None] * up)
-    body.put("head", carried(source, frames(left, np.broadcast_to(up, left.shape)), upright))
+    body.set("head", carried(source, frames(left, np.broadcast_to(up, left.shape)), upright))
 
 
-def _put_limbs(body: _Body, lines: BodyLines, k: int, counted: Array) -> None:
-    """Arm, hand and leg of a side, whose bones and hinges the lines show."""
+def _set_limbs(body: _Body, lines: BodyLines, k: int, weights: Array) -> None:
+    """Arm, hand and leg of a side, from the bones and hinge axes in `lines`."""
     side, sign = SIDES[k], 1.0 - 2.0 * k
     elbow, knee = -sign * lines.elbow_normals()[:, k], lines.knee_normals()[:, k]
     bones = (
@@ -209,12 +214,17 @@ def _put_limbs(body: _Body, lines: BodyLines, k: int, counted: Array) -> None:
         (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles, knee, (2, -1.0), 1),
     )
     for parent, name, start, end, hinge, along, across in bones:
-        body.put(name, _limb(body.joint(name), (end - start)[:, k], hinge, body.of(parent), along, across, counted))
-    hand, forearm = body.joint(f"{side}_hand"), body.of(f"{side}_forearm")
-    body.put(f"{side}_hand", forearm if hand is None else carried(hand, forearm, counted))
+        body.set(
+            name,
+            _limb_rotations(
+                body.source(name), (end - start)[:, k], hinge, body.segment(parent), along, across, weights
+            ),
+        )
+    hand, forearm = body.source(f"{side}_hand"), body.segment(f"{side}_forearm")
+    body.set(f"{side}_hand", forearm if hand is None else carried(hand, forearm, weights))
 
 
-def _own_trunk(has_arms: bool) -> Array:
+def _figure_trunk_frame(has_arms: bool) -> Array:
     """Frame of the figure's own trunk line in the rest pose, built like a source's by `frames`."""
     model = figure_model()
     top = model.body("abdomen").pos + model.body("chest").pos
@@ -222,17 +232,17 @@ def _own_trunk(has_arms: bool) -> Array:
     return frames(np.array([[0.0, 1.0, 0.0]]), unit(np.array([[top[0], 0.0, top[2]]])))[0]
 
 
-def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
+def _align_trunk(segments: Array, trunk: Array, shoulders: Array, has_clavicles: bool) -> None:
     """Align the figure's trunk and shoulder lines with the source's, whose spine has joints in other places.
 
     Abdomen, chest and clavicles turn together by some degrees, more where the spine bends; then the clavicles turn, if
-    the source has them. The head looks where the source's does. Changes `segments`.
+    the source has them. The head keeps its orientation. Changes `segments` in place.
     """
     model = figure_model()
     abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
     sides = [BODIES.index(f"{side}_clavicle") for side in SIDES]
     carried = [BODIES.index(body) for body in ("abdomen", "chest")] + sides
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATION_COUNT):
         ends = [
             quaternions.rotated(segments[:, 2], model.body(BODIES[clavicle]).pos)
             + quaternions.rotated(segments[:, clavicle], model.body(f"{side}_upper_arm").pos)
@@ -242,39 +252,43 @@ def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool)
         own = unit(own + (ends[0] + ends[1]) / 2.0)
         turn = quaternions.arcs(own, np.where(np.isnan(trunk), own, trunk))
         segments[:, carried] = quaternions.product(turn[:, None], segments[:, carried])
-        if not clavicled:
+        if not has_clavicles:
             continue
         own = quaternions.rotated(turn, unit(ends[0] - ends[1]))
         turn = quaternions.arcs(own, np.where(np.isnan(shoulders), own, shoulders))
         segments[:, sides] = quaternions.product(turn[:, None], segments[:, sides])
 
 
-def _limb(
+def _limb_rotations(
     source: Array | None, bone: Array, hinge: Array, parent: Array, along: tuple[int, float], across: int,
-    counted: Array,
+    weights: Array,
 ) -> Array:  # fmt: skip
     """R of a limb's segment: axis `along` is on its bone in every frame, axis `across` on its hinge on average.
 
-    The average is weighted by `counted` (n,).
+    The average is weighted by `weights` (n,).
     """
     axis, sign = along
     if np.isnan(bone).any():
-        return parent if source is None else carried(source, parent, counted)
+        return parent if source is None else carried(source, parent, weights)
     bone = unit(bone)
     straight = quaternions.product(quaternions.arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
-    unbent = quaternions.rotated(straight, np.eye(3)[across])
+    parent_axis = quaternions.rotated(straight, np.eye(3)[across])
     sine = np.linalg.norm(hinge, axis=1, keepdims=True)
-    evidence = counted[:, None] * (np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent)
+    evidence = weights[:, None] * (
+        np.nan_to_num(hinge * np.maximum(sine - _MIN_BEND_SINE, 0.0)) + _PARENT_AXIS_WEIGHT * parent_axis
+    )
     if source is None:
         return straight
-    back = quaternions.conjugate(source)
-    long = unit(counted @ quaternions.rotated(back, bone))
-    lateral = quaternions.rotated(back, evidence).sum(axis=0)
+    inverse = quaternions.conjugate(source)
+    long = unit(weights @ quaternions.rotated(inverse, bone))
+    lateral = quaternions.rotated(inverse, evidence).sum(axis=0)
     lateral = unit(lateral - long * (lateral @ long))
     columns = np.empty((3, 3))
     columns[:, axis], columns[:, across] = sign * long, lateral
     third = 3 - axis - across
     columns[:, third] = np.cross(columns[:, (third + 1) % 3], columns[:, (third + 2) % 3])
-    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
-    # In files that stretch bones, or bend them at joints in between, bones turn relative to the joint frames.
-    return quaternions.product(quaternions.arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)
+    rotations = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
+    # In files that stretch bones, or bend them at intermediate joints, bones turn relative to the joint frames.
+    return quaternions.product(
+        quaternions.arcs(sign * quaternions.rotated(rotations, np.eye(3)[axis]), bone), rotations
+    )

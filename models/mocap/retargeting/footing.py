@@ -1,7 +1,7 @@
 """Floor of a retargeted motion: its height and slope, and ankle rotations that keep toes above it.
 
-A capture volume that was calibrated askew has a sloping floor. If the body stands at places far enough from each other,
-the slope is estimated by a plane through its level soles; where it is significant, the motion is rotated level.
+A badly calibrated capture volume has a sloping floor. If the body stands at places far enough from each other, the
+slope is estimated by a plane through its level soles; if it is significant, the motion is rotated so that it is level.
 
 The figure's foot is one rigid body. At push-off over bent toes it would penetrate the floor, so where contact points of
 the toes are too low, the ankle is rotated about its lateral axis until they touch.
@@ -15,29 +15,30 @@ from models.arrays import Array, IntArray, Mask
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
 from models.mocap.motion import quaternions
 
-# Largest height difference of the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
-_LEVEL = 0.06
-# Quantile of the heights of level soles that is the floor: half of it moves the floor of 19 captures by 2 mm, twice
-# by 4 (10 in one of them).
-_SHARE = 0.25
-# Largest speed of a standing sole [m/s]: with half of it one of the 28 captures of docs/validation/prepared-captures.md
-# gets a slope of 1.4°, with twice one keeps its slope.
-_STILL = 0.4
-_SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
-# Least number of stances: half of it changes none of 17 captures, twice leaves one of them its slope.
-_STEPS = 4
-# Probability of a slope as large on a level floor, two-sided: half or twice changes none of the 28 captures.
-_CHANCE = 0.02
-# Smaller slopes are none, larger ones are not due to calibration. With 1° two of 17 captures keep theirs; 0.25, 4 or
-# 16° change none.
-_SLOPE = np.deg2rad((0.5, 8.0))
-# RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]: half or twice changes none of
-# 17 captures.
-_UNEVEN = 0.025
-# Least share of the slope that either foot's own stances have: negative in a dance; 0.25 or 0.7 change none of the 28.
-_AGREE = 0.5
+# Largest height difference among the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
+_MAX_SOLE_RANGE = 0.06
+# Quantile of the heights of level soles that is taken as the floor: half the value moves the floor of 19 captures by
+# 2 mm, twice by 4 mm (10 mm in one of them).
+_FLOOR_QUANTILE = 0.25
+# Largest speed of a standing sole [m/s]: with half the value one of the 28 captures of
+# docs/validation/prepared-captures.md gets a slope of 1.4°, with twice one keeps its slope.
+_MAX_STANDING_SPEED = 0.4
+_MIN_SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
+# Least number of stances: half the value changes none of 17 captures, twice leaves the slope of one of them.
+_MIN_STANCE_COUNT = 4
+# Significance level (two-sided) against a level floor: half or twice changes none of the 28 captures.
+_SIGNIFICANCE = 0.02
+# Smaller slopes are ignored, larger ones are not due to calibration. With 1° two of 17 captures keep their slopes;
+# 0.25, 4 or 16° change none.
+_SLOPE_RANGE = np.deg2rad((0.5, 8.0))
+# RMS deviation of the soles from the plane above which they are taken to stand on stairs or boxes [m]: half or twice
+# changes none of 17 captures.
+_MAX_UNEVENNESS = 0.025
+# Least fraction of the slope that the stances of each foot alone must show: negative in a dance; 0.25 or 0.7 change
+# none of the 28 captures.
+_MIN_AGREEMENT = 0.5
 # Standard deviation of the Gaussian filter for the ankles' correction [s]: without it toe-off turns ankles faster
-# than any ankle turns. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
+# than any human's. Half or twice turns the joints of 19 captures by 0.1 or 0.2° RMS.
 _SMOOTHING = 0.02
 _ALL = slice(None)
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
@@ -55,27 +56,28 @@ def on_the_floor(root: Array, segments: Array, fps: float, counted: Mask | slice
     fps : float
         Frame rate [1/s].
     counted : array of bool, shape (frames,)
-        Frames that tell where the floor is.
+        Frames from which the floor is estimated.
 
     Returns
     -------
     root, segments : arrays
         Positions and rotations after the shift and the rotation of the ankles.
     """
-    ankles = root[:, None, 2] + _ankles(segments)[..., 2]
+    ankles = root[:, None, 2] + _ankle_positions(segments)[..., 2]
     feet = segments[:, _FEET]
     points = soles().reshape(2, 4, 3)
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
-    floor = _floor(heights[counted])
-    bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
-    # The correction of a foot that points straight down ends abruptly when it leaves the floor, so it is smoothed.
+    floor = _floor_height(heights[counted])
+    bend = _toe_correction(ankles - floor - CONTACT_RADIUS, feet, points)
+    # The correction of a foot that points straight down ends abruptly when the foot leaves the floor, so it is
+    # smoothed.
     bend = gaussian_filter1d(bend, _SMOOTHING * fps, axis=0, mode="nearest")
     segments = segments.copy()
     segments[:, _FEET] = quaternions.product(feet, quaternions.about_axis(1, bend))
     return root - np.array([0.0, 0.0, floor]), segments
 
 
-def _ankles(segments: Array) -> Array:
+def _ankle_positions(segments: Array) -> Array:
     """Positions of the ankles relative to the pelvis, in world axes [m], shape (frames, 2, 3)."""
     model = figure_model()
     places = np.zeros((len(segments), len(_FEET), 3))
@@ -94,7 +96,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     root, segments, fps
         As in `on_the_floor`.
     """
-    points = (root[:, None] + _ankles(segments))[:, :, None] + quaternions.rotated(
+    points = (root[:, None] + _ankle_positions(segments))[:, :, None] + quaternions.rotated(
         segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3)
     )
     middle = points.mean(axis=2)
@@ -102,24 +104,26 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     if len(points) < 4:
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
-    # Not `contacts.standing_parts`: there is no floor yet over which a sole could be low.
-    stands = (np.ptp(points[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
-    begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also where the other foot takes over
+    # Not `contacts.standing_parts`: the floor, above which a sole could be low, is not known yet.
+    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < _MAX_STANDING_SPEED)
+    begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also if the other foot takes over
     stances = int(begins.sum())
-    slopes = _slopes(middle[lower][stands], lower[1][stands], stances) if stances >= _STEPS else np.zeros(2)
+    slopes = (
+        _floor_slopes(middle[lower][stands], lower[1][stands], stances) if stances >= _MIN_STANCE_COUNT else np.zeros(2)
+    )
     angle = float(np.arctan(np.linalg.norm(slopes)))
-    if not _SLOPE[0] < angle < _SLOPE[1]:
+    if not _SLOPE_RANGE[0] < angle < _SLOPE_RANGE[1]:
         return root, segments, 0.0
     # The plane z = s·(x, y) has the normal (−s, 1); turned about normal × z it is level.
     axis = np.array([-slopes[1], slopes[0], 0.0]) / np.linalg.norm(slopes)
-    level = np.concatenate(([np.cos(angle / 2)], np.sin(angle / 2) * axis))
-    return quaternions.rotated(level, root), quaternions.product(level, segments), angle
+    leveling = np.concatenate(([np.cos(angle / 2)], np.sin(angle / 2) * axis))
+    return quaternions.rotated(leveling, root), quaternions.product(leveling, segments), angle
 
 
-def _slopes(points: Array, feet: IntArray, stances: int) -> Array:
+def _floor_slopes(points: Array, feet: IntArray, stances: int) -> Array:
     """Slopes dz/dx, dz/dy of parallel planes through points of standing soles; 0 in directions without significance.
 
-    A plane for either foot (0, 1): their soles need not lie at the same height in the file.
+    One plane for each foot (0, 1): their soles need not lie at the same height in the file.
     """
     centred, both = np.zeros_like(points), np.unique(feet)
     for foot in both:
@@ -127,31 +131,33 @@ def _slopes(points: Array, feet: IntArray, stances: int) -> Array:
     flat, height = centred[:, :2], centred[:, 2]
     _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
     spread = sizes / np.sqrt(len(points))
-    told = np.where(spread > _SPREAD, 1.0, 0.0)
-    slopes = told * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
-    off = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
-    # Through few stances a plane fits well whatever its slope: Student's t with the degrees of freedom that are left.
-    free = stances - len(both) - int(told.sum())
-    least = float(stdtrit(free, 1.0 - _CHANCE / 2.0)) * off / np.sqrt(free) if free > 0 else np.inf
-    sure = np.abs(slopes) * spread > least
-    found = directions.T @ (slopes * sure)
-    rises = flat @ found
-    agree = all(
-        rises[feet == foot] @ height[feet == foot] >= _AGREE * np.sum(rises[feet == foot] ** 2) for foot in both
+    is_spread = np.where(spread > _MIN_SPREAD, 1.0, 0.0)
+    slopes = is_spread * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
+    deviation = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
+    # A plane fits a few stances well whatever its slope: Student's t with the remaining degrees of freedom.
+    degrees = stances - len(both) - int(is_spread.sum())
+    min_rise = (
+        float(stdtrit(degrees, 1.0 - _SIGNIFICANCE / 2.0)) * deviation / np.sqrt(degrees) if degrees > 0 else np.inf
     )
-    return found if off <= _UNEVEN and agree else np.zeros(2)
+    significant = np.abs(slopes) * spread > min_rise
+    slope = directions.T @ (slopes * significant)
+    rises = flat @ slope
+    agree = all(
+        rises[feet == foot] @ height[feet == foot] >= _MIN_AGREEMENT * np.sum(rises[feet == foot] ** 2) for foot in both
+    )
+    return slope if deviation <= _MAX_UNEVENNESS and agree else np.zeros(2)
 
 
-def _floor(heights: Array) -> float:
+def _floor_height(heights: Array) -> float:
     """Height of the floor [m] from heights of contact points (frames, 2, 4): that of the lower foot's level soles."""
     lower = np.argmin(heights.min(axis=2), axis=1)
     sole = heights[np.arange(len(heights)), lower]
-    level = np.ptp(sole, axis=1) < _LEVEL
+    level = np.ptp(sole, axis=1) < _MAX_SOLE_RANGE
     # If no foot is ever put down flat, the lowest contact points are used.
-    return float(np.quantile(sole[level].mean(axis=1) if level.any() else sole.min(axis=1), _SHARE))
+    return float(np.quantile(sole[level].mean(axis=1) if level.any() else sole.min(axis=1), _FLOOR_QUANTILE))
 
 
-def _toe_bend(ankles: Array, feet: Array, points: Array) -> Array:
+def _toe_correction(ankles: Array, feet: Array, points: Array) -> Array:
     """Rotations about the feet's y axis [rad], ≤ 0, after which no toe is below the floor, shape (frames, 2).
 
     After a rotation by δ, a point p of a foot, with the vertical r in the foot's frame and the ankle's height h, is at

@@ -1,4 +1,4 @@
-"""What the user states about a motion file, in place of what would be estimated from it."""
+"""Facts about a motion file that the user states in place of estimates."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +18,9 @@ class Hints:
     rest_frame : int or None
         A frame of the file in which the body stands upright with level feet, counted from 0.
     roles : Path or None
-        A file that says which joint plays which role, in place of the joints' names; see `role_file`.
+        A file that assigns roles to joints, in place of the joints' names; see `role_file`.
     frame_rate : float or None
-        Frames per second [1/s]; of frames of unequal durations (DeepMimic) the rate of the shortest.
+        Frames per second [1/s]; for frames of unequal durations (DeepMimic) the rate of the shortest.
 
     Raises
     ------
@@ -42,6 +42,6 @@ class Hints:
             raise ModelError(f"frame rate is {self.frame_rate:g} a second; expected 0.1 to 10000, such as 60")
 
     def of_estimates(self) -> tuple[str, ...]:
-        """Options of the command line that are stated in place of an estimate; nobody estimates a frame rate."""
+        """Stated command-line options that replace an estimate; the frame rate is never estimated."""
         stated = {"--up": self.up, "--rest-frame": self.rest_frame, "--roles": self.roles}
         return tuple(option for option, value in stated.items() if value is not None)

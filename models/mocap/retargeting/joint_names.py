@@ -1,7 +1,8 @@
-"""Side and body words of a joint's name, whatever a program writes around them.
+"""Parsing of joint names into a side and body words, whatever a program writes around them.
 
 ``Skeleton_001_LeftUpLeg``, ``l_upleg_JNT``, ``leftupleg`` and ``RL_L_UpLeg`` all become (left, upleg). Leading and
-trailing words that half of a skeleton's joints share are its own; numbers are those of a chain, or of an export.
+trailing words that half of the joints share belong to the skeleton's name; numbers count a chain or come from an
+export.
 """
 
 import re
@@ -12,17 +13,17 @@ from typing import NamedTuple
 
 _SIDES = {"left": "left", "l": "left", "lt": "left", "lf": "left", "lft": "left",
           "right": "right", "r": "right", "rt": "right", "rf": "right", "rgt": "right"}  # fmt: skip
-_CENTRE = frozenset(("c", "cn", "m", "x", "mid", "middle", "center", "centre"))
-_NOISE = frozenset((
+_CENTRE_WORDS = frozenset(("c", "cn", "m", "x", "mid", "middle", "center", "centre"))
+_NOISE_WORDS = frozenset((
     "jnt", "joint", "jt", "j", "bind", "def", "deform", "org", "bn", "bone", "b", "skin", "bend", "stretch", "bip",
     "biped", "mixamorig", "character", "cc", "armature", "rig",
 ))  # fmt: skip
-_HELPERS = frozenset((
+_HELPER_WORDS = frozenset((
     "twist", "roll", "helper", "corrective", "muscle", "mesh", "nub", "end", "ik", "pole", "ctrl", "target", "site",
     "marker", "tip", "part",
 ))  # fmt: skip
-# Least share of the joints that begin with a word that is the skeleton's own: 0.25 and 0.9 name 17 captures alike.
-_SHARE = 0.5
+# Least fraction of the joints that share a word of the skeleton's name: 0.25 and 0.9 name 17 captures the same way.
+_MIN_SHARED_FRACTION = 0.5
 # MikuMikuDance; longer words first.
 _JAPANESE = {
     "左": "left", "右": "right", "上半身": "spine", "下半身": "pelvis", "センター": "center", "足首": "ankle",
@@ -31,25 +32,25 @@ _JAPANESE = {
 }  # fmt: skip
 _GLOSS = re.compile(r"[\[(].*?[\])]")  # Skyrim's NPC L Thigh [LThg]
 _PIECES = re.compile(r"[\W_]+")
-# Numbers stay with a single letter (the vertebrae L3 and T8 of Xsens): no side is written L3.
+# Numbers stay with a single letter (the vertebrae L3 and T8 of Xsens): no program writes a side as L3.
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|[^\W\da-zA-Z_]+")
 _VERTEBRA = re.compile(r"[A-Z]\d+")
 
 
 class JointName(NamedTuple):
-    """What a joint's name says.
+    """A parsed joint name.
 
     Attributes
     ----------
     side : str
         ``left``, ``right``, or empty.
     bare : str
-        The other words in lower case, in one: ``upperarm``.
+        The other words in lower case, joined: ``upperarm``.
     noisy : bool
-        Whether words such as *joint* or *stretch*, or leading underscores, are left out of `bare`: a name without them
-        is the more likely one.
+        Whether words such as *joint* or *stretch*, or leading underscores, are left out of `bare`: among joints with
+        the same words, one without them is more likely to be the body's.
     helper : bool
-        Whether it is a twist, a tip, or another joint that is no part of the body.
+        Whether it is a twist, a tip, or another joint that is not part of the body.
     """
 
     side: str
@@ -66,40 +67,40 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
     joints : tuple of str
         Names as the file gives them.
     sided, central : frozenset of str
-        Words of the body that have a side, and that have none.
+        Words of body parts with a side, and of those without.
     """
-    split = [_words(joint) for joint in joints]
-    for end, of in ((0, str.startswith), (-1, str.endswith)):
-        while (word := _shared(split, end)) is not None:
-            if len(word) > 1 and any(of(alias, word) for alias in sided | central):
+    split = [_split_words(joint) for joint in joints]
+    for end, matches in ((0, str.startswith), (-1, str.endswith)):
+        while (word := _shared_word(split, end)) is not None:
+            if len(word) > 1 and any(matches(alias, word) for alias in sided | central):
                 break
-            split = [_without(words, end) if len(words) > 1 and words[end] == word else words for words in split]
+            split = [_drop_word(words, end) if len(words) > 1 and words[end] == word else words for words in split]
     # MakeHuman's __UpLeg_L is the link from the pelvis to UpLeg_L.
     return tuple(
-        _read(words, sided, _plain(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
+        _parse(words, sided, _normalise(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
     )
 
 
-def _shared(split: Sequence[list[str]], end: int) -> str | None:
-    """The word at an end of the names that is the skeleton's own, if there is one."""
+def _shared_word(split: Sequence[list[str]], end: int) -> str | None:
+    """The first or last word of the names (`end` 0 or −1) that belongs to the skeleton's name, if there is one."""
     counts = Counter(words[end] for words in split if len(words) > 1)
     word, n = counts.most_common(1)[0] if counts else ("", 0)
-    meant = word in _SIDES or (end == -1 and word in _HELPERS)
-    return None if n < _SHARE * len(split) or meant else word
+    has_meaning = word in _SIDES or (end == -1 and word in _HELPER_WORDS)
+    return None if n < _MIN_SHARED_FRACTION * len(split) or has_meaning else word
 
 
-def _without(words: list[str], end: int) -> list[str]:
+def _drop_word(words: list[str], end: int) -> list[str]:
     return words[1:] if end == 0 else words[:-1]
 
 
-def _plain(name: str) -> str:
-    """A name without namespace, in the usual form of its characters."""
+def _normalise(name: str) -> str:
+    """A name without namespace, in the Unicode normal form NFKC."""
     return unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
 
 
-def _words(name: str) -> list[str]:
+def _split_words(name: str) -> list[str]:
     """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
-    name = _plain(name)
+    name = _normalise(name)
     name = _GLOSS.sub("", name) or name
     for text, word in _JAPANESE.items():
         name = name.replace(text, f" {word} ")
@@ -116,13 +117,13 @@ def _words(name: str) -> list[str]:
     return words
 
 
-def _read(words: list[str], sided: frozenset[str], link: bool) -> JointName:
+def _parse(words: list[str], sided: frozenset[str], link: bool) -> JointName:
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
-    kept = [word for word in words if word not in _SIDES]
-    if not side and not _CENTRE.issuperset(kept):
-        kept = [word for word in kept if word not in _CENTRE]
-    bare = "".join(word for word in kept if word not in _NOISE)
-    noisy, helper = link or not _NOISE.isdisjoint(kept), not _HELPERS.isdisjoint(kept)
+    others = [word for word in words if word not in _SIDES]
+    if not side and not _CENTRE_WORDS.issuperset(others):
+        others = [word for word in others if word not in _CENTRE_WORDS]
+    bare = "".join(word for word in others if word not in _NOISE_WORDS)
+    noisy, helper = link or not _NOISE_WORDS.isdisjoint(others), not _HELPER_WORDS.isdisjoint(others)
     if not side:
         for mark in _SIDES:
             rest = bare.removeprefix(mark)

@@ -2,7 +2,7 @@
 
 Segment axes in the rig, the vertical and the floor are estimated from the motion itself (`calibration`, `upright`,
 `footing`), never from the rig's rest pose, so limbs point exactly where the source's do. The root is the middle of the
-hips, scaled by the length of the legs (`leg_proportions` for those of another shape). A constant vertical shift puts
+hips, scaled by the length of the legs (`leg_proportions` for legs of other proportions). A constant vertical shift puts
 the feet on the floor, so flights remain parabolas.
 """
 
@@ -44,11 +44,11 @@ from models.mocap.retargeting.upright import check_sides, check_stature, propped
 
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
-_PROPPED = (
+_PROPPED_REMARK = (
     "for {:.1f} s the body's weight is beside its feet and all else that is low: what it sits, hangs or leans on is "
     "not in the file, and the figure has to do without"
 )
-_SITS = (
+_SITTING_REMARK = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
     "{} cm in height, so that feet that stand stay on the floor"
 )
@@ -57,7 +57,7 @@ _SITS = (
 class _Frames(NamedTuple):
     """Frames of the file from `first` on: global rotations and positions of the joints, and anatomical positions.
 
-    `dropped` is the number of the file's frames that are not of the motion: a pose in front of it.
+    `dropped` is the number of leading frames of the file that do not belong to the motion: a calibration pose.
     """
 
     rotations: Array
@@ -68,7 +68,7 @@ class _Frames(NamedTuple):
 
 
 def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tuple[Clip, RetargetReport]:
-    """The motion on the figure, starting over the world's origin and facing +x, and how it was interpreted.
+    """The motion on the figure, starting above the world's origin and facing +x, and how it was interpreted.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     """
     rest = hints.rest_frame
     _check_channels(motion, rest)
-    motion, broken, jumps, shortened, odd = repaired(motion, roles, rest)
+    motion, broken, jumps, shortened, joint_jumps = repaired(motion, roles, rest)
     frames = _frames(motion, roles, rest)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
@@ -87,35 +87,35 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     up = up_axis(motion, roles, lines, frames.positions[:, body], hints.up)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, frames.positions)
-    calibrated = _calibrated(motion, roles, frames, up.axis, rest)
+    calibrated = _calibrate_body(motion, roles, frames, up.axis, rest)
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
     segments = quaternions.product(axes, with_twist_shared(calibrated.segments[skipped:]))
-    own_leg = _own_leg(not np.isnan(lines.ankles).any())
+    figure_leg = _figure_leg_length(not np.isnan(lines.ankles).any())
     hips, ankles = lines.middle[skipped:], lines.ankles[skipped:]
-    scaled = own_leg / lines.leg
-    path = scaled * quaternions.rotated(axes, hips - hips[0])
-    legs = scaled * quaternions.rotated(axes, ankles - lines.hips[skipped:])
-    below = scaled * quaternions.rotated(axes, ankles - hips[:, None])
-    root = hips_over_feet(path, segments, legs, below, motion.fps)
-    sits = float(np.ptp(root[:, 2] - path[:, 2]))
+    scale = figure_leg / lines.leg
+    path = scale * quaternions.rotated(axes, hips - hips[0])
+    legs = scale * quaternions.rotated(axes, ankles - lines.hips[skipped:])
+    hip_to_ankle = scale * quaternions.rotated(axes, ankles - hips[:, None])
+    root = hips_over_feet(path, segments, legs, hip_to_ankle, motion.fps)
+    hip_shift = float(np.ptp(root[:, 2] - path[:, 2]))
     root, segments, slope = levelled(root, segments, motion.fps)
     if slope:  # levelling changes the heading of a body that does not face along the slope
-        ahead = _world_axes(segments[0, 0], _Z)
-        root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
+        facing = _world_axes(segments[0, 0], _Z)
+        root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
     propped = propped_seconds(lines, frames.positions[:, body], up.axis, motion.fps)
-    broken, jumps = ([k for k in told if k >= frames.dropped] for told in (broken, jumps))
+    broken, jumps = ([k for k in indices if k >= frames.dropped] for indices in (broken, jumps))
     filled = lines.filled(motion.fps)[skipped:]
-    lasts = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
-    counted = ~filled & np.repeat(2 * lasts >= lasts.max(), lasts)  # not what is lost in between
+    lengths = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
+    counted = ~filled & np.repeat(2 * lengths >= lengths.max(), lengths)  # not short pieces between jumps
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *held_remarks(filled, motion.fps, frames.dropped),
         *haste_remarks(legs, motion.fps),
-        *joint_jump_remarks([jump for jump in odd if jump.frame >= frames.dropped], motion),
+        *joint_jump_remarks([jump for jump in joint_jumps if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
-        *([_SITS.format(round(100.0 * sits))] if sits else ()),
-        *([_PROPPED.format(propped)] if propped else ()),
+        *([_SITTING_REMARK.format(round(100.0 * hip_shift))] if hip_shift else ()),
+        *([_PROPPED_REMARK.format(propped)] if propped else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, roles),
         *(calibration_remarks(calibrated, roles, motion.n_frames - frames.dropped) if rest is None else ()),
@@ -126,8 +126,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         missing(roles),
         axis_name(up.axis),
         axis_name(quaternions.rotated(quaternions.conjugate(axes), _X)),
-        unit_name(motion.unit, lines.leg, own_leg),
-        scaled,
+        unit_name(motion.unit, lines.leg, figure_leg),
+        scale,
         frames.dropped,
         up.confidence,
         remarks,
@@ -147,7 +147,7 @@ def _check_channels(motion: SourceMotion, rest: int | None) -> None:
 
 
 def _frames(motion: SourceMotion, roles: Roles, rest: int | None) -> _Frames:
-    """The frames of the motion, without a pose in front of it unless the user names that as the rest frame."""
+    """The frames of the motion, without a leading calibration pose unless the user states it as the rest frame."""
     rotations = motion.global_rotations()
     positions = motion.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
@@ -159,7 +159,7 @@ def _frames(motion: SourceMotion, roles: Roles, rest: int | None) -> _Frames:
     return _Frames(rotations, positions, lines, first, dropped)
 
 
-def _calibrated(motion: SourceMotion, roles: Roles, frames: _Frames, up: Array, rest: int | None) -> Calibration:
+def _calibrate_body(motion: SourceMotion, roles: Roles, frames: _Frames, up: Array, rest: int | None) -> Calibration:
     """The body on the figure's segments, or an error if its joints do not define them."""
     unclear = MotionFileError(
         motion.path, 0, "its joints do not tell how the body stands", "a trunk, thighs and shanks that have a length"
@@ -167,29 +167,29 @@ def _calibrated(motion: SourceMotion, roles: Roles, frames: _Frames, up: Array, 
     frame = None if rest is None else rest - frames.first
     try:
         with np.errstate(invalid="ignore"):
-            found = calibrate(roles, motion.parents, frames.lines, frames.rotations, up, motion.fps, frame)
+            calibration = calibrate(roles, motion.parents, frames.lines, frames.rotations, up, motion.fps, frame)
     except np.linalg.LinAlgError:
         raise unclear from None
-    if not np.isfinite(found.segments).all():
+    if not np.isfinite(calibration.segments).all():
         raise unclear
-    return found
+    return calibration
 
 
 def _world_axes(body: Array, up: Array) -> Array:
     """Rotation from the file's axes to the world's: `up` to z, the body's heading (its head's, if it lies) to +x.
 
-    Of a body whose belly points downwards it is the longer of both: a crawl's belly leans to the side with a limb.
+    If the belly points downwards, it is the longer of the two: in a crawl the belly turns to the side with each limb.
     """
     forward, head = quaternions.rotated(body, _X), quaternions.rotated(body, _Z)
-    x, ahead = forward - up * (forward @ up), head - up * (head @ up)
-    if np.linalg.norm(x) < max(0.3, float(np.linalg.norm(ahead)) * (forward @ up < 0.0)):  # it lies, or crawls
-        x = ahead
+    x, head_heading = forward - up * (forward @ up), head - up * (head @ up)
+    if np.linalg.norm(x) < max(0.3, float(np.linalg.norm(head_heading)) * (forward @ up < 0.0)):  # it lies, or crawls
+        x = head_heading
     x /= np.linalg.norm(x)
-    turned = Rotation.from_matrix(np.column_stack((x, np.cross(up, x), up)))
-    return quaternions.conjugate(np.asarray(turned.as_quat(scalar_first=True)))
+    axes = Rotation.from_matrix(np.column_stack((x, np.cross(up, x), up)))
+    return quaternions.conjugate(np.asarray(axes.as_quat(scalar_first=True)))
 
 
-def _own_leg(ankles: bool) -> float:
+def _figure_leg_length(ankles: bool) -> float:
     """Length of the figure's leg [m] from hip to ankle, or to the knee if the source has no ankles."""
     model = figure_model()
     children = ("left_shank", "left_foot") if ankles else ("left_shank",)

@@ -1,4 +1,4 @@
-"""How a motion file was interpreted, in words: axes, unit, joints, and what had to be guessed."""
+"""Report on how a motion file was interpreted: axes, unit, joints, and what had to be guessed."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -16,21 +16,24 @@ from models.mocap.retargeting.broken_frames import JointJump
 from models.mocap.retargeting.calibration import Calibration
 from models.mocap.retargeting.skeleton_roles import Roles
 
-_BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
-_STANCE_FRAMES = 8  # least frames that tell a sole: by fewer, it lies up to 25° otherwise on legs 0.6 to 1.6 as long
-_NAMED = 12  # unused joints that are named: rigs with faces and fingers have hundreds
-_RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
-# Least height [m] and time [s] in which a body is taken to stand above the floor: a step of stairs is 0.17 m high, and
-# a flight of 1 s rises by 1.2 m. The longest of the 28 captures of docs/validation/prepared-captures.md lasts 0.5 s.
-_ALOFT, _FLIGHT = 0.1, 1.0
-_BENEATH = 0.1  # least depth beneath the floor that is reported [m]: in the same captures nothing is deeper
-# Legs of a human, hip to ankle [m]: 0.49 of a grown-up's stature (Winter 2009, figure 4.1), of the tallest known 1.33;
-# about 0.3 of a child that begins to walk. Units are mistaken by factors above 2, so the bounds may be wide.
-_SHORTEST_LEG, _LONGEST_LEG = 0.3, 1.5
+_MAX_SPINE_BEND = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
+# Least number of stance frames for a reliable sole: with fewer, it differs by up to 25° on legs 0.6 to 1.6 as long.
+_MIN_STANCE_FRAMES = 8
+_MAX_NAMED = 12  # largest number of unused joints that are named: rigs with faces and fingers have hundreds
+# Least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979).
+_MIN_RANGE_EXCESS = np.deg2rad(15.0)
+# Height [m] and time [s] above which a body is taken to stand on something above the floor: a step of stairs is 0.17 m
+# high, and a flight of 1 s rises by 1.2 m. The longest flight in the 28 captures of
+# docs/validation/prepared-captures.md lasts 0.5 s.
+_MIN_ALOFT_HEIGHT, _MIN_ALOFT_TIME = 0.1, 1.0
+_MIN_DEPTH = 0.1  # least depth below the floor that is reported [m]: in the same captures nothing is deeper
+# Legs of a human, hip to ankle [m]: 0.49 of an adult's stature (Winter 2009, figure 4.1), 1.33 m for the tallest known;
+# about 0.3 m for a child that begins to walk. Wrong units are off by factors above 2, so the bounds may be wide.
+_MIN_LEG_LENGTH, _MAX_LEG_LENGTH = 0.3, 1.5
 COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
-# [m/s] speed of an ankle with respect to its hip that no leg has for a tenth of a capture, and its quantile: 8 in a
-# file of a kick and 15 in the fastest of some 450 captures, an estimate from video; a walk has 3.
-_SWIFT, _OFTEN = 20.0, 0.9
+# Speed of an ankle relative to its hip [m/s] that no leg exceeds for a tenth of a capture, and the quantile: 8 in a
+# file of a kick, 15 in the fastest of some 450 captures, an estimate from video; a walk has 3.
+_MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -60,7 +63,7 @@ class RetargetReport(NamedTuple):
     scale : float
         Metres of the figure per unit of the file.
     dropped : int
-        Number of frames of a calibration pose in front, such as a T-pose, that are left out.
+        Number of frames left out in front, of a calibration pose such as a T-pose.
     confidence : float
         Lead of the score of `up` over the next axis, at least 0.25; infinite where the format or the user states it.
     remarks : tuple of str
@@ -80,18 +83,20 @@ class RetargetReport(NamedTuple):
 
     @property
     def scaling(self) -> str:
-        """The file's unit, and what becomes of it, in words."""
+        """The file's unit and the scale to metres, in words."""
         return f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs"
 
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
         how = "the format or you said so" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
-        named = ", ".join(self.unused[:_NAMED])
+        named = ", ".join(self.unused[:_MAX_NAMED])
         lines = (
             f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",
             self.scaling,
             "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
-            "unused: " + (named or "none") + (f", … ({len(self.unused)} joints)" if len(self.unused) > _NAMED else ""),
+            "unused: "
+            + (named or "none")
+            + (f", … ({len(self.unused)} joints)" if len(self.unused) > _MAX_NAMED else ""),
             *([] if self.missing else ["missing: none"]),
         )
         return (*(printable(line, 4000) for line in lines), *self.notes())
@@ -110,32 +115,33 @@ class RetargetReport(NamedTuple):
 def beyond_range_remarks(poses: Array) -> Iterator[str]:
     """Joints that exceed their ranges by more than people's ranges differ."""
     excess = beyond_ranges(poses)
-    most = excess.max(axis=0)
-    told = [
-        f"{JOINTS[k].replace('_', ' ')} by {np.rad2deg(most[k]):.0f}° ({np.mean(excess[:, k] > _RANGE):.0%} of frames)"
-        for k in np.argsort(-most)
-        if most[k] > _RANGE
+    largest = excess.max(axis=0)
+    listed = [
+        f"{JOINTS[k].replace('_', ' ')} by {np.rad2deg(largest[k]):.0f}° "
+        f"({np.mean(excess[:, k] > _MIN_RANGE_EXCESS):.0%} of frames)"
+        for k in np.argsort(-largest)
+        if largest[k] > _MIN_RANGE_EXCESS
     ]
-    if told:
-        yield f"beyond the figure's range: {', '.join(told)}; see whether the file has it so"
+    if listed:
+        yield f"beyond the figure's range: {', '.join(listed)}; see whether the file has it so"
 
 
 def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
-    """Soles whose orientation only a few of n frames tell, and a spine that is never straight."""
+    """Soles calibrated from only a few of n frames, and a spine that is never straight."""
     few = [
         f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
-        if count < min(_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
+        if count < min(_MIN_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     if few:
-        told = "how the soles lie is a guess, since few frames tell"
-        yield f"{told} ({', '.join(few)}); --rest-frame would say it"
-    if calibrated.bend > _BENT:
+        remark = "how the soles lie is a guess, since few frames tell"
+        yield f"{remark} ({', '.join(few)}); --rest-frame would say it"
+    if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it"
 
 
 def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
-    """Limbs of which neither a joint nor a tip says where they end."""
+    """Limbs whose end is defined neither by a joint nor by a tip."""
     ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles}
     named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
@@ -146,13 +152,13 @@ def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
 def frame_remarks(
     broken: Sequence[int], jumps: Sequence[int], shortened: bool, fps: float, timed: bool
 ) -> Iterator[str]:  # fmt: skip
-    """Frames whose time is not stated or long, those that were lost, a last one left out, and jumps that are left."""
+    """A frame time that is not stated or long, lost frames, a last frame left out, and jumps that remain."""
     if not timed:
-        told = f"the file states no frame rate: {fps:g} a second are assumed"
-        yield f"{told}; if it is another, state it with --frame-rate"
+        remark = f"the file states no frame rate: {fps:g} a second are assumed"
+        yield f"{remark}; if it is another, state it with --frame-rate"
     if fps < COARSE:
-        told = f"a frame lasts {two_digits(1.0 / fps)} s, longer than a camera's"
-        yield f"{told}: if that is not so, state its --frame-rate"
+        remark = f"a frame lasts {two_digits(1.0 / fps)} s, longer than a camera's"
+        yield f"{remark}: if that is not so, state its --frame-rate"
     if broken:
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
@@ -165,31 +171,31 @@ def frame_remarks(
 
 
 def held_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
-    """Frames (n,) that fill a motion up at its ends; `fps` and `dropped` as in `floor_remarks`."""
+    """Padding frames (n,) at the ends of a motion; `fps` and `dropped` as in `floor_remarks`."""
     if filled.any():
-        told = f"nothing moves at all for {_lasting(spans(filled), fps, dropped)}"
-        yield f"{told}, as where programs fill a motion up: soles, limbs and floor are told by the other frames"
+        remark = f"nothing moves at all for {_duration_text(spans(filled), fps, dropped)}"
+        yield f"{remark}, as where programs fill a motion up: soles, limbs and floor are told by the other frames"
 
 
 def haste_remarks(legs: Array, fps: float) -> Iterator[str]:
-    """Legs that swing faster than a human's, as where a frame rate is stated ten times too high.
+    """Legs that swing faster than a human's, as if the frame rate is stated ten times too high.
 
     Parameters
     ----------
     legs : array of shape (n, 2, 3)
-        Ankles with respect to their hips on the figure [m].
+        The figure's ankles relative to their hips [m].
     fps : float
         Frame rate [1/s].
     """
     speeds = np.linalg.norm(np.diff(legs, axis=0), axis=2).max(axis=1, initial=0.0) * fps
-    swift = float(np.quantile(speeds, _OFTEN)) if len(speeds) else 0.0
-    if swift > _SWIFT:
-        told = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
-        yield f"{told}: if {fps:g} frames a second are not so, state the --frame-rate"
+    swift = float(np.quantile(speeds, _SPEED_QUANTILE)) if len(speeds) else 0.0
+    if swift > _MAX_ANKLE_SPEED:
+        remark = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
+        yield f"{remark}: if {fps:g} frames a second are not so, state the --frame-rate"
 
 
 def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iterator[str]:
-    """Single joints that turn on for good within a frame: the largest jumps, by the file's names."""
+    """Single joints that jump within a frame without return: the largest jumps, by the file's names."""
     if jumps:
         largest = sorted(sorted(jumps, key=lambda jump: -jump.angle)[:4])
         which = ", ".join(
@@ -201,14 +207,14 @@ def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iter
 
 
 def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
-    """Skeletons whose hips are at one place, of which one is taken."""
+    """Skeletons whose hips are at the same place, only one of which is used."""
     if hips:
-        told = f"{len(hips)} skeletons have their hips at one place ({', '.join(hips)}): that of {taken} is taken"
-        yield f'{told}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
+        remark = f"{len(hips)} skeletons have their hips at one place ({', '.join(hips)}): that of {taken} is taken"
+        yield f'{remark}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
 
 
 def floor_remarks(clearance: Array, fps: float, dropped: int) -> Iterator[str]:
-    """Where the body is above the floor for longer than a flight lasts, and where beneath it.
+    """Times at which the body is above the floor for longer than any flight, and at which it is below it.
 
     Parameters
     ----------
@@ -219,20 +225,20 @@ def floor_remarks(clearance: Array, fps: float, dropped: int) -> Iterator[str]:
     dropped : int
         Frames that were left out in front: times count from the file's first frame.
     """
-    aloft = [span for span in spans(clearance > _ALOFT) if span[1] - span[0] > _FLIGHT * fps]
+    aloft = [span for span in spans(clearance > _MIN_ALOFT_HEIGHT) if span[1] - span[0] > _MIN_ALOFT_TIME * fps]
     if aloft:
         high = max(float(clearance[start:end].max()) for start, end in aloft)
-        how = f"up to {high:.2f} m above the floor, for {_lasting(aloft, fps, dropped)}, which no flight lasts"
+        how = f"up to {high:.2f} m above the floor, for {_duration_text(aloft, fps, dropped)}, which no flight lasts"
         why = "it stands on something that is not in the file, or its place is in another unit than its bones"
         yield f"the body is {how}: {why}"
-    beneath = spans(clearance < -_BENEATH)
+    beneath = spans(clearance < -_MIN_DEPTH)
     if beneath:
-        how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_lasting(beneath, fps, dropped)}"
+        how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_duration_text(beneath, fps, dropped)}"
         yield f"parts of the body are {how}; see whether the file has it so"
 
 
-def _lasting(found: Sequence[tuple[int, int]], fps: float, dropped: int) -> str:
-    """How long spans of frames last together, and when the first one begins in the file."""
+def _duration_text(found: Sequence[tuple[int, int]], fps: float, dropped: int) -> str:
+    """Total duration of spans of frames, and start of the first one in the file, in words."""
     lasts, first = sum(end - start for start, end in found) / fps, (found[0][0] + dropped) / fps
     return f"{two_digits(lasts)} s (the first at {first:.2f} s)"
 
@@ -251,9 +257,9 @@ def axis_name(direction: Array) -> str:
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
     """The unit in which the performer's legs are about as long as the figure's."""
     if unit is not None:
-        told = f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
-        human = _SHORTEST_LEG <= leg * unit <= _LONGEST_LEG
-        return told if human else f"{told}, which are no human's: the file's unit is another"
+        description = f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+        human = _MIN_LEG_LENGTH <= leg * unit <= _MAX_LEG_LENGTH
+        return description if human else f"{description}, which are no human's: the file's unit is another"
     name, unit = min(_UNITS, key=lambda known: abs(np.log(leg * known[1] / own_leg)))
     likely = abs(np.log(leg * unit / own_leg)) < np.log(1.3)
     return f"{name} (worked out), legs {leg * unit:.2f} m" if likely else f"unknown, legs {leg:.4g} units"

@@ -1,4 +1,4 @@
-"""Roles of a skeleton's joints as a person states them, in a TOML file of lines such as ``left_thigh = "Bone.012"``."""
+"""Joint roles that the user states, in a TOML file of lines such as ``left_thigh = "Bone.012"``."""
 
 import tomllib
 from collections.abc import Sequence
@@ -12,43 +12,45 @@ from models.mocap.retargeting.bodies import of_one_body
 from models.mocap.retargeting.skeleton_roles import LIMBS, Roles, ancestry, assembled, names_of, roles_of
 
 _ROLES = (*BODIES, *(f"{side}_{end}" for side in ("left", "right") for end in ("wrist", "toe")))
-_LIMIT = 100_000  # bytes
-_NEEDED = tuple(f"{side}_{part}" for side in ("left", "right") for part in ("thigh", "shank"))
+_SIZE_LIMIT = 100_000  # bytes
+_REQUIRED_ROLES = tuple(f"{side}_{part}" for side in ("left", "right") for part in ("thigh", "shank"))
 
 
 def stated_roles(
     path: Path, motion: SourceMotion, people: Sequence[Sequence[int]]
 ) -> tuple[SourceMotion, Roles]:  # fmt: skip
-    """The roles in a file, for the joints of a motion, and the motion of the body that they are of.
+    """The roles in a file, for the joints of a motion, and the motion of the body to which they belong.
 
-    Roles are the figure's bodies, and where forearms and feet end: ``left_wrist`` (if the hand is another joint beyond
-    it) and ``left_toe``. Thighs and shanks have to be there. Pelvis, abdomen, chest and head are found as without a
-    file where it leaves them out; of the others, those that it leaves out have no joint. A file of the pelvis alone
-    says whose body is meant: all its other joints are found by their names.
+    Roles are the figure's bodies, and the ends of forearms and feet: ``left_wrist`` (if the hand is another joint
+    beyond it) and ``left_toe``. Thighs and shanks are required. Pelvis, abdomen, chest and head, if left out, are found
+    as without a file; other roles that are left out have no joint. A file with the pelvis alone selects a person: all
+    other joints are found by their names.
 
     Parameters
     ----------
     path : Path
         TOML file.
     motion : SourceMotion
-        The motion of one person or more.
+        The motion of one or more people.
     people : sequence of sequences of int
-        Their hips, of `bodies`.
+        Their hips, from `bodies`.
 
     Raises
     ------
     MotionFileError
-        If the file cannot be read, a role or a joint is unknown, two roles have one joint, a thigh or a shank is
+        If the file cannot be read, a role or a joint is unknown, two roles have the same joint, a thigh or a shank is
         missing, or a part of a limb is above the one before it.
     """
-    stated = _read(path)
-    whole = _named(path, stated, motion)
-    if not (alone := set(whole) == {"pelvis"}) and (missing := [role for role in _NEEDED if role not in whole]):
+    stated = _read_toml(path)
+    whole = _joints_of_roles(path, stated, motion)
+    if not (pelvis_only := set(whole) == {"pelvis"}) and (
+        missing := [role for role in _REQUIRED_ROLES if role not in whole]
+    ):
         raise MotionFileError(path, 0, f"no joint for {', '.join(missing)}", f'{missing[0]} = "NAME OF A JOINT"')
-    hips = [joint for copies in people for joint in (copies if alone else copies[:1])]
+    hips = [joint for copies in people for joint in (copies if pelvis_only else copies[:1])]
     motion = of_one_body(motion, hips, next(iter(whole.values()))) if len(hips) > 1 else motion
-    named = _named(path, stated, motion)
-    if alone:
+    named = _joints_of_roles(path, stated, motion)
+    if pelvis_only:
         roles = roles_of(motion.joints, motion.parents, named["pelvis"])
     else:
         _check_order(path, named, motion)
@@ -58,7 +60,7 @@ def stated_roles(
     return motion, roles
 
 
-def _named(path: Path, stated: dict[str, object], motion: SourceMotion) -> dict[str, int]:
+def _joints_of_roles(path: Path, stated: dict[str, object], motion: SourceMotion) -> dict[str, int]:
     """Joint of every role."""
     named: dict[str, int] = {}
     for role, joint in stated.items():
@@ -67,7 +69,7 @@ def _named(path: Path, stated: dict[str, object], motion: SourceMotion) -> dict[
         indices = [k for k, name in enumerate(motion.joints) if name == joint]
         if not isinstance(joint, str) or len(indices) != 1:
             what = f"{len(indices) or 'no'} joint{'s' * (len(indices) > 1)} of {motion.path.name} called {joint!r}"
-            raise MotionFileError(path, 0, f"{role}: {what}", f"one of {_listed(motion.joints)}")
+            raise MotionFileError(path, 0, f"{role}: {what}", f"one of {_name_list(motion.joints)}")
         if other := [known for known, index in named.items() if index == indices[0]]:
             raise MotionFileError(path, 0, f"{joint} is both {other[0]} and {role}", "a joint for one role")
         named[role] = indices[0]
@@ -85,13 +87,13 @@ def _check_order(path: Path, named: dict[str, int], motion: SourceMotion) -> Non
                     raise MotionFileError(path, 0, what, f"{' and then '.join(parts)} on the way from the pelvis out")
 
 
-def _read(path: Path) -> dict[str, object]:
+def _read_toml(path: Path) -> dict[str, object]:
     try:
-        return tomllib.loads(read_text(path, _LIMIT, "role file").decode("utf-8"))
+        return tomllib.loads(read_text(path, _SIZE_LIMIT, "role file").decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise MotionFileError(path, 0, f"is no TOML ({error})", 'lines such as left_thigh = "NAME"') from None
 
 
-def _listed(joints: tuple[str, ...]) -> str:
+def _name_list(joints: tuple[str, ...]) -> str:
     """The joints' names, or the first forty."""
     return ", ".join(joints[:40]) + (", …" if len(joints) > 40 else "")

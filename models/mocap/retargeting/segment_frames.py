@@ -12,7 +12,7 @@ def frames(left: Array, along: Array) -> Array:
     """Rotations that turn y into `left` and z as nearly as possible into `along`, shape (n, 4)."""
     x = unit(np.cross(left, along))
     matrices = np.stack((x, left, np.cross(x, left)), axis=-1)
-    # Where both are parallel, the frame is undefined; the substitute has no weight, since such a trunk is not straight.
+    # If both are parallel, the frame is undefined; the substitute has no weight, since such a trunk is not straight.
     matrices[np.isnan(matrices).any(axis=(1, 2))] = np.eye(3)
     return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
 

@@ -1,8 +1,8 @@
 """Assignment of a foreign skeleton's joints to the figure's segments, by name and by position in the joint tree.
 
-Names alone do not decide: each part of a limb lies below the one before, and a limb that goes on by a name that is not
-known is refused. Pelvis, chest and abdomen have many names, so they are found in the tree: the pelvis is where the legs
-meet, the chest where the arms meet, the abdomen halfway between. The tests have the names of some forty programs.
+Names alone do not decide: each part of a limb lies below the one before, and a limb that continues with an unknown name
+is refused. Pelvis, chest and abdomen have many names, so they are found in the tree: the pelvis is where the legs meet,
+the chest where the arms meet, the abdomen halfway between. The tests cover the names of some forty programs.
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,8 @@ from typing import NamedTuple
 from models.humanoid.skeleton import BODIES, SEGMENTS
 from models.mocap.retargeting.joint_names import JointName, joint_names
 
-# Words for each part, with their rank: a word that also means a neighbour (a leg is a shank below an upper leg, and a
-# thigh above a knee) gives way to one that does not.
+# Words for each part, with their rank: a word that may also mean a neighbouring part (a leg is a shank below an upper
+# leg, and a thigh above a knee) ranks behind one that may not.
 _LEG = {
     "thigh": {"femur": 0, "thigh": 0, "upleg": 0, "upperleg": 0, "uleg": 0, "legupper": 0, "hip": 1,
               "leg": 2},
@@ -33,15 +33,15 @@ LIMBS = (tuple(_LEG), (*_ARM, "hand"))  # parts from the trunk out
 _HAND = ("fingerbase", "hand")  # beyond the wrist
 _CHEST = frozenset(("chest", "upperchest", "thorax", "torso", "spine", "upperbody", "t8"))
 _NECK = frozenset(("neck", "lowerneck", "upperneck", "necklower", "neckupper", "necktwist"))
-_SIDED = frozenset(word for limb in (_LEG, _ARM) for words in limb.values() for word in words) | {*_HAND}
-_CENTRAL = _CHEST | _NECK | {"head"}
-_OPTIONAL = ("clavicle", "toe")  # a limb without one is whole
-# Costs of a limb's chain, each beyond all sums of the next, which is that of a joint further from the root.
-_LACKING, _LEAF, _RANK = 10_000_000, 1_000_000, 10_000
+_SIDED_WORDS = frozenset(word for limb in (_LEG, _ARM) for words in limb.values() for word in words) | {*_HAND}
+_CENTRAL_WORDS = _CHEST | _NECK | {"head"}
+_OPTIONAL_PARTS = ("clavicle", "toe")  # parts without which a limb is complete
+# Costs of a limb's chain, in decreasing priority: each exceeds all sums of the next; the last is 1 a level of depth.
+_MISSING_COST, _LEAF_COST, _RANK_COST = 10_000_000, 1_000_000, 10_000
 
 
 class Roles(NamedTuple):
-    """Joints by the part they play.
+    """Joints by the part of the body that they represent.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Roles(NamedTuple):
     ends : dict from figure body to joint index
         The joint at which the segments of arms and legs end.
     spine : tuple of int
-        Joints from beyond the pelvis to the chest, of which the abdomen is one; empty where the abdomen is stated.
+        Joints from beyond the pelvis to the chest, one of which is the abdomen; empty if the abdomen is stated.
     """
 
     segments: dict[str, int]
@@ -59,7 +59,7 @@ class Roles(NamedTuple):
 
 
 def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | None = None) -> Roles | str:
-    """The roles of a skeleton's joints; or, where they do not tell a human's, the part that no joint is taken for.
+    """The roles of a skeleton's joints; or, if it is not recognised as a human's, the part without a joint.
 
     The pelvis is found, too, unless it is stated.
     """
@@ -67,7 +67,7 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | No
     named: dict[str, int] = {} if pelvis is None else {"pelvis": pelvis}
     for side in ("left", "right"):
         for limb in (_LEG, _ARM):
-            named |= _limb(side, limb, names, parents)
+            named |= _find_limb(side, limb, names, parents)
         if (toe := named.get(f"{side}_toe")) is not None:
             if f"{side}_foot" not in named and parents[toe] == named.get(f"{side}_shank"):
                 named[f"{side}_foot"] = named.pop(f"{side}_toe")  # an ankle, by what is right above it
@@ -93,7 +93,7 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | No
 
 
 def has_legs(top: int, joints: tuple[str, ...], parents: tuple[int, ...]) -> bool:
-    """Whether a thigh and a shank below it, of both sides, are below a joint, by the names there alone."""
+    """Whether both sides' thighs, each with a shank below it, are below a joint, by the names of the joints there."""
     below = joints_below(top, parents)
     names = dict(zip(below, names_of(tuple(joints[k] for k in below)), strict=True))
     legs = set[str]()
@@ -108,7 +108,7 @@ def has_legs(top: int, joints: tuple[str, ...], parents: tuple[int, ...]) -> boo
 
 def names_of(joints: tuple[str, ...]) -> tuple[JointName, ...]:
     """Sides and words of joints' names."""
-    return joint_names(joints, _SIDED, _CENTRAL)
+    return joint_names(joints, _SIDED_WORDS, _CENTRAL_WORDS)
 
 
 def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]) -> Roles | str:
@@ -117,9 +117,9 @@ def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tupl
     Parameters
     ----------
     named : dict from part to joint index
-        Figure bodies, and ``left_wrist``, ``left_toe`` and so on where forearms and feet end.
+        Figure bodies, and ``left_wrist``, ``left_toe`` and so on for the ends of forearms and feet.
     names : tuple of JointName
-        What the joints' names say.
+        The joints' parsed names.
     parents : tuple of int
         Parent of each joint.
     """
@@ -133,13 +133,13 @@ def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tupl
     if pelvis is None or any(part != "pelvis" and joint == pelvis for part, joint in named.items()):
         return "pelvis"
     segments = {"pelvis": pelvis} | {part: named[part] for part in BODIES if part in named}
-    spine = _spine(pelvis, named, names, parents)
+    spine = _find_spine(pelvis, named, names, parents)
     choice = () if "abdomen" in segments else tuple(spine)
     if spine:
         segments.setdefault("chest", spine[-1])
         if len(spine) > 1:
             segments.setdefault("abdomen", middle_of(spine))
-    if "head" not in segments and (head := _head(spine, named, names, parents)) is not None:
+    if "head" not in segments and (head := _find_head(spine, named, names, parents)) is not None:
         segments["head"] = head
     ends: dict[str, int] = {}
     for side in ("left", "right"):
@@ -158,17 +158,17 @@ def middle_of(spine: Sequence[int]) -> int:
     return spine[(len(spine) - 1) // 2]
 
 
-def _limb(
+def _find_limb(
     side: str, limb: dict[str, dict[str, int]], names: tuple[JointName, ...], parents: tuple[int, ...]
 ) -> dict[str, int]:
     """The likeliest joints of a limb's parts, each below the one before.
 
-    Of all such chains the one that lacks least; then with fewest leaves, of words that mean their part alone, and
-    nearest to the root. Two joints of one word, such as ``thigh.L`` and ``thigh.L.001``, are one part.
+    Of all such chains, the one with the fewest missing parts; then the one with the fewest leaves, with words that mean
+    only their part, and nearest to the root. Two joints with one word (``thigh.L``, ``thigh.L.001``) are one part.
     """
-    inner, parts = set(parents), tuple(limb)
+    parent_joints, parts = set(parents), tuple(limb)
     above = {k: set(ancestry(k, parents)[1:]) for k, name in enumerate(names) if name.side == side}
-    lacking = [_LACKING * (1 if part in _OPTIONAL else 10) for part in parts]
+    missing_costs = [_MISSING_COST * (1 if part in _OPTIONAL_PARTS else 10) for part in parts]
     # Chains that begin at a part: its index, the cost, and the parts' joints.
     chains: list[tuple[int, int, tuple[tuple[str, int], ...]]] = [(len(parts), 0, ())]
     for k in reversed(range(len(parts))):
@@ -177,34 +177,40 @@ def _limb(
             if (rank := limb[parts[k]].get(names[joint].bare)) is None:
                 continue
             cost, rest = min(
-                (cost + sum(lacking[k + 1 : first]), chain)
+                (cost + sum(missing_costs[k + 1 : first]), chain)
                 for first, cost, chain in chains
                 if not chain or (joint in above[chain[0][1]] and names[joint].bare != names[chain[0][1]].bare)
             )
-            leaf = _LEAF if k < len(parts) - 1 else 1  # where a limb ends, a leaf is as likely
-            cost += leaf * (joint not in inner) + _RANK * (2 * rank + names[joint].noisy) + len(above[joint])
+            leaf = _LEAF_COST if k < len(parts) - 1 else 1  # where a limb ends, a leaf is as likely
+            cost += (
+                leaf * (joint not in parent_joints) + _RANK_COST * (2 * rank + names[joint].noisy) + len(above[joint])
+            )
             longer.append((k, cost, ((f"{side}_{parts[k]}", joint), *rest)))
         chains += longer
-    return dict(min((cost + sum(lacking[:first]), chain) for first, cost, chain in chains)[1])
+    return dict(min((cost + sum(missing_costs[:first]), chain) for first, cost, chain in chains)[1])
 
 
 def _middle_toe(toe: int, joints: tuple[str, ...], names: tuple[JointName, ...], parents: tuple[int, ...]) -> int:
-    """Of toes side by side the middle one, in the order of their names: a foot points where it does."""
+    """Of toes side by side, the middle one in the order of their names: it gives the direction of the foot."""
     limb = ancestry(toe, parents)
     foot = next((k for k in limb if names[k].bare != names[toe].bare), -1)
-    alike = [k for k, name in enumerate(names)
+    toes = [k for k, name in enumerate(names)
              if name == names[toe] and len(above := ancestry(k, parents)) == len(limb) and foot in above]  # fmt: skip
-    return sorted(alike, key=lambda k: joints[k])[(len(alike) - 1) // 2]
+    return sorted(toes, key=lambda k: joints[k])[(len(toes) - 1) // 2]
 
 
-def _spine(
+def _find_spine(
     pelvis: int, named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]
 ) -> list[int]:  # fmt: skip
-    """Joints from the pelvis (or from what it and the chest hang on) to the chest, where the arms meet."""
+    """Joints from the pelvis (or from its common ancestor with the chest) to the chest, where the arms meet."""
     arms = [named[part] for part in ("left_upper_arm", "right_upper_arm") if part in named]
     chest = named.get("chest", _meeting_point(arms[0], arms[1], parents) if len(arms) == 2 else None)
     if chest is None and len(arms) < 2:
-        trunk = [k for k in _free(named, parents) if names[k].bare in _CHEST and not names[k].side and k != pelvis]
+        trunk = [
+            k
+            for k in _unassigned_joints(named, parents)
+            if names[k].bare in _CHEST and not names[k].side and k != pelvis
+        ]
         chest = max(trunk, key=lambda k: (k in parents, len(ancestry(k, parents))), default=None)
     if chest is None or chest == pelvis:
         return []
@@ -217,11 +223,11 @@ def _spine(
     return path
 
 
-def _head(
+def _find_head(
     spine: list[int], named: dict[str, int], names: tuple[JointName, ...], parents: tuple[int, ...]
 ) -> int | None:  # fmt: skip
-    """The head, or the last joint of the neck, by name; or the end of a chain that goes on beyond the chest."""
-    free = [k for k in _free(named, parents) if not names[k].side]
+    """The head, or the last joint of the neck, by name; or the end of a chain that continues beyond the chest."""
+    free = [k for k in _unassigned_joints(named, parents) if not names[k].side]
     heads = [k for k in free if names[k].bare == "head"]
     if heads:
         return min(heads, key=lambda k: (k not in parents, names[k].noisy, len(ancestry(k, parents))))
@@ -229,13 +235,13 @@ def _head(
         return max(necks, key=lambda k: len(ancestry(k, parents)))
     words = {names[k].bare for k in spine} - {""}
     last = end = spine[-1] if spine else -1
-    while spine and (further := [k for k in free if parents[k] == end and names[k].bare in words]):
-        end = further[0]
+    while spine and (beyond := [k for k in free if parents[k] == end and names[k].bare in words]):
+        end = beyond[0]
     return end if end != last else None
 
 
-def _free(named: dict[str, int], parents: tuple[int, ...]) -> list[int]:
-    """Joints that neither carry a limb nor belong to one."""
+def _unassigned_joints(named: dict[str, int], parents: tuple[int, ...]) -> list[int]:
+    """Joints that are neither part of a limb nor an ancestor of one."""
     limbs = {joint for part, joint in named.items() if part.startswith(("left", "right"))}
     carrying = {joint for limb in limbs for joint in ancestry(limb, parents)}
     return [k for k in range(len(parents)) if k not in carrying and limbs.isdisjoint(ancestry(k, parents))]
@@ -256,7 +262,7 @@ def _meeting_point(one: int, other: int, parents: tuple[int, ...]) -> int | None
 
 
 def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
-    """A joint and all its descendants: the body without nodes that programs put above or beside it."""
+    """A joint and all its descendants."""
     below = {top}
     for joint, parent in enumerate(parents):
         if parent in below:
@@ -265,7 +271,7 @@ def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
 
 
 def unused(roles: Roles, joints: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the joints that play no part."""
+    """Names of the joints without a role."""
     used = {*roles.segments.values(), *roles.ends.values()}
     return tuple(joint for index, joint in enumerate(joints) if index not in used)
 

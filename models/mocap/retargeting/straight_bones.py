@@ -7,12 +7,13 @@ from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
-# Largest distance from the bone, as a share of its length: half or twice refuses and changes none of 17 captures.
-_OFF = 0.15
+# Largest distance from the bone, as a fraction of its length: half or twice neither refuses nor changes any of 17
+# captures.
+_MAX_DISTANCE_RATIO = 0.15
 
 
 def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
-    """Refuse a limb that bends where no part begins: a joint was taken for a part that another one plays.
+    """Refuse a limb that bends at a joint where no part begins: the parts were then assigned to the wrong joints.
 
     Parameters
     ----------
@@ -21,12 +22,12 @@ def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
     roles : Roles
         Which joint plays which part.
     positions : array of shape (n, joints, 3)
-        Of its joints.
+        Positions of its joints.
 
     Raises
     ------
     MotionFileError
-        If a joint between a part and its end is on average off the line between them.
+        If the median distance of a joint between a part and its end from the line between them is too large.
     """
     for part, end in roles.ends.items():
         start = roles.segments[part]
@@ -35,8 +36,8 @@ def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
         for joint in ancestry(motion.parents[end], motion.parents):
             if joint == start:
                 break
-            away = np.linalg.norm(np.cross(positions[:, joint] - positions[:, start], bone), axis=1)
-            if np.median(away) > _OFF * np.median(length) ** 2:
+            moment = np.linalg.norm(np.cross(positions[:, joint] - positions[:, start], bone), axis=1)
+            if np.median(moment) > _MAX_DISTANCE_RATIO * np.median(length) ** 2:
                 name, known = motion.joints[joint], f"{motion.joints[start]} and {motion.joints[end]}"
                 what = f"the {part.replace('_', ' ')} bends at {name}, between {known}"
                 raise MotionFileError(motion.path, 0, what, "names that are known, or --roles FILE that says them")

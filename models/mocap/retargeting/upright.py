@@ -7,17 +7,18 @@ lowest joints,
 
 with b from the feet to the trunk's upper end; σ the spread (5 to 95 %) of the lowest joint's height; d the distance of
 the middle of hips and shoulders outside the hull of the joints nearest to the floor, seen along u; l the length of the
-legs; and β = 0.1 for +Y and +Z, the only axes that programs write. Only what stands on something has to do so: frames
-count in which a joint is at rest, or, if those are few, the calmest ones. A somersault is judged by its stances.
+legs; and β = 0.1 for +Y and +Z, the only axes that programs write. The criteria hold only while the body is supported,
+so only frames count in which a joint is at rest or, if those are few, the calmest ones. A somersault is judged by its
+stances.
 
-What programs write by custom is evidence besides: in most files floors are at zero, and rigs stand along the vertical
-in their zero pose. A body that lies throughout stands along an axis of the floor as well as one that stands, and is
-refused where it is flat on the plane zero of +Y or +Z, along which its rig stands. Runs whose curves leave their weight
-beside their feet need a lower score where both confirm it. A body that stands along an axis of which all others are far
-behind needs no least score: it climbs over boxes or stairs. Where the best axis is not the one along which the rig is
-drawn, it has to lead by more, and by far if the body turns towards that at times: what falls is calm only where it
-lies. A body that sits, trunk and shanks along the axis of its rig and thighs across, is upright, though its weight is
-beside its feet.
+Conventions of programs are further evidence: in most files the floor is at zero, and rigs stand along the vertical in
+their zero pose. A body that lies throughout fits an axis in the floor as well as a standing body fits the vertical; it
+is refused if it is flat on the plane zero of +Y or +Z along which its rig stands. Runs on curves, whose weight is
+beside their feet, need a lower score if both conventions confirm it. A body that stands along an axis far ahead of all
+others needs no least score: it climbs over boxes or stairs. If the best axis is not the one along which the rig is
+drawn, it has to lead by more, and by far if the body turns towards that axis at times: a falling body is calm only
+while it lies. A body that sits, with trunk and shanks along the axis of its rig and thighs across, is upright although
+its weight is beside its feet.
 """
 
 from dataclasses import replace
@@ -33,46 +34,49 @@ from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines, 
 from models.mocap.retargeting.skeleton_roles import Roles
 
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
-# Half or twice of β, or of any of the numbers below but the least scores, finds the same axes for 17 captures.
-_CUSTOM = 0.1  # β
+# Half or twice β, or any of the values below except the least scores, finds the same axes for 17 captures.
+_CONVENTION_BONUS = 0.1  # β
 # Least lead of the best axis over the next: the 28 captures of docs/validation/prepared-captures.md have 0.72 and more.
-_CERTAIN = 0.25
-# Least score of the best axis where bodies rest on the ground, and where they hardly do. In the same captures it is
-# 0.2 and more, even of cartwheels, and 0.59 and more of runs; wrong axes of pieces of half a second have 0.1 and less,
-# and 0.37 and less.
-_LEAST_RESTING, _LEAST_MOVING = 0.15, 0.45
+_MIN_LEAD = 0.25
+# Least score of the best axis for bodies that rest on the ground, and for bodies that hardly do. In the same captures
+# it is 0.2 and more, even for cartwheels, and 0.59 and more for runs; wrong axes of pieces of half a second have at
+# most 0.1 and 0.37.
+_MIN_RESTING_SCORE, _MIN_MOVING_SCORE = 0.15, 0.45
 # Mean cosine of b to the best axis, and its lead, from which it needs no least score: a body that crawls or swims along
-# an axis leads over the vertical by 0.1 at most. Of 891 windows of 0.5 to 20 s of 120 captures, no wrong axis that had
-# less than its least score had both: the nearest had 0.87 and 1.1.
-_STANDING, _ALONE = 0.9, 1.0
-# Cosine of trunk and b in some frame to the axis along which the rig is drawn, and its lead, from which that needs no
-# least score: in 3271 windows of 0.5 to 20 s of 180 captures this finds 41 more axes, and no wrong one.
-_AS_DRAWN, _LEADS = 0.95, 0.5
-# Least lead of an axis along which the rig is not drawn, and cosine of trunk or b to that of the rig in some frame
-# from which it needs the second; none suffices where the body stands as drawn at times. Of 53 wrong axes of 4878 such
-# windows, of falls, jumps and climbs, those with a larger cosine lead by 0.96 at most, the others by 0.67; two whole
-# captures whose rigs are drawn otherwise by 0.72 and 1.55.
-_AHEAD, _FAR_AHEAD, _TURNED = 0.7, 1.2, 0.5
-# Mean cosine of trunk and shanks of a body that sits to the vertical, and largest one of its thighs: 0.9 and more, and
-# 0.06 to 0.59, in 23 captures of people on chairs and a bicycle.
-_SITS, _ACROSS = 0.85, 0.7
-# Distance of the body's middle outside its lowest joints [leg lengths] beyond which something that is not in the file
-# bears it, and for longer than what [s]: of 200 captures, people on chairs and cliffs, and five others.
-_BESIDE, _STAYS = 0.25, 1.0
-_VOLUME = 10.0  # height of the highest capture volumes [leg lengths]: what climbs more has its root in another unit
-_CALM = 0.4  # least share of the frames that are judged
-_BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
-# Largest height of the lowest joint of a body that lies on a floor at zero, and of one that runs there, whose lowest
-# joint may be an ankle [leg lengths]: 0.02 and 0.04 in two captures, and 0.01 to 0.19 in eight runs of low scores.
-_ON_ZERO, _OVER_ZERO = 0.1, 0.2
-_ALONG = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the vertical
-_FLAT = 0.5  # largest height of a body that lies [leg lengths]: 0.2 and 0.3 in two captures
-_SAMPLES = 200  # number of frames that are evaluated
-_DIRECTIONS = 16  # directions in which the hull of the bearing joints is bounded
-# Length of an animal's trunk [leg lengths], 1.0 in two elephants and 1.2 to 1.4 in 12 dogs, and the largest mean cosine
-# of one that is across the legs to them: 0.16 in these, and 0.84 and more in ten humans of another make, of 0.7 to 1.3.
-_LONG, _LEVEL = 0.8, 0.5
-_SURE = 0.15  # least mean sine of the knees' bend, and cosine of the toes' direction, that tell left from right
+# an axis leads over the vertical by at most 0.1. In 891 windows of 0.5 to 20 s of 120 captures, no wrong axis with less
+# than its least score had both: the nearest had 0.87 and 1.1.
+_MIN_STANDING_COSINE, _MIN_STANDING_LEAD = 0.9, 1.0
+# Cosine of both trunk and b, at some time, to the axis along which the rig is drawn, and that axis's lead, from which
+# it needs no least score: in 3271 windows of 0.5 to 20 s of 180 captures this finds 41 more axes, and no wrong one.
+_MIN_DRAWN_COSINE, _MIN_DRAWN_LEAD = 0.95, 0.5
+# Least lead of an axis along which the rig is not drawn: the first value, or the second if the cosine of trunk or b to
+# the rig's axis exceeds the third at some time; no lead suffices if the body stands as drawn at some time. Of 53 wrong
+# axes in 4878 such windows (falls, jumps and climbs), those with a larger cosine lead by at most 0.96, the others by
+# 0.67; two whole captures whose rigs are drawn along another axis lead by 0.72 and 1.55.
+_MIN_OTHER_LEAD, _MIN_TURNED_LEAD, _TURNED_COSINE = 0.7, 1.2, 0.5
+# Least mean cosine of trunk and shanks of a sitting body to the vertical, and largest one of its thighs: 0.9 and more,
+# and 0.06 to 0.59, in 23 captures of people on chairs and a bicycle.
+_MIN_SITTING_COSINE, _MAX_THIGH_COSINE = 0.85, 0.7
+# Distance of the body's middle outside its lowest joints [leg lengths] and time [s] beyond which something that is not
+# in the file supports it: in 200 captures, this finds people on chairs and cliffs, and five others.
+_MIN_PROPPED_DISTANCE, _MIN_PROPPED_TIME = 0.25, 1.0
+_MAX_CLIMB = 10.0  # height of the highest capture volumes [leg lengths]: a larger climb means a root in another unit
+_CALM_FRACTION = 0.4  # least fraction of the frames that are judged
+# Height above the lowest joint up to which joints may bear load [leg lengths]: ankles above toes.
+_MAX_SUPPORT_HEIGHT = 0.12
+# Largest height of the lowest joint above a floor at zero for a lying body, and for a running one, whose lowest joint
+# may be an ankle [leg lengths]: 0.02 and 0.04 in two captures, and 0.01 to 0.19 in eight runs with low scores.
+_MAX_LYING_OFFSET, _MAX_RUNNING_OFFSET = 0.1, 0.2
+_MIN_ALONG_COSINE = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the vertical
+_MAX_LYING_HEIGHT = 0.5  # largest height of a lying body [leg lengths]: 0.2 and 0.3 in two captures
+_SAMPLE_COUNT = 200  # number of frames that are evaluated
+_DIRECTION_COUNT = 16  # directions in which the hull of the bearing joints is bounded
+# Least length of an animal's trunk [leg lengths] (1.0 in two elephants, 1.2 to 1.4 in 12 dogs), and largest mean cosine
+# between trunk and legs if it is across them: 0.16 in these, and 0.84 and more in ten human skeletons of another
+# make, with trunks of 0.7 to 1.3.
+_MIN_ANIMAL_TRUNK, _MAX_ANIMAL_COSINE = 0.8, 0.5
+# Least mean sine of the knees' bend, and cosine of the toes' direction, that distinguish left from right.
+_MIN_EVIDENCE = 0.15
 
 
 class Up(NamedTuple):
@@ -100,24 +104,24 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     """
     if (name := said or motion.up) is not None:
         return Up(np.array(AXES[name], dtype=np.float64), np.inf)
-    # Frames that were lost stand in the zero pose, which need not be upright.
+    # Lost frames are in the zero pose, which need not be upright.
     lost = motion.at_rest(range(len(motion.joints)))[-len(positions) :]
-    calm, rests = _calm(positions / lines.leg, motion.fps, lost)
-    frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLES).round().astype(int))]
-    scores = {name: _score(name, lines, positions, frames) for name in AXES}
+    calm, at_rest = _calm_frames(positions / lines.leg, motion.fps, lost)
+    frames = calm[np.unique(np.linspace(0, len(calm) - 1, _SAMPLE_COUNT).round().astype(int))]
+    scores = {name: _axis_score(name, lines, positions, frames) for name in AXES}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
     lead = scores[best] - scores[second]
-    rig = _rig(_zero_pose(motion, roles), lines, ~lost)
-    if (lying := _lies_along(best, rig.zero, positions[frames] / lines.leg)) is not None:
+    rig = _describe_rig(_zero_pose_direction(motion, roles), lines, ~lost)
+    if (lying := _lying_axis(best, rig.zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
-    least = _least_score(best, lead, rests, rig, lines, positions, frames)
-    if rig.drawn is not None and _sits(lines, frames, np.array(AXES[rig.drawn])):
-        best, lead, least = rig.drawn, max(lead, _CERTAIN), -np.inf
+    min_score = _min_score(best, lead, at_rest, rig, lines, positions, frames)
+    if rig.drawn is not None and _is_sitting(lines, frames, np.array(AXES[rig.drawn])):
+        best, lead, min_score = rig.drawn, max(lead, _MIN_LEAD), -np.inf
     elif rig.contradicts(best, lead):
-        least, second = np.inf, str(rig.drawn)
+        min_score, second = np.inf, str(rig.drawn)
     if np.isnan(lines.ankles).any():
-        least = np.inf  # knees of a squat are no support
-    if lead < _CERTAIN or scores[best] < least:
+        min_score = np.inf  # without ankles, the lowest joints are knees, which do not support a squat
+    if lead < _MIN_LEAD or scores[best] < min_score:
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
         )
@@ -125,18 +129,18 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
 
 
 class _Rig(NamedTuple):
-    """How a rig is drawn.
+    """Orientation of a rig in its zero pose.
 
     Attributes
     ----------
     zero : array of shape (3,)
-        Direction from the feet to the trunk's upper end with all rotations zero; 0 where there is none.
+        Direction from the feet to the trunk's upper end with all rotations zero; 0 if it is undefined.
     drawn : str or None
-        The axis of +Y and +Z along which that is.
+        The axis, +Y or +Z, along which this direction is.
     turned : float
-        Largest cosine of trunk or body to it in any frame; −1 without such an axis.
+        Largest cosine of trunk or body to this axis in any frame; −1 without such an axis.
     stands : bool
-        Whether both are along it at times.
+        Whether both are along it at some time.
     """
 
     zero: Array
@@ -145,56 +149,59 @@ class _Rig(NamedTuple):
     stands: bool
 
     def contradicts(self, best: str, lead: float) -> bool:
-        """Whether the rig is drawn along another axis than the best one, which does not lead by far enough for that."""
-        least = np.inf if self.stands else _FAR_AHEAD if self.turned > _TURNED else _AHEAD
-        return self.drawn not in (best, None) and lead < least
+        """Whether the rig is drawn along another axis than the best one, whose lead is too small to overrule this."""
+        min_lead = np.inf if self.stands else _MIN_TURNED_LEAD if self.turned > _TURNED_COSINE else _MIN_OTHER_LEAD
+        return self.drawn not in (best, None) and lead < min_lead
 
 
-def _rig(zero: Array, lines: BodyLines, kept: Mask) -> _Rig:
-    """How the rig is drawn, and how the body turns towards that in the frames that are kept."""
-    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _ALONG), None)
+def _describe_rig(zero: Array, lines: BodyLines, kept: Mask) -> _Rig:
+    """The rig's axis, and how the body is oriented to it in the frames `kept`."""
+    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _MIN_ALONG_COSINE), None)
     if drawn is None or not kept.any():
         return _Rig(zero, drawn, -1.0, False)
-    most = [float((part[kept] @ AXES[drawn]).max()) for part in (_standing(lines), unit(lines.trunk))]
-    return _Rig(zero, drawn, max(most), min(most) > _AS_DRAWN)
+    largest = [float((part[kept] @ AXES[drawn]).max()) for part in (_body_directions(lines), unit(lines.trunk))]
+    return _Rig(zero, drawn, max(largest), min(largest) > _MIN_DRAWN_COSINE)
 
 
-def _least_score(
-    best: str, lead: float, rests: bool, rig: _Rig, lines: BodyLines, positions: Array, frames: IntArray
+def _min_score(
+    best: str, lead: float, at_rest: bool, rig: _Rig, lines: BodyLines, positions: Array, frames: IntArray
 ) -> float:
-    """Score that the best axis needs; −inf if it stands out by its lead alone."""
+    """Score that the best axis needs; −inf if its lead alone suffices."""
     lowest = (positions[frames] @ AXES[best]).min(axis=1) / lines.leg
-    alone = float((_standing(lines)[frames] @ AXES[best]).mean()) > _STANDING and lead > _ALONE
-    as_drawn = rig.drawn == best and rig.stands and lead > _LEADS
-    if (alone or as_drawn) and np.ptp(lowest) < _VOLUME:
+    stands_out = (
+        float((_body_directions(lines)[frames] @ AXES[best]).mean()) > _MIN_STANDING_COSINE
+        and lead > _MIN_STANDING_LEAD
+    )
+    stands_as_drawn = rig.drawn == best and rig.stands and lead > _MIN_DRAWN_LEAD
+    if (stands_out or stands_as_drawn) and np.ptp(lowest) < _MAX_CLIMB:
         return -np.inf
-    along = min(rig.zero @ AXES[best], unit(lines.trunk)[frames].mean(axis=0) @ AXES[best]) > _ALONG
-    confirmed = along and np.median(np.abs(lowest)) < _OVER_ZERO
-    return _LEAST_RESTING if rests or confirmed else _LEAST_MOVING
+    along = min(rig.zero @ AXES[best], unit(lines.trunk)[frames].mean(axis=0) @ AXES[best]) > _MIN_ALONG_COSINE
+    confirmed = along and np.median(np.abs(lowest)) < _MAX_RUNNING_OFFSET
+    return _MIN_RESTING_SCORE if at_rest or confirmed else _MIN_MOVING_SCORE
 
 
-def _sits(lines: BodyLines, frames: IntArray, up: Array) -> bool:
+def _is_sitting(lines: BodyLines, frames: IntArray, up: Array) -> bool:
     """Whether trunk and shanks are along an axis, and thighs across it."""
     thighs, shanks = lines.hips - lines.knees, lines.knees - lines.ankles
     trunk, thigh, shank = (
         float((unit(part)[frames] @ up).mean()) for part in (lines.trunk, thighs.mean(axis=1), shanks.mean(axis=1))
     )
-    return min(trunk, shank) > _SITS and thigh < _ACROSS
+    return min(trunk, shank) > _MIN_SITTING_COSINE and thigh < _MAX_THIGH_COSINE
 
 
-def _lies_along(best: str, zero: Array, positions: Array) -> str | None:
-    """Another axis than the best along which a body lies on the floor [leg lengths], if there is one."""
+def _lying_axis(best: str, zero: Array, positions: Array) -> str | None:
+    """The vertical (+Y or +Z) if, contrary to the best axis, the body lies on a floor; positions in leg lengths."""
     heights = {name: positions @ np.array(AXES[name], dtype=np.float64) for name in (best, "+Y", "+Z")}
-    off = {name: float(np.quantile(np.abs(h.min(axis=1)), 0.9)) for name, h in heights.items()}
+    offsets = {name: float(np.quantile(np.abs(h.min(axis=1)), 0.9)) for name, h in heights.items()}
     for name in ("+Y", "+Z"):
-        flat = float(np.median(np.ptp(heights[name], axis=1))) < _FLAT
-        if off[name] < min(_ON_ZERO, off[best]) and flat and zero @ AXES[name] > _ALONG:
+        is_low = float(np.median(np.ptp(heights[name], axis=1))) < _MAX_LYING_HEIGHT
+        if offsets[name] < min(_MAX_LYING_OFFSET, offsets[best]) and is_low and zero @ AXES[name] > _MIN_ALONG_COSINE:
             return name
     return None
 
 
-def _zero_pose(motion: SourceMotion, roles: Roles) -> Array:
-    """Direction from the feet to the trunk's upper end with all rotations zero; 0 where there is none."""
+def _zero_pose_direction(motion: SourceMotion, roles: Roles) -> Array:
+    """Direction from the feet to the trunk's upper end with all rotations zero; 0 if it is undefined."""
     unturned = np.zeros((1, len(motion.joints), 4))
     unturned[..., 0] = 1.0
     zero = replace(motion, rotations=unturned, translations=np.median(motion.translations, axis=0, keepdims=True))
@@ -202,41 +209,41 @@ def _zero_pose(motion: SourceMotion, roles: Roles) -> Array:
         lines = body_lines(zero, roles, zero.global_positions(unturned), unturned)
     except MotionFileError:
         return np.zeros(3)
-    return np.nan_to_num(_standing(lines)[0])
+    return np.nan_to_num(_body_directions(lines)[0])
 
 
-def _standing(lines: BodyLines) -> Array:
+def _body_directions(lines: BodyLines) -> Array:
     """Unit vectors b from the feet to the trunk's upper end, shape (n, 3)."""
     return unit(lines.top - lines.lowest_joints.mean(axis=1))
 
 
-def _calm(positions: Array, fps: float, lost: Mask) -> tuple[IntArray, bool]:
-    """Frames in which a joint is at rest, or the `_CALM` share in which the slowest is slowest; whether it is rest."""
+def _calm_frames(positions: Array, fps: float, lost: Mask) -> tuple[IntArray, bool]:
+    """Frames in which a joint is at rest, or else the calmest (`_CALM_FRACTION`); and whether joints are at rest."""
     if len(positions) == 1 or lost.all():
         return np.arange(len(positions)), True
     slowest = np.linalg.norm(np.gradient(positions, axis=0), axis=2).min(axis=1) * fps
-    calm = float(np.quantile(slowest[~lost], _CALM))
+    calm = float(np.quantile(slowest[~lost], _CALM_FRACTION))
     return np.flatnonzero((slowest <= max(AT_REST, calm)) & ~lost), calm <= AT_REST
 
 
-def _score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> float:
+def _axis_score(name: str, lines: BodyLines, positions: Array, frames: IntArray) -> float:
     up = np.array(AXES[name], dtype=np.float64)
-    body = _standing(lines)[frames]
+    body = _body_directions(lines)[frames]
     heights = positions[frames] @ up
     lowest = heights.min(axis=1)
     spread = float(np.subtract(*np.quantile(lowest, (0.95, 0.05)))) / lines.leg
-    balance = float(_outside(lines, positions, frames, up).mean()) / lines.leg
-    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
+    balance = float(_distance_outside(lines, positions, frames, up).mean()) / lines.leg
+    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CONVENTION_BONUS * (name in ("+Y", "+Z"))
 
 
-def _outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> Array:
+def _distance_outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> Array:
     """Distance of the middle of hips and shoulders outside the hull of the lowest joints, seen along an axis, (m,)."""
     heights = positions[frames] @ up
-    bearing = heights < heights.min(axis=1)[:, None] + _BEARING * lines.leg
+    bearing = heights < heights.min(axis=1)[:, None] + _MAX_SUPPORT_HEIGHT * lines.leg
     first, second = np.roll(up, 1), np.roll(up, 2)
     middle = (lines.middle + lines.top)[frames] / 2.0
     outside = np.zeros(len(frames))
-    for angle in np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS:
+    for angle in np.arange(_DIRECTION_COUNT) * 2.0 * np.pi / _DIRECTION_COUNT:
         along = np.cos(angle) * first + np.sin(angle) * second
         furthest = np.where(bearing, positions[frames] @ along, -np.inf).max(axis=1)
         outside = np.maximum(outside, middle @ along - furthest)
@@ -244,7 +251,7 @@ def _outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) ->
 
 
 def propped_seconds(lines: BodyLines, positions: Array, up: Array, fps: float) -> float:
-    """Time for which the body stays with its weight beside all that is low: on a chair, against a wall, on a rope [s].
+    """Time for which the body's weight is beside its lowest joints [s]: on a chair, against a wall, on a rope.
 
     Parameters
     ----------
@@ -257,23 +264,27 @@ def propped_seconds(lines: BodyLines, positions: Array, up: Array, fps: float) -
     fps : float
         Frame rate [1/s].
     """
-    beside = _outside(lines, positions, np.arange(len(positions)), up) > _BESIDE * lines.leg
-    return sum(end - start for start, end in spans(beside) if end - start > _STAYS * fps) / fps
+    beside = _distance_outside(lines, positions, np.arange(len(positions)), up) > _MIN_PROPPED_DISTANCE * lines.leg
+    return sum(end - start for start, end in spans(beside) if end - start > _MIN_PROPPED_TIME * fps) / fps
 
 
 def check_stature(motion: SourceMotion, lines: BodyLines) -> None:
-    """Refuse an animal under the names of a human: a trunk about as long as the legs, and across them throughout.
+    """Refuse an animal with a human's joint names: its trunk is about as long as the legs, and across them throughout.
 
     Raises
     ------
     MotionFileError
-        If it is one.
+        If the body is an animal's.
     """
-    size = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
+    length = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
     whole = lines.has_arms and not np.isnan(lines.ankles).any()
     legs = unit((lines.hips - lines.ankles).mean(axis=1))
-    if whole and size > _LONG and float(np.sum(unit(lines.trunk) * legs, axis=1).mean()) < _LEVEL:
-        what = f"the trunk is {size:.1f} times as long as thigh and shank, and across the legs"
+    if (
+        whole
+        and length > _MIN_ANIMAL_TRUNK
+        and float(np.sum(unit(lines.trunk) * legs, axis=1).mean()) < _MAX_ANIMAL_COSINE
+    ):
+        what = f"the trunk is {length:.1f} times as long as thigh and shank, and across the legs"
         raise MotionFileError(motion.path, 0, what, "a human, who stands at times")
 
 
@@ -283,16 +294,17 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     Raises
     ------
     MotionFileError
-        If toes and knees show a mirrored body, one of them does while the other is unclear or contradicts it, or the
-        shoulders lie on average the other way than the hips: no trunk is twisted by more than 90° throughout.
+        If toes and knees show a mirrored body, if one of them does while the other is unclear or contradicts it, or if
+        left and right of the shoulders are on average opposite to the hips': no trunk is twisted by more than 90°
+        throughout.
     """
     left = unit(lines.left)
-    # Ahead of its own shank: the toes of a body that kneels point back in the room.
+    # Ahead of each foot's own shank: in the world, the toes of a kneeling body point back.
     ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
     toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
-    clear = [np.sign(s) for s in signs if abs(s) > _SURE]
+    clear = [np.sign(s) for s in signs if abs(s) > _MIN_EVIDENCE]
     stated = "left and right as the names say, or --roles FILE that says them"
     shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
     if lines.has_arms and np.sum(lines.left * shoulders) < 0.0:
@@ -300,7 +312,7 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
         raise MotionFileError(motion.path, 0, what, stated)
     if clear and sum(clear) < 0:
-        back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_SURE)
+        back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_MIN_EVIDENCE)
         raise MotionFileError(motion.path, 0, f"the body is mirrored: {back} point back", stated)
     if clear and sum(clear) == 0:
         raise MotionFileError(

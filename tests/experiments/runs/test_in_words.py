@@ -110,7 +110,7 @@ def test_a_loaded_capture_is_prepared_as_on_the_way_into_a_run(
         return np.vstack((np.r_[clip.fps, 0.0, np.zeros(73)], clip.poses))
 
     monkeypatch.setattr(prepared_clip, "kept_array", lambda *args: args[-1]())
-    monkeypatch.setattr(prepared_clip._Capture, "_found", far)
+    monkeypatch.setattr(prepared_clip._Capture, "_prepare", far)
     with pytest.warns(UserWarning, match=r"walker\.bvh: no feasible motion is near it"):
         hvf.load(capture)
 

@@ -71,9 +71,9 @@ def test_memory_does_not_hold_all_jacobians(change, monkeypatch):
     """The normal equations by chunks of knot intervals are those of all at once."""
     problem = _Problem(change, stances(change.clip, change.clip))
     x = 1e-3 * np.random.default_rng(4).normal(size=change.n_points * N_TANGENT)
-    whole, g = problem._linearised(x)
+    whole, g = problem._linearise(x)
     monkeypatch.setattr(feasible, "_CHUNK", 3)
-    parts, h = problem._linearised(x)
+    parts, h = problem._linearise(x)
     np.testing.assert_allclose(parts.band, whole.band, atol=1e-9 * np.abs(whole.band).max())
     np.testing.assert_allclose(h, g, atol=1e-9 * np.abs(g).max())
 
@@ -103,7 +103,9 @@ def test_normal_equations_are_those_of_the_stacked_rows(change):
 
 def test_the_jacobian_of_the_errors(change, monkeypatch):
     """Against central differences along random changes; contacts keep their edges for so small a step."""
-    monkeypatch.setattr(feasible, "_STRONG", 0.02)  # so that most torques count, those of standing legs among them
+    monkeypatch.setattr(
+        feasible, "_STRAIN_THRESHOLD", 0.02
+    )  # so that most torques count, those of standing legs among them
     clip = change.clip
     problem = _Problem(change, stances(clip, smoothed(clip)))
     # Narrow ranges, so that bent joints exceed them about all axes, where a rotation is no longer its vector's change.

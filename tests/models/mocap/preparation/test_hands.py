@@ -135,7 +135,7 @@ def test_a_hand_stands_longer_where_nothing_else_bears():
 
 def test_the_jacobian_with_loaded_hands(monkeypatch):
     """Against central differences along a random change, with torques of arms and trunk that count."""
-    monkeypatch.setattr(feasible, "_STRONG", 0.02)
+    monkeypatch.setattr(feasible, "_STRAIN_THRESHOLD", 0.02)
     arms = np.deg2rad(85.0) - 0.15 * np.sin(np.linspace(0.0, np.pi, 40)) ** 2
     clip = Clip(np.array([pose_of(propped(angle)) for angle in arms]), 60.0, "push-up")
     schedule, change = stances(clip, clip), Change(clip, 0.1, 0.05, passage=True)

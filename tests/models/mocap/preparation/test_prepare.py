@@ -373,7 +373,7 @@ def test_what_a_file_lacks_is_said_in_the_terminal(tmp_path, capsys):
 
 
 def test_prepared_clips_are_kept_by_the_code_that_prepares_them():
-    assert prepared.__module__ == prepared_clip._CODE
+    assert prepared.__module__ == prepared_clip._PREPARING_MODULE
 
 
 def test_a_target_that_exists_is_left(tmp_path):

@@ -53,14 +53,14 @@ def test_four_stances_at_heights_that_differ_at_random_tell_no_slope():
     found = 0
     for _ in range(400):
         points = np.column_stack((places, rng.normal(0.0, 0.006, 4)))
-        found += np.any(footing._slopes(points, np.zeros(4, dtype=np.int64), 4) != 0.0)
+        found += np.any(footing._floor_slopes(points, np.zeros(4, dtype=np.int64), 4) != 0.0)
     assert found / 400 < 0.08
 
 
 def test_five_stances_along_a_slope_tell_it():
     heights = 0.02 * np.arange(5.0) * 0.7 + np.array([2.0, -1.0, -2.0, -1.0, 2.0]) * 1e-3
     points = np.column_stack((0.7 * np.arange(5.0), np.zeros(5), heights))
-    np.testing.assert_allclose(footing._slopes(points, np.zeros(5, dtype=np.int64), 5), [0.02, 0.0], atol=1e-4)
+    np.testing.assert_allclose(footing._floor_slopes(points, np.zeros(5, dtype=np.int64), 5), [0.02, 0.0], atol=1e-4)
 
 
 def test_a_foot_whose_soles_lie_higher_in_the_file_tells_no_slope():
@@ -70,13 +70,13 @@ def test_a_foot_whose_soles_lie_higher_in_the_file_tells_no_slope():
         rng = np.random.default_rng(seed)
         places = np.column_stack((np.where(feet == 0, 0.4, -0.4) + rng.normal(0.0, 0.3, 20), rng.normal(0.0, 0.3, 20)))
         points = np.column_stack((places, np.where(feet == 0, 0.009, -0.009) + rng.normal(0.0, 0.002, 20)))
-        assert np.linalg.norm(footing._slopes(points, np.zeros_like(feet), 20)) > np.tan(np.deg2rad(0.7))
-        assert not footing._slopes(points, feet, 20).any()
+        assert np.linalg.norm(footing._floor_slopes(points, np.zeros_like(feet), 20)) > np.tan(np.deg2rad(0.7))
+        assert not footing._floor_slopes(points, feet, 20).any()
 
 
 def test_feet_that_contradict_each_other_tell_no_slope():
     feet, way = np.repeat([0, 1], 12), np.tile(np.linspace(-1.0, 1.0, 12), 2)
     for left in (1.0, -0.5):
         heights = 0.03 * way * np.where(feet == 0, left, 1.0)
-        slopes = footing._slopes(np.column_stack((way, 0.3 * feet, heights)), feet, 24)
+        slopes = footing._floor_slopes(np.column_stack((way, 0.3 * feet, heights)), feet, 24)
         assert slopes[0] == (pytest.approx(0.03, rel=1e-6) if left == 1.0 else 0.0)

@@ -323,7 +323,7 @@ def test_the_head_does_not_turn_with_the_line_of_the_trunk(motions):
     """Where a spine of other joints bends, that is 20° off the figure's own."""
     given = global_rotations(motions.whole("cheer").poses)
     turned, trunk = given.copy(), np.tile([np.sin(0.35), 0.0, np.cos(0.35)], (len(given), 1))
-    calibration._set_lines(turned, trunk, np.full_like(trunk, np.nan), clavicled=False)
+    calibration._align_trunk(turned, trunk, np.full_like(trunk, np.nan), has_clavicles=False)
     head, chest = BODIES.index("head"), BODIES.index("chest")
     np.testing.assert_array_equal(turned[:, head], given[:, head])
     assert np.abs(turned[:, chest] - given[:, chest]).max() > 0.1
