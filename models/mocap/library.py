@@ -122,7 +122,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
         *motion.remarks,
         *copy_remarks([motion.joints[joint] for joint in copies], report.taken["pelvis"]),
         *report.remarks,
-        *floor_remarks(contacts(clip).clearance, clip.fps, report.dropped),
+        *floor_remarks(contacts(clip).clearance, clip.poses[:, :3], clip.fps, report.dropped),
     )
     return Loaded(clip, report._replace(remarks=remarks), motion.loops)
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.arrays import Array, Mask
+from models.gravity import GRAVITY
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.motion.spans import spans
@@ -26,6 +27,11 @@ _MIN_RANGE_EXCESS = np.deg2rad(15.0)
 # high, and a flight of 1 s rises by 1.2 m. The longest flight in the 28 captures of
 # docs/validation/prepared-captures.md lasts 0.5 s.
 _MIN_ALOFT_HEIGHT, _MIN_ALOFT_TIME = 0.1, 1.0
+# In a file of a wrong frame rate a body in flight falls along a parabola, but not with g: largest fraction of g, least
+# change of height [m], and largest RMS distance from the parabola over that change. Two jumps in a file of 120 frames a
+# second that states 24 have 0.04, 0.1 m and 0.03.
+_MAX_FALL_RATIO, _MIN_FALL_HEIGHT, _MAX_FALL_ERROR = 0.5, 0.05, 0.05
+_MAX_PINNED_MOTION = 0.01  # largest extent of a root's positions that do not move [m]: a body that stands sways by more
 _MIN_DEPTH = 0.1  # least depth below the floor that is reported [m]: in the same captures nothing is deeper
 # Legs of a human, hip to ankle [m]: 0.49 of an adult's stature (Winter 2009, figure 4.1), 1.33 m for the tallest known;
 # about 0.3 m for a child that begins to walk. Wrong units are off by factors above 2, so the bounds may be wide.
@@ -213,13 +219,15 @@ def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
         yield f'{remark}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
 
 
-def floor_remarks(clearance: Array, fps: float, dropped: int) -> Iterator[str]:
+def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> Iterator[str]:
     """Times at which the body is above the floor for longer than any flight, and at which it is below it.
 
     Parameters
     ----------
     clearance : array of shape (n,)
         Height of the lowest point of the body [m].
+    root : array of shape (n, 3)
+        Position of the root [m].
     fps : float
         Frame rate [1/s].
     dropped : int
@@ -229,12 +237,29 @@ def floor_remarks(clearance: Array, fps: float, dropped: int) -> Iterator[str]:
     if aloft:
         high = max(float(clearance[start:end].max()) for start, end in aloft)
         how = f"up to {high:.2f} m above the floor, for {_duration_text(aloft, fps, dropped)}, which no flight lasts"
+        fall = min(_fall_acceleration(root[start:end, 2], fps) for start, end in aloft)
         why = "it stands on something that is not in the file, or its place is in another unit than its bones"
+        if np.ptp(root, axis=0).max() < _MAX_PINNED_MOTION:
+            why = "its root does not move in the file, as in poses that are estimated from a video"
+        if fall > 0.0:
+            how += f", and falls with {two_digits(fall)} m/s² there"
+            rate = fps * float(np.sqrt(GRAVITY / fall))
+            why = f"at {two_digits(rate)} frames a second instead of {fps:g} it would fall freely; see --frame-rate"
         yield f"the body is {how}: {why}"
     beneath = spans(clearance < -_MIN_DEPTH)
     if beneath:
         how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_duration_text(beneath, fps, dropped)}"
         yield f"parts of the body are {how}; see whether the file has it so"
+
+
+def _fall_acceleration(heights: Array, fps: float) -> float:
+    """Downward acceleration [m/s²] of heights (n,) that follow a parabola, more slowly than in a fall; 0 otherwise."""
+    time = np.arange(len(heights)) / fps
+    parabola = np.polyfit(time, heights, 2)
+    change, fall = float(np.ptp(heights)), -2.0 * float(parabola[0])
+    error = float(np.sqrt(np.mean((heights - np.polyval(parabola, time)) ** 2)))
+    fits = change > _MIN_FALL_HEIGHT and error < _MAX_FALL_ERROR * change
+    return fall if fits and 0.0 < fall < _MAX_FALL_RATIO * GRAVITY else 0.0
 
 
 def _duration_text(found: Sequence[tuple[int, int]], fps: float, dropped: int) -> str:

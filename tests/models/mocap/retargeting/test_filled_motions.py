@@ -65,7 +65,9 @@ def test_a_calibration_pose_that_a_filter_has_spread_is_left_out_as_a_whole(tmp_
 
 def test_times_count_from_the_first_frame_of_the_file() -> None:
     clearance = np.where(np.arange(100) < 40, 0.0, 0.3)
-    (plain,), (led,) = (list(floor_remarks(clearance, 30.0, dropped)) for dropped in (0, 90))
+    (plain,), (led,) = (
+        list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 30.0, dropped)) for dropped in (0, 90)
+    )
     assert "(the first at 1.33 s)" in plain
     assert "(the first at 4.33 s)" in led
 

@@ -76,18 +76,36 @@ def test_flights_and_steps_are_no_raised_floor(name, tmp_path):
     assert not [remark for remark in report.remarks if "the floor" in remark]
 
 
+@pytest.mark.parametrize("slower", [4.0, 5.0, 10.0])
+def test_flight_that_lasts_too_long_reports_the_true_frame_rate(slower, tmp_path):
+    clip = embedded("jump")
+    report = report_of(Clip(clip.poses, clip.fps / slower, "slow"), tmp_path / "r.bvh")
+    (remark,) = [remark for remark in report.remarks if "no flight lasts" in remark]
+    rate = float(remark.split(" there: at ")[1].split(" frames")[0])
+    assert rate == pytest.approx(clip.fps, rel=0.2)
+    assert "--frame-rate" in remark
+
+
+def test_feet_that_hang_from_a_root_that_does_not_move_are_told_so():
+    clearance = np.where(np.arange(400) < 200, 0.0, 0.3)
+    (remark,) = floor_remarks(clearance, np.zeros((400, 3)), 100.0, 0)
+    assert "its root does not move in the file" in remark
+    (remark,) = floor_remarks(clearance, np.outer(np.arange(400), [0.001, 0.0, 0.0]), 100.0, 0)
+    assert "it stands on something" in remark
+
+
 def test_what_is_beneath_the_floor_is_said_with_its_depth_and_time():
     clearance = np.zeros(200)
     clearance[50:60] = -0.28
-    assert list(floor_remarks(clearance, 100.0, 0)) == [
+    assert list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0)) == [
         "parts of the body are up to 0.28 m beneath the floor, for 0.1 s (the first at 0.50 s); "
         "see whether the file has it so"
     ]
     clearance[50:60] = -0.09
-    assert not list(floor_remarks(clearance, 100.0, 0))
+    assert not list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0))
 
 
 def test_hops_that_follow_each_other_are_no_raised_floor():
     """Each of them lasts less than a second, however many there are."""
     clearance = np.tile(np.concatenate((np.full(90, 0.3), np.zeros(10))), 5)
-    assert not list(floor_remarks(clearance, 100.0, 0))
+    assert not list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0))
