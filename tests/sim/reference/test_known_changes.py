@@ -105,7 +105,7 @@ def test_where_no_change_is_found_the_map_is_as_it_was(
     monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
     # Other processes would find the changes that this one is told not to find.
     monkeypatch.setattr(river_changes, "side_by_side", lambda calls: [call(*given) for call, given in calls])
-    monkeypatch.setattr(river_changes, "_passage", lambda *rest: None)
+    monkeypatch.setattr(river_changes, "_make_passage", lambda *rest: None)
     for _ in range(2):  # found, and as it is kept
         made = river_changes.with_changes(plain, 0.4, FIGURE)
         assert made.changes == ()
