@@ -45,9 +45,7 @@ _MAX_WAIT_TIME = 4.0  # [s] between gates in long strides, which have as many ga
 _MAX_STRIDES = 8  # in a round
 _TIMEOUT = 8.0  # [s] after which a change that has not happened is given up
 _SAMPLES = 840  # of a round: divisible by any number of strides up to `_MAX_STRIDES`
-_MAX_ROW_STEP = (
-    1.0  # [rad] between rows, five times the largest of captures: no spline can follow such a rotation vector
-)
+_MAX_ROW_STEP = 1.0  # [rad] between rows, five times the largest of captures: no spline follows larger steps
 _STRIDE_TOLERANCE = 0.02  # [rad], [m] within which strides of one clip count as equal
 
 

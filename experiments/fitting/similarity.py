@@ -23,9 +23,7 @@ from sim.reference.reference import map_poses
 SKATES = 0.02
 """Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
 
-LACKS = (
-    0.06  # [body weights] excess of the RMS residual over the clips' (for foot skate `SKATES`) from which clips differ
-)
+LACKS = 0.06  # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `SKATES`
 _FPS = 60.0
 _TRUNK_BODIES = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z

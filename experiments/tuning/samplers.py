@@ -5,9 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import optuna
 
-REFUSED_MOST = (
-    30  # maximum number of proposals per simulated candidate; if more are needed, hardly any point is certified
-)
+REFUSED_MOST = 30  # maximum of proposals per simulated candidate; if more are needed, hardly any point is certified
 STARTUP = 10  # candidates drawn at random before a sampler begins to learn from results
 
 

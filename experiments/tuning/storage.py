@@ -27,7 +27,7 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
             with open(where, "a+b") as file:
                 file.seek(0)
                 first_line = file.readline()
-            if first_line and "op_code" not in json.loads(first_line):  # Optuna takes any single line for torn
+            if first_line and "op_code" not in json.loads(first_line):  # Optuna takes any single line for unfinished
                 raise ValueError
             return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
         except OSError as error:

@@ -94,7 +94,7 @@ class Cluster:
 
 @contextmanager
 def local_cluster(workers: int) -> Generator[Cluster]:
-    """A cluster of `workers` local processes, each of which runs one trial at a time; closed with the block.
+    """A cluster of `workers` local processes, each of which runs one trial at a time; closed after the block.
 
     Raises
     ------
