@@ -10,7 +10,7 @@ typedef char hvf_sizes[sizeof(hvf_input) == 64 && sizeof(hvf_output) == 64 && si
                        sizeof(hvf_calibration) == 64 ? 1 : -1];
 
 #define CRC_AT (HVF_REPORT_SIZE - 4)
-#define COOLER 500 /* 0.01 degrees C below the limit before a motor counts as cool again */
+#define COOLER 500 /* [0.01 degrees C] below the limit, at which a motor counts as cool again */
 #define TRIPPED (HVF_STATUS_WATCHDOG | HVF_STATUS_HOT | HVF_STATUS_AMPLIFIER | HVF_STATUS_ENCODER)
 
 const uint8_t hvf_report_descriptor[] = {
@@ -28,7 +28,7 @@ const uint8_t hvf_report_descriptor[] = {
 };
 const size_t hvf_report_descriptor_size = sizeof hvf_report_descriptor;
 
-/* CRC-32/ISO-HDLC, the one of Ethernet and zlib: reflected 0x04C11DB7, begins with and is inverted by 0xFFFFFFFF. */
+/* CRC-32/ISO-HDLC, as in Ethernet and zlib: reflected 0x04C11DB7, initial value and final XOR 0xFFFFFFFF. */
 uint32_t hvf_crc32(const void *bytes, size_t n) {
     const uint8_t *p = bytes;
     uint32_t crc = 0xFFFFFFFFu;
@@ -96,7 +96,7 @@ int hvf_take_output(hvf_device *device, const uint8_t *bytes, size_t n, uint64_t
     device->watchdog_us = output.watchdog_us;
     if (!(output.flags & HVF_ENABLE)) {
         off(device);
-        /* What is still wrong trips again in the next tick; what is hot has to cool first. */
+        /* A fault that persists trips again in the next tick; a hot motor has to cool first. */
         device->status &= (uint16_t)~(device->warm ? TRIPPED & ~HVF_STATUS_HOT : TRIPPED);
     } else if (!(device->status & TRIPPED)) {
         for (int i = 0; i < 3; i++) device->torque[i] = clamped(output.torque[i], device->identity.peak_torque[i]);

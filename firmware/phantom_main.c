@@ -1,5 +1,5 @@
-/* The reference firmware: one loop, that reports at the rate that the identity tells. Feature reads are answered by the USB stack's
- * interrupt with `hvf_give_feature(&phantom, …)`, which only reads. */
+/* The reference firmware: one loop, which sends reports at the rate given by the identity. Feature reads are answered by the USB
+ * stack's interrupt with `hvf_give_feature(&phantom, …)`, which only reads. */
 #include "phantom_board.h"
 
 hvf_device phantom;
@@ -20,7 +20,7 @@ int main(void) {
         while ((n = board_receive(bytes, sizeof bytes)) > 0) {
             if (bytes[0] != HVF_OUTPUT) hvf_take_feature(&phantom, bytes, n);
             else if (hvf_take_output(&phantom, bytes, n, board_time_us())) {
-                hvf_drive(&phantom, &motors); /* at once: waiting for the period would be a delay in the force */
+                hvf_drive(&phantom, &motors); /* at once: waiting for the next period would delay the force */
                 board_drive(&motors);
             }
         }

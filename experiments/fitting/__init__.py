@@ -1,1 +1,1 @@
-"""Fitting a map to the physical figure before a run: balance, choice of legs, feasible changes, kept verdicts."""
+"""Fitting a map to the physical figure before a run: balance, choice of legs, feasible changes, cached verdicts."""

@@ -23,11 +23,11 @@ from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, 
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import map_poses
 
-_ROWS = 96  # samples of a lap
-_ROUNDS = 3
+_LAP_SAMPLES = 96  # samples of a lap
+_ITERATIONS = 3  # each corrects the remaining error of the zero-moment point
 CUTOFF = 6.0  # highest frequency of the sway [Hz]
-_SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
-_FARTHEST = 0.2  # largest sway [m]
+_SUPPORT_SCALE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
+_MAX_SWAY = 0.2  # largest sway [m]
 
 
 class Laps(NamedTuple):
@@ -51,9 +51,9 @@ class Laps(NamedTuple):
     height: float
 
     def outside(self) -> Array:
-        """Way from the zero-moment points to the support [m], times the load in body weights; shape (k, n, 2)."""
+        """Vectors from zero-moment points to nearest supported ones [m] times the load [body weights], (k, n, 2)."""
         touching = self.contacts[..., 2] < SWINGS
-        nearest = nearest_supported(self.zmp, self.contacts[..., :2], touching, _SHARE)
+        nearest = nearest_supported(self.zmp, self.contacts[..., :2], touching, _SUPPORT_SCALE)
         return self.load[..., None] * (nearest - self.zmp)
 
 
@@ -69,39 +69,39 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
     lap : float
         Duration of a lap [s].
     """
-    shape = (_ROWS, len(haptic_map.mixtures), 2)
+    shape = (_LAP_SAMPLES, len(haptic_map.mixtures), 2)
     model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
     mujoco.mj_saveModel(figure, None, model)
     made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]))
     return haptic_map.with_sway(
-        kept_array(kept_folder(__name__), "sway", made_of, shape, lambda: _sway(haptic_map, figure, lap))
+        kept_array(kept_folder(__name__), "sway", made_of, shape, lambda: _compute_sway(haptic_map, figure, lap))
     )
 
 
-def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
+def _compute_sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
     weights = haptic_map.mixtures
-    corners = weights.argmax(axis=0)
-    # The poses begin one row before the seam, so the rows measured lie in the map's second lap.
-    turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_ROWS) / _ROWS)
-    sway = np.zeros((_ROWS, len(weights), 2))
-    for k in range(_ROUNDS):
-        laps = _laps(haptic_map.with_sway(sway) if k > 0 else haptic_map, figure, lap)
+    single_clips = weights.argmax(axis=0)
+    # The poses begin one sample before the seam, so the samples that are measured lie in the map's second lap.
+    turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_LAP_SAMPLES) / _LAP_SAMPLES)
+    sway = np.zeros((_LAP_SAMPLES, len(weights), 2))
+    for k in range(_ITERATIONS):
+        laps = _lap_dynamics(haptic_map.with_sway(sway) if k > 0 else haptic_map, figure, lap)
         outside = laps.outside()
-        own = outside[corners]
-        outside -= np.einsum("km,mnx->knx", weights, own)
+        clip_outside = outside[single_clips]
+        outside -= np.einsum("km,mnx->knx", weights, clip_outside)
         c, s = np.cos(turn), np.sin(turn)
         x, y = outside[..., 0], outside[..., 1]
         error = np.stack([c * x - s * y, s * x + c * y], axis=-1).transpose(1, 0, 2)
         sway += sway_of(error, laps.height, lap, CUTOFF)
-        size = np.linalg.norm(sway, axis=-1, keepdims=True)
-        sway *= np.minimum(1.0, _FARTHEST / np.maximum(size, 1e-12))
+        length = np.linalg.norm(sway, axis=-1, keepdims=True)
+        sway *= np.minimum(1.0, _MAX_SWAY / np.maximum(length, 1e-12))
     return sway
 
 
-def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
-    places = haptic_map.places(2.0 * np.pi * np.arange(-1, _ROWS + 1) / _ROWS)
+def _lap_dynamics(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
+    places = haptic_map.places(2.0 * np.pi * np.arange(-1, _LAP_SAMPLES + 1) / _LAP_SAMPLES)
     poses = np.stack([map_poses(haptic_map, stylus) for stylus in places])
-    return measured_laps(poses, lap / _ROWS, figure)
+    return measured_laps(poses, lap / _LAP_SAMPLES, figure)
 
 
 def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
@@ -109,7 +109,7 @@ def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
     data = mujoco.MjData(figure)
     feet = [figure.geom(name).id for name in FOOT_CONTACTS]
     k, n = poses.shape[:2]
-    com, spin, contacts = np.empty((k, n, 3)), np.empty((k, n, 3)), np.empty((k, n, len(feet), 3))
+    com, angular_momentum, contacts = np.empty((k, n, 3)), np.empty((k, n, 3)), np.empty((k, n, len(feet), 3))
     velocity = np.empty(figure.nv)
     for node in range(k):
         for i in range(n):
@@ -119,11 +119,11 @@ def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
             mujoco.mj_comPos(figure, data)
             mujoco.mj_comVel(figure, data)
             mujoco.mj_subtreeVel(figure, data)
-            com[node, i], spin[node, i] = data.subtree_com[1], data.subtree_angmom[1]
+            com[node, i], angular_momentum[node, i] = data.subtree_com[1], data.subtree_angmom[1]
             contacts[node, i] = data.geom_xpos[feet]
     acceleration = (com[:, 2:] - 2.0 * com[:, 1:-1] + com[:, :-2]) / step**2
     force = acceleration + np.array([0.0, 0.0, GRAVITY])
-    torque = (spin[:, 2:] - spin[:, 1:-1]) / (step * figure.body_subtreemass[1])
+    torque = (angular_momentum[:, 2:] - angular_momentum[:, 1:-1]) / (step * figure.body_subtreemass[1])
     com = com[:, 1:-1]
     force[..., 2] = np.maximum(force[..., 2], 0.1 * GRAVITY)
     contacts[..., 2] -= CONTACT_RADIUS

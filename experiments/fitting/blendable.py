@@ -13,19 +13,19 @@ from models.mocap.preparation.poses import sole_points
 from sim.body.figure_state import FigureGains
 
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
-FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same of clips with flights: these need 0.8 to 1.2 of gravity
-SLOWEST, FASTEST = 0.75, 1.33  # played pace over own: inertial forces go with its square, 0.56 to 1.8
-_SAME = 0.02  # laps that differ by less are the same: `natural_lap` takes the shortest of those
+FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same for clips with flights, which then need 0.8 to 1.2 of gravity
+SLOWEST, FASTEST = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
+_LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natural_lap` takes the shortest of them
 
 
 def longest_flight(clip: Clip) -> float:
-    """Longest time for which the figure would fly [s]: no point of a sole is below `FigureGains.flight_height`."""
-    flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FigureGains().flight_height
-    return max((end - start for start, end in spans(flies)), default=0) / clip.fps
+    """Longest time that the figure would be in flight [s]: no point of a sole is below `FigureGains.flight_height`."""
+    flying = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FigureGains().flight_height
+    return max((end - start for start, end in spans(flying)), default=0) / clip.fps
 
 
 def same(clips: Sequence[Clip]) -> bool:
-    """Whether clips are one and the same."""
+    """Whether all clips have the same poses."""
     return all(np.array_equal(clip.poses, clips[0].poses) for clip in clips)
 
 
@@ -33,36 +33,36 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     """Remarks on clips that cannot be blended with the others, a line each; none if all clips are the same."""
     if same(clips):
         return ()
-    found: list[str] = []
+    lines: list[str] = []
     for clip in {clip.name: clip for clip in clips}.values():
         flight = longest_flight(clip)
         if clip.turns_over:
-            over = f"turns over (pelvis {np.rad2deg(np.arccos(clip.least_upright)):.0f}° from upright)"
-            found.append(f"{clip.name} {over}: no motion lies between it and others")
+            fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.least_upright)):.0f}° from upright)"
+            lines.append(f"{clip.name} {fault}: no motion lies between it and others")
         elif flight > LONGEST_FLIGHT:
-            found.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")
-    return tuple(found)
+            lines.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")
+    return tuple(lines)
 
 
 def grounded(clips: Sequence[Clip]) -> int:
     """Index of the clip that times the lap: the first without a flight, or else the first.
 
-    Which clip's legs carry the arms of the others is found with the physical figure (`carried`): arms move the centre
-    of mass, so flights of a clip are ballistic only with its own arms.
+    Which clip's legs are combined with the arms of the others is found with the physical figure (`carried`): arms move
+    the centre of mass, so flights of a clip are ballistic only with its own arms.
     """
     return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
 
 
 def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
-    """Whether a lap [s] plays all clips near enough to their own pace to be blended; nearer if one has flights."""
+    """Whether a lap [s] plays all clips near enough to their own pace to be blended; flights have tighter limits."""
     paces = [loop.duration / lap for loop in loops]
-    flies = any(longest_flight(clip) > 0.0 for clip in clips)
-    slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if flies else (SLOWEST, FASTEST)
+    any_flight = any(longest_flight(clip) > 0.0 for clip in clips)
+    slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if any_flight else (SLOWEST, FASTEST)
     return all(slowest <= pace <= fastest for pace in paces)
 
 
 def keep_own_pace(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> bool:
-    """Whether a round [s] plays every clip near enough to its own pace to be followed alone."""
+    """Whether a round [s] plays every clip near enough to its own pace to be followed by itself."""
     return all(
         (FLYING_SLOWEST if longest_flight(clip) > 0.0 else SLOWEST) <= loop.duration / seconds <= FLYING_FASTEST
         for clip, loop in zip(clips, loops, strict=True)
@@ -75,26 +75,30 @@ def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
 
 
 def furthest_off(loops: Sequence[Loop], seconds: float) -> float:
-    """Largest |log| of the pace at which a round [s] plays a loop, relative to its own."""
+    """Largest |log| of the ratio of the pace at which a round [s] plays a loop to the loop's own pace."""
     return max(abs(float(np.log(loop.duration / seconds))) for loop in loops)
 
 
 def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
-    """The loops, reordered to begin with the one of index `first`."""
+    """The loops with the one of index `first` moved to the front."""
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int, timing: int) -> tuple[str, ...]:
     """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `in_step`.
 
-    `laps` is the number of laps in a round, in which each loop is played once; `timing` the index of the clip whose
+    `laps` is the number of laps in a round, in which each loop is played once; `timing` is the index of the clip whose
     pace an advised lap keeps.
     """
     paces = {clip.name: loop.duration / (laps * lap) for clip, loop in zip(clips, loops, strict=True)}
-    off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
-    if not off:
+    outside = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
+    if not outside:
         return ()
     best = natural_lap(led_by(timing, closed_loops(clips)))
-    better = f"--lap {best:.1f} suits them best" if abs(best / lap - 1.0) > _SAME else "no lap suits them all better"
+    better = (
+        f"--lap {best:.1f} suits them best"
+        if abs(best / lap - 1.0) > _LAP_TOLERANCE
+        else "no lap suits them all better"
+    )
     played = f"a lap of {lap:.1f} s plays" if laps == 1 else f"{laps} laps of {lap:.1f} s play"
-    return (f"{played} {', '.join(off)} times its own pace; {better}",)
+    return (f"{played} {', '.join(outside)} times its own pace; {better}",)

@@ -11,7 +11,7 @@ from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
 
 
 def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
-    """The figure's legs as limbs of a blend: soles are placed where they are in the clips on average."""
+    """The figure's legs as limbs of a blend: soles are placed at the mean of their places in the clips."""
     legs: list[Limb] = []
     for side in ("left", "right"):
         bodies = [f"{side}_{part}" for part in ("thigh", "shank", "foot")]

@@ -1,4 +1,4 @@
-r"""Choice of the clip whose legs and trunk the map plays where clips move too differently to be blended as a whole.
+r"""Choice of the clip whose legs and trunk the map plays if clips move too differently to be blended as a whole.
 
 Only arms and head are then blended. A kick is balanced by the arms of its own clip, and a flight is ballistic only with
 them, so simulation decides: for the legs of each clip in turn, the physical figure follows the map's animation while a
@@ -29,10 +29,10 @@ from sim.reference.reference import map_poses
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
 WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is taken at once
-# Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and excess angle [rad].
+# Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and largest excess of a joint [rad].
 SINKS, BEYOND = 0.01, np.deg2rad(5.0)
-_PUSHED = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, in 50 mm
-EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand
+_PUSH_OFFSET = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
+EVERY, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
 
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
@@ -51,26 +51,26 @@ def unbearable(made: Cylindrical, name: str, lap: float, parallel: bool) -> tupl
 
 
 def _domain(made: Cylindrical | Composite) -> Array:
-    """Intervals of r and z [m] that the hand passes through."""
+    """Intervals of r and z through which the hand moves [m], shape (2, 2)."""
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
 
 
 def toured(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
-    """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
+    """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
     so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
-    (`Follow.parallel`) at its angular speed.
+    (`Follow.parallel`) its angular speed does not change.
     """
     times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
-    turn, pushed = 2.0 * np.pi * times / SECONDS, _PUSHED * push_profile(times)
+    turn, pushed = 2.0 * np.pi * times / SECONDS, _PUSH_OFFSET * push_profile(times)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = _domain(made).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
-    since = times if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
-    angle = 2.0 * np.pi / lap * since
+    elapsed = times if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    angle = 2.0 * np.pi / lap * elapsed
     stylus = np.zeros((len(times), 7))
     stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
     return Clip(map_poses(made, stylus), FPS, "blend")
@@ -79,7 +79,7 @@ def toured(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
 def push_profile(times: Array) -> Array:
     """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
     phase = times / EVERY % 2.0
-    ramp = np.minimum(phase, 2.0 - phase) * EVERY / _WITHIN
+    ramp = np.minimum(phase, 2.0 - phase) * EVERY / _PUSH_TIME
     return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
@@ -90,7 +90,7 @@ def sound(made: Cylindrical | Composite, lap: float, parallel: bool) -> bool:
 
 
 def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArray[np.generic]]) -> bool:
-    """Whether soles neither penetrate the floor nor skate, and joints stay within ranges, all within tolerances.
+    """Whether soles neither penetrate the floor nor skate and joints stay within their ranges, within tolerances.
 
     The result is cached; needs compiled code. The arguments are those of `tried`.
     """
@@ -120,22 +120,22 @@ def carried(
     parallel : bool
         Whether the field keeps the pace of a hand that is pushed off (`Follow.parallel`).
     """
-    owned = cache(make)  # made on demand: most often the first clip will do
+    map_with_legs = cache(make)  # made on demand, since the first clip is mostly taken
 
     @cache
-    def fit(i: int) -> bool:
-        return sound(owned(i).with_share(0.0), lap, parallel)
+    def has_sound_legs(i: int) -> bool:
+        return sound(map_with_legs(i).with_share(0.0), lap, parallel)
 
-    best, name, found = owned(0), names[0], Verdict(np.inf, 0.0)
-    for wanted in (True, False):
+    best, name, best_verdict = map_with_legs(0), names[0], Verdict(np.inf, 0.0)
+    for soundness in (True, False):
         for share in SHARES:
-            for i in (i for i in range(len(names)) if fit(i) is wanted):
-                made = owned(i).with_share(share)
+            for i in (i for i in range(len(names)) if has_sound_legs(i) is soundness):
+                made = map_with_legs(i).with_share(share)
                 verdict = verdict_on(made, lap, parallel)
                 if verdict.bearable and verdict.residual <= WELL:
                     return made, ()
-                if verdict.worse() < found.worse():
-                    best, name, found = made, names[i], verdict
-            if found.bearable:
+                if verdict.worse() < best_verdict.worse():
+                    best, name, best_verdict = made, names[i], verdict
+            if best_verdict.bearable:
                 return best, ()
-    return best, (f"the physical figure {found} with the legs of {name}, the best that is found at this lap",)
+    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best that is found at this lap",)

@@ -1,9 +1,9 @@
 """Trials before a run: how much of a lifted map the physical figure follows when its hand is pushed off its curve.
 
-Curves lie some 10 mm apart, and 2.5 N push a hand by 8: at any moment of the lap, not only where motions agree, and
-within 0.15 s. Where the figure does not follow the whole map, or feet skate on it, its legs and trunk stay with the
-curve's own clip, and it carries as large a share of the others' arms as it can, as on the cylinder
-(`experiments.fitting.leg_choice`).
+Curves lie some 10 mm apart, and a push of 2.5 N moves the hand by 8 mm within 0.15 s, at any moment of the lap and not
+only where motions agree. If the figure does not follow the whole map, or its feet skate, its legs and trunk stay with
+the curve's own clip, and the other clips' arms are blended in with as large a share as the figure can follow, as on the
+cylinder (`experiments.fitting.leg_choice`).
 """
 
 from collections.abc import Sequence
@@ -20,32 +20,32 @@ from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 
-_PUSHED = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
+_PUSH_OFFSET = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
 
 
 def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
-    Where the field does not keep its pace there (`Follow.parallel`), a push leaves the hand's speed as it is, so its
-    angular speed is lower the further out it is.
+    If the field does not keep the pace off the curve (`Follow.parallel`), a push does not change the hand's speed, so
+    its angular speed is lower the further out it is.
     """
     times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
-    pushed = _PUSHED * push_profile(np.maximum(times - EVERY, 0.0))
-    since = times if keeps_pace else _slowed(curve, pushed)
-    phases = since % curve.duration if curve.periodic else np.minimum(since, curve.duration)
+    pushed = _PUSH_OFFSET * push_profile(np.maximum(times - EVERY, 0.0))
+    elapsed = times if keeps_pace else _slowed_phase(curve, pushed)
+    phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
     points = curve.point(curve.start + phases)
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
     return Clip(map_poses(made, stylus_path(points)), FPS, "pushed")
 
 
-def _slowed(curve: Trajectory, pushed: Array) -> Array:
+def _slowed_phase(curve: Trajectory, pushed: Array) -> Array:
     """Phase since the curve's start [s] of a hand off the curve by `pushed` [m], at the speed that it has on it."""
-    since = np.zeros(len(pushed))
-    for k, off in enumerate(pushed[:-1]):
-        at = since[k] % curve.duration if curve.periodic else min(since[k], curve.duration)
-        radius = float(np.hypot(*curve.point(curve.start + at)[:2]))
-        since[k + 1] = since[k] + radius / (radius + off) / FPS
-    return since
+    elapsed = np.zeros(len(pushed))
+    for k, offset in enumerate(pushed[:-1]):
+        phase = elapsed[k] % curve.duration if curve.periodic else min(elapsed[k], curve.duration)
+        radius = float(np.hypot(*curve.point(curve.start + phase)[:2]))
+        elapsed[k + 1] = elapsed[k] + radius / (radius + offset) / FPS
+    return elapsed
 
 
 def followed_map(
@@ -60,7 +60,7 @@ def followed_map(
     curve : Trajectory
         The curve that the hand follows.
     clip : int
-        Its clip, whose legs the figure keeps where it does not follow the whole map.
+        Its clip, whose legs the figure keeps if it does not follow the whole map.
     arms : sequence of int
         Joints that are then still blended, counted from 1.
     keeps_pace : bool
@@ -77,14 +77,14 @@ def followed_map(
     sound = not whole.bearable or is_sound(__name__, lambda: toured(made, curve, keeps_pace), made_of(made))
     if whole.bearable and sound:
         return made, ()
-    best, found = (made, whole) if sound else (made, Verdict(np.inf, 0.0))
+    best, best_verdict = (made, whole) if sound else (made, Verdict(np.inf, 0.0))
     for share in SHARES:
         part = made.with_legs_of(clip, arms, share)
         verdict = verdict_on(part)
-        if verdict.worse() < found.worse():
-            best, found = part, verdict
-        if found.bearable and found.residual <= WELL:
+        if verdict.worse() < best_verdict.worse():
+            best, best_verdict = part, verdict
+        if best_verdict.bearable and best_verdict.residual <= WELL:
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
-    told = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (told if found.bearable else f"{told}, and {found} with what it bears best",)
+    remark = f"pushed off its curve to those beside it, {fault} with the whole map"
+    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with what it bears best",)

@@ -1,4 +1,4 @@
-"""Rest phases of clips: where a hand that leaves all rivers stops the figure, it should be statically balanced."""
+"""Rest phases of clips: statically balanced poses, at which the figure can stop when the hand leaves all rivers."""
 
 import mujoco
 import numpy as np
@@ -12,9 +12,9 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 from sim.reference.reference import map_poses
 
-_ROWS = 96  # samples of a lap of the hand
-_SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
-_UNSUPPORTED = 1.0  # [m] distance assigned to phases in flight: larger than any other
+_LAP_SAMPLES = 96  # samples of a lap of the hand
+_SUPPORT_SCALE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
+_FLIGHT_DISTANCE = 1.0  # [m] distance assigned to phases in flight, larger than any other
 
 
 def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
@@ -31,24 +31,24 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         Model of the figure alone.
     """
     data, feet = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    rows = clips.laps * _ROWS
+    rows = clips.laps * _LAP_SAMPLES
     centre, contacts = np.empty((rows, 2)), np.empty((rows, len(feet), 3))
     rests: list[npt.NDArray[np.float64]] = []
     for river, curve in enumerate(clips.curves):
-        phases = curve.start + curve.duration * np.arange(rows) / _ROWS
-        lap = clips.compiled().memory
-        lap[RIVER] = river
-        for i, pose in enumerate(map_poses(clips, stylus_path(curve.point(phases)), lap)):
+        phases = curve.start + curve.duration * np.arange(rows) / _LAP_SAMPLES
+        memory = clips.compiled().memory
+        memory[RIVER] = river
+        for i, pose in enumerate(map_poses(clips, stylus_path(curve.point(phases)), memory)):
             data.qpos[:] = pose
             mujoco.mj_kinematics(figure, data)
             mujoco.mj_comPos(figure, data)
             centre[i], contacts[i] = data.subtree_com[1, :2], data.geom_xpos[feet]
         contacts[..., 2] -= CONTACT_RADIUS
-        touch = contacts[..., 2] < STANDS
-        nearest = nearest_supported(centre, contacts[..., :2], contacts[..., 2] < SWINGS, _SHARE)
-        missing = np.linalg.norm(nearest - centre, axis=1)
-        missing[~touch.any(axis=1)] = _UNSUPPORTED
+        touching = contacts[..., 2] < STANDS
+        nearest = nearest_supported(centre, contacts[..., :2], contacts[..., 2] < SWINGS, _SUPPORT_SCALE)
+        distance = np.linalg.norm(nearest - centre, axis=1)
+        distance[~touching.any(axis=1)] = _FLIGHT_DISTANCE
         # FOOT_CONTACTS begins with the four points of the left foot.
-        good = (missing == 0.0) & touch[:, :4].any(axis=1) & touch[:, 4:].any(axis=1)
-        rests.append(phases[good] if good.any() else phases[[missing.argmin()]])
+        can_rest = (distance == 0.0) & touching[:, :4].any(axis=1) & touching[:, 4:].any(axis=1)
+        rests.append(phases[can_rest] if can_rest.any() else phases[[distance.argmin()]])
     return clips.with_rests(rests)

@@ -3,7 +3,7 @@
 A transition by decaying offsets and quick steps (`sim.reference.river_changes`) needs a residual force of 13 to 25 % of
 body weight, and the figure may fall. It serves as the initial guess only: such transitions are generated at several
 moments of the stride and ranked by residual. The best are made feasible from 0.7 s before the change to 0.9 s after it,
-as a capture is (`models.mocap.preparation.feasible`); both ends stay equal to the clips.
+like a capture (`models.mocap.preparation.feasible`); both ends stay equal to the clips.
 """
 
 from typing import NamedTuple
@@ -29,24 +29,24 @@ from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import make_reference, map_poses, reference_along
 
-_LEAD, _TAIL = 0.7, 0.9  # [s] before and after a change that belong to it and are optimised
-_SETTLES, _BANDWIDTH = 1.0, 40.0  # [s] settling time and [Hz] cut-off of the stylus filter, high enough not to show
-_AT_ONCE = 6  # frames between two checks whether the clip has changed
+_LEAD, _TAIL = 0.7, 0.9  # [s] optimised time before and after a change
+_SETTLING, _BANDWIDTH = 1.0, 40.0  # [s] settling time and [Hz] cut-off of the stylus filter, too high to show
+_BLOCK = 6  # frames between two checks of whether the clip has changed
 _ITERATIONS = 10
-_AROUND = 0.5  # [s] of context on either side of a change, from which its stances are detected
+_CONTEXT = 0.5  # [s] context on either side of a change, for the detection of its stances
 _MOMENTS = 8  # moments of a stride at which a change by offsets is tried
-# How many of these are made feasible at most, and the cost below which no more are tried. With 12 iterations, three
-# tries and waits of 2.4 s, which take longer, eight of eight sets of captures stood; with these numbers seven or
-# eight do.
-_TRIES, _WELL = 2, 400.0
-_WAITS = 2.0  # [s] that a hand waits for the next gate, at most about
-_GATES = 3  # gates in a stride at most, unless it is long, since each takes some seconds to compute
-_LONGEST_WAIT = 4.0  # [s]: in clips with few strides, gates are as many as this needs
-_MOST = 8  # strides in a round at most
-_LONG = 8.0  # [s] after which a change that has not happened is given up
-_ROWS = 840  # samples of a round: divisible by any number of strides up to `_MOST`
-_LEAPS = 1.0  # [rad] from row to row, five times the largest of captures: a rotation vector that no spline can follow
-_REPEATS = 0.02  # [rad], [m] by which strides of one clip may differ
+# Maximum number of them that are made feasible, and the cost below which no more are tried. With 12 iterations, three
+# tries and waits of 2.4 s, which take longer, the figure stayed up on eight of eight sets of captures; with these
+# numbers it does on seven or eight.
+_MAX_TRIES, _GOOD_COST = 2, 400.0
+_TARGET_WAIT_TIME = 2.0  # [s] time between gates: about the longest that a hand waits for one
+_MAX_GATES = 3  # in a stride, since each takes some seconds to compute; a long stride has more
+_MAX_WAIT_TIME = 4.0  # [s] between gates in long strides, which have as many gates as this needs
+_MAX_STRIDES = 8  # in a round
+_TIMEOUT = 8.0  # [s] after which a change that has not happened is given up
+_SAMPLES = 840  # of a round: divisible by any number of strides up to `_MAX_STRIDES`
+_MAX_ROW_STEP = 1.0  # [rad] between rows, five times the largest of captures: no spline follows larger steps
+_STRIDE_TOLERANCE = 0.02  # [rad], [m] within which strides of one clip count as equal
 
 
 class _Passage(NamedTuple):
@@ -55,7 +55,7 @@ class _Passage(NamedTuple):
     Attributes
     ----------
     poses : Array, shape (n, nq)
-        The transition with `_AROUND` seconds of context on either side, at `FPS` frames a second.
+        The transition with `_CONTEXT` seconds of context on either side, at `FPS` frames a second.
     second : Array, shape (n, nq)
         The new clip alone at the same times, placed where the figure is after the change.
     gate : float
@@ -67,23 +67,25 @@ class _Passage(NamedTuple):
     gate: float
 
     @property
-    def own(self) -> slice:
+    def core(self) -> slice:
         """Rows of the transition, without the context."""
-        return slice(round(_AROUND * FPS), len(self.poses) - round(_AROUND * FPS))
+        return slice(round(_CONTEXT * FPS), len(self.poses) - round(_CONTEXT * FPS))
 
     def clip(self) -> Clip:
         """The transition without the context."""
-        return Clip(self.poses[self.own], FPS, "change")
+        return Clip(self.poses[self.core], FPS, "change")
 
     def stances(self) -> Stances:
         """Stances of the transition, detected with the context."""
-        whole, own = Clip(self.poses, FPS, "change"), self.own
-        told = stances(whole, whole)
-        return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own], told.kept[own])
+        whole, core = Clip(self.poses, FPS, "change"), self.core
+        found = stances(whole, whole)
+        return Stances(
+            found.standing[core], found.pushing[core], found.places[core], found.sliding[core], found.kept[core]
+        )
 
 
 class _Gate(NamedTuple):
-    """Where a transition is sought: its two rivers, a part of a stride, strides in a round, and moments to try [s]."""
+    """Where a transition is sought: its two rivers, part of the stride, strides in a round, and moments to try [s]."""
 
     first: int
     second: int
@@ -108,117 +110,122 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
     figure : mujoco.MjModel
         Model of the figure alone.
     """
-    rivers, alike = range(len(made.curves)), made.on_one_river()
+    rivers, one_river = range(len(made.curves)), made.on_one_river()
     made_of = (made.compiled().params, np.array([blend]))
     gates: list[_Gate] = []
     for first, second in ((a, b) for a in rivers for b in rivers if a != b):
-        strides = _strides(alike, first, second)
+        strides = _stride_count(one_river, first, second)
         stride = made.round_seconds(first) / strides
-        parts = max(min(int(np.ceil(stride / _WAITS)), _GATES), int(np.ceil(stride / _LONGEST_WAIT)))
+        parts = max(min(int(np.ceil(stride / _TARGET_WAIT_TIME)), _MAX_GATES), int(np.ceil(stride / _MAX_WAIT_TIME)))
         span = stride / parts
         gates += [_Gate(first, second, k, strides, span * (k + np.arange(_MOMENTS) / _MOMENTS)) for k in range(parts)]
     missing = [gate for gate in gates if not is_kept(kept_folder(__name__), gate.name, made_of, (-1, 57))]
     if missing:
         with working("making rivers' changes feasible", len(missing)):
-            side_by_side([(_kept, (alike, made_of, blend, figure, gate)) for gate in missing])
+            side_by_side([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
     changes: list[ClipChange] = []
     for gate in gates:
-        rows, period = _kept(alike, made_of, blend, figure, gate), made.round_seconds(gate.first)
+        rows, period = _cached_change(one_river, made_of, blend, figure, gate), made.round_seconds(gate.first)
         if len(rows):
             phases = (rows[0, 0] + period / gate.strides * np.arange(gate.strides)) % period
             changes.append(ClipChange(gate.first, gate.second, phases, rows[1:]))
     return made.with_changes(changes)
 
 
-def _kept(made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate) -> Array:
-    """Result of `_found`, cached under the data of which the rivers are made."""
+def _cached_change(
+    made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate
+) -> Array:
+    """Result of `_change`, cached under the data of which the map is made."""
 
     def find() -> Array:
-        return _found(made, blend, figure, gate.first, gate.second, gate.moments)
+        return _change(made, blend, figure, gate.first, gate.second, gate.moments)
 
     return kept_array(kept_folder(__name__), gate.name, made_of, (-1, 57), find)
 
 
-def _strides(made: RiverClips, first: int, second: int) -> int:
-    """Into how many equal strides a round of both clips divides."""
+def _stride_count(made: RiverClips, first: int, second: int) -> int:
+    """Number of equal strides into which a round of both clips divides."""
     rounds = [
-        _alone(made, river, np.arange(_ROWS) * made.round_seconds(river) / _ROWS)[:, 7:] for river in (first, second)
+        _clip_poses(made, river, np.arange(_SAMPLES) * made.round_seconds(river) / _SAMPLES)[:, 7:]
+        for river in (first, second)
     ]
-    for strides in range(_MOST, 1, -1):
-        if all(np.abs(whole - np.roll(whole, _ROWS // strides, axis=0)).max() < _REPEATS for whole in rounds):
+    for strides in range(_MAX_STRIDES, 1, -1):
+        if all(
+            np.abs(whole - np.roll(whole, _SAMPLES // strides, axis=0)).max() < _STRIDE_TOLERANCE for whole in rounds
+        ):
             return strides
     return 1
 
 
-def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
+def _clip_poses(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
     """Poses of a river's clip at phases [s] after the start of the round, beginning with a given memory of the map."""
-    curve, own = made.curves[river], _begun(made, phases[0]) if memory is None else memory.copy()
-    own[RIVER] = river
-    return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), own)
+    curve, start_memory = made.curves[river], _memory_at(made, phases[0]) if memory is None else memory.copy()
+    start_memory[RIVER] = river
+    return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), start_memory)
 
 
-def _begun(made: RiverClips, phase: float) -> Array:
+def _memory_at(made: RiverClips, phase: float) -> Array:
     """Memory of a run that begins at a phase [s] after the start of the round."""
     memory, start = made.compiled().memory, made.curves[0].start
     memory[PHASE] = start + phase % made.round_seconds(0)
     return memory
 
 
-def _passage(
+def _make_passage(
     made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
 ) -> _Passage | None:
-    """The transition from one river's clip to another's at or soon after a moment of the round [s]; None without."""
+    """The transition from one river's clip to another's at or soon after a moment of the round [s]; None if none."""
     curve, period = made.curves[first], made.round_seconds(first)
     lap = curve.duration
-    times = period + moment - _LEAD - _AROUND - _SETTLES + np.arange(_AT_ONCE * round(_LONG * FPS / _AT_ONCE)) / FPS
+    times = period + moment - _LEAD - _CONTEXT - _SETTLING + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
     stylus = stylus_path(curve.point(curve.start + times % lap))
     traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
     traces[:, TRACE_RIVER] = np.where(times < period + moment, first, second)
     traces[:, TRACE_PHASE] = curve.start + times % lap
-    compiled = made.compiled()._replace(memory=_begun(made, times[0]))
+    compiled = made.compiled()._replace(memory=_memory_at(made, times[0]))
     compiled.memory[RIVER] = first
     reference = make_reference(figure, compiled, 1.0 / FPS, _BANDWIDTH, blend, packed_legs(figure))
-    changed, tail = None, round((_TAIL + _AROUND) * FPS)
-    for k in range(0, len(times) - tail, _AT_ONCE):
-        part = slice(k, k + _AT_ONCE)
+    changed, tail = None, round((_TAIL + _CONTEXT) * FPS)
+    for k in range(0, len(times) - tail, _BLOCK):
+        part = slice(k, k + _BLOCK)
         reference_along(reference, stylus[part], traces[part], poses[part])
         changed = k if changed is None and reference.memory[RIVER] == second else changed
         if changed is not None and reference.transition.since[0] >= reference.transition.lasts[0]:
             rest = slice(part.stop, part.stop + tail)
             reference_along(reference, stylus[rest], traces[rest], poses[rest])
-            rows = np.arange(changed - round((_LEAD + _AROUND) * FPS), rest.stop)
-            alone = _alone(made, second, times[rows[::-1]], reference.memory)[::-1]
-            return _Passage(poses[rows], alone, float((times[rows[0]] + _AROUND) % period))
+            rows = np.arange(changed - round((_LEAD + _CONTEXT) * FPS), rest.stop)
+            second_poses = _clip_poses(made, second, times[rows[::-1]], reference.memory)[::-1]
+            return _Passage(poses[rows], second_poses, float((times[rows[0]] + _CONTEXT) % period))
     return None
 
 
-def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
+def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
     """The gate [s] as a first row, then the offsets (n, 57) of the transition that begins there; (0, 57) if none."""
-    passages = [_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
+    passages = [_make_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
     longest = LONGEST * made.round_seconds(first)
-    tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
-    if not tried:
+    usable = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
+    if not usable:
         return np.zeros((0, 57))
-    tried.sort(key=lambda passage: borne(passage.clip(), passage.stances(), passage=True).residual)
-    made_so: list[tuple[_Passage, Feasible]] = []
-    for passage in tried[:_TRIES]:
-        made_so.append((passage, feasible(passage.clip(), passage.stances(), _ITERATIONS, FPS, passage=True)))
-        if made_so[-1][1].costs[-1] < _WELL:
+    usable.sort(key=lambda passage: borne(passage.clip(), passage.stances(), passage=True).residual)
+    candidates: list[tuple[_Passage, Feasible]] = []
+    for passage in usable[:_MAX_TRIES]:
+        candidates.append((passage, feasible(passage.clip(), passage.stances(), _ITERATIONS, FPS, passage=True)))
+        if candidates[-1][1].costs[-1] < _GOOD_COST:
             break
-    best, changed = min(made_so, key=lambda found: found[1].costs[-1])
-    poses, own = best.poses.copy(), best.own
-    poses[own] = changed.clip.poses
-    shown = slice(own.start - round(LEAD_IN * FPS), own.stop)
-    offsets = _way(best.second[shown], poses[shown])
-    # Offsets at the end are only the lag of the stylus filter: fade them out.
+    best, changed = min(candidates, key=lambda found: found[1].costs[-1])
+    poses, core = best.poses.copy(), best.core
+    poses[core] = changed.clip.poses
+    shown = slice(core.start - round(LEAD_IN * FPS), core.stop)
+    offsets = _pose_offsets(best.second[shown], poses[shown])
+    # Offsets at the end are only due to the lag of the stylus filter: fade them out.
     left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)
     offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
-    if np.abs(np.diff(offsets, axis=0)).max() > _LEAPS:
+    if np.abs(np.diff(offsets, axis=0)).max() > _MAX_ROW_STEP:
         return np.zeros((0, 57))
     return np.vstack([np.full((1, 57), best.gate), offsets])
 
 
-def _way(second: Array, shown: Array) -> Array:
+def _pose_offsets(second: Array, shown: Array) -> Array:
     """Offsets (n, 57) from poses of the second clip to the poses shown, as `clip_change` adds them."""
     n = len(second)
     turns = [poses[:, 3:].reshape(n, -1, 4) for poses in (second, shown)]

@@ -21,11 +21,11 @@ from sim.compilation.sources import kept_folder
 from sim.reference.reference import map_poses
 
 SKATES = 0.02
-"""Largest foot skate of a blend, 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
+"""Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
 
-LACKS = 0.06  # [body weights] RMS above that of the clips: from there on, or from `SKATES` above it, clips differ
+LACKS = 0.06  # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `SKATES`
 _FPS = 60.0
-_TRUNK = ("abdomen", "chest")
+_TRUNK_BODIES = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
 
 
@@ -63,9 +63,9 @@ def motion_of(poses: Array, fps: float) -> Motion:
 
     clip = Clip(poses, fps, "blend")
     schedule = stances(clip, smoothed(clip))
-    given = borne(clip, schedule)
-    slides, lowest = skates(clip, schedule, given.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
-    return Motion(given.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
+    support = borne(clip, schedule)
+    slides, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
+    return Motion(support.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:
@@ -78,12 +78,12 @@ def moves_alike(made: Cylindrical, lap: float) -> bool:
         return np.array([motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
     found = kept_array(kept_folder(__name__), "alike", (made.compiled().params, np.array([lap])), (5, 4), find)
-    usual = np.median(found[1:], axis=0)
-    return bool(found[0, 0] < usual[0] + LACKS and found[0, 2] < usual[2] + SKATES)
+    corner_median = np.median(found[1:], axis=0)
+    return bool(found[0, 0] < corner_median[0] + LACKS and found[0, 2] < corner_median[2] + SKATES)
 
 
 def carries_alike(made: Composite, lap: float) -> bool:
-    """Whether the legs of a composite map need little more residual under other clips' upper bodies than their own."""
+    """Whether the residual of a composite map's legs grows little with other clips' upper bodies."""
     lower = made.clips[0]
     own = Composite(lower, lower, lower, made.upper_joints, made.r_range, made.limbs, made.lap)
 
@@ -98,7 +98,7 @@ def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: fl
     """Measure a lap [s] of a map round a circle, at shares `place` of its domain in r and z; needs compiled code."""
     (r_low, r_high), (z_low, z_high) = made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)
     rows = max(64, round(_FPS * lap))
-    # The last pose repeats the first, as in a closed clip: without it the motion would be taken for one that stops.
+    # The last pose repeats the first, as in a closed clip: otherwise the motion would count as one that stops.
     angles, r = 2.0 * np.pi * np.arange(rows + 1) / rows, r_low + place[0] * (r_high - r_low)
     stylus = np.zeros((rows + 1, 7))
     stylus[:, 0], stylus[:, 1] = r * np.cos(angles), r * np.sin(angles)
@@ -108,4 +108,4 @@ def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: fl
 
 def arms(legs: Sequence[Limb]) -> list[int]:
     """Joints of arms and head."""
-    return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK}]
+    return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK_BODIES}]

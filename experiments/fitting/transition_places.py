@@ -1,7 +1,7 @@
-"""Places over the floor of two motions at a transition of a lifted map: how far a change between them carries a figure.
+"""Places over the floor of two motions at a transition of a lifted map: how far a change between them moves a figure.
 
 Transitions are found where poses, velocities and standing feet agree, regardless of the place over the floor. Motions
-that go there and back within a lap, such as a run from one end of a room to the other, may be anywhere at that moment.
+that travel there and back within a lap, such as a run from one end of a room to the other, may be far apart then.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
 from sim.reference.reference import map_poses
 
-# [m]; a hand changes over within about 0.25 s, so that a figure is carried by 1 m/s. Transitions of the embedded clips
-# have 3 mm; of captures, one has 1.6 m, and there the figure falls.
-_FAR = 0.25
+# [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 3 mm
+# apart at their transitions; captures are 1.6 m apart at one, where the figure falls.
+_MAX_DISTANCE = 0.25
 
 
 def places_apart(made: Lifted, transition: MapTransition) -> float:
@@ -28,9 +28,9 @@ def places_apart(made: Lifted, transition: MapTransition) -> float:
 
 
 def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple[str, ...]]:
-    """The map, and a remark if a push over at a transition carries the figure too far to be followed."""
+    """The map, and a remark if a change at a transition moves the figure too far to be followed."""
     apart = places_apart(made, transition)
-    if apart < _FAR:
+    if apart < _MAX_DISTANCE:
         return made, ()
     names = f"{made.names[transition.first]} and {made.names[transition.second]}"
     return made, (

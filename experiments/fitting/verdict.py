@@ -1,4 +1,4 @@
-"""Trials before a run of how the physical figure follows a map's animation; results are cached."""
+"""Trials, before a run, of how the physical figure follows a map's animation; results are cached."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from sim.compilation.sources import kept_folder
 from sim.compilation.unit_workers import compile_units
 
 BEARABLE = FLYING
-"""Largest bearable RMS residual [body weights]."""
+"""Largest acceptable RMS of the residual force [body weights]."""
 
 SECONDS, FPS = 20.0, 120.0
 """Duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
@@ -73,7 +73,7 @@ def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterab
         from experiments.preparation.followed import followed  # imported late: loads signal processing
 
         with working("following the blend"):
-            told = followed(show(), seconds, compile_units)
-        return np.array([[told.residual, np.inf if told.fell is None else told.fell]])
+            result = followed(show(), seconds, compile_units)
+        return np.array([[result.residual, np.inf if result.fell is None else result.fell]])
 
     return Verdict(*kept_array(kept_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())

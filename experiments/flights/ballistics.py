@@ -32,10 +32,10 @@ from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, tracked_motion
 
-_LIFT = 10.0  # height at which a flight is flown, out of reach of the floor [m]
-_FINE = 480.0  # frame rate at which a flight is flown [1/s]
+_FLIGHT_HEIGHT = 10.0  # height at which a flight is flown, out of reach of the floor [m]
+_FLIGHT_FPS = 480.0  # frame rate at which a flight is flown [1/s]
 # Frames after the landing that shape the reference's spline: an end's influence decays by 0.27 a frame, to 3e-5.
-_AFTER = 8
+_FRAMES_AFTER_LANDING = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +69,15 @@ class ClipBallistics:
         """The verdicts and the admissible rates in words, a line each."""
         verdicts = [f"{name}: {found.verdict}; {found.reason}" for name, found in self.certificate.verdicts.items()]
         rates = [
-            f"flight at {flight.fit.time:.2f} s: seen as natural {_in_words(flight.seen)} of its speed, can be done "
-            f"{_in_words(flight.done)}; true gravity asks for a take-off at {flight.fit.take_off_speed:.2f} m/s, "
+            f"flight at {flight.fit.time:.2f} s: seen as natural {_rates_text(flight.seen)} of its speed, can be done "
+            f"{_rates_text(flight.done)}; true gravity asks for a take-off at {flight.fit.take_off_speed:.2f} m/s, "
             f"recorded {flight.fit.take_off[2]:.2f}"
             for flight in self.flights
         ]
         return (*verdicts, *rates)
 
 
-def _in_words(rates: tuple[float, float] | None) -> str:
+def _rates_text(rates: tuple[float, float] | None) -> str:
     if rates is None or not np.isfinite(rates[0]):
         return "at no rate"
     return f"at {rates[0]:.2f} or more" if rates[1] > ANY_RATE else f"at {rates[0]:.2f} to {rates[1]:.2f}"
@@ -97,7 +97,7 @@ class FlightTrial(NamedTuple):
     turn : float
         Largest angle between the pelvis of figure and clip [rad].
     residual : float
-        Largest component of the residual wrench at the root [N, N m]; not zero only if it was no flight.
+        Largest component of the residual wrench at the root [N, N m]; zero in a true flight.
     """
 
     rate: float
@@ -109,17 +109,17 @@ class FlightTrial(NamedTuple):
 
 def body_motion(clip: Clip) -> BodyMotion:
     """Centre of mass, momentum and contacts of a clip on the default figure, for the ballistic certificate."""
-    moved, touched = momentum(clip), contacts(clip)
-    return BodyMotion(clip.fps, *moved, touched.clearance, touched.supported)
+    dynamics, floor = momentum(clip), contacts(clip)
+    return BodyMotion(clip.fps, *dynamics, floor.clearance, floor.supported)
 
 
 def body_contact(clip: Clip) -> BodyContact:
     """Floor contact and foot skate of a clip, for the certificate's checks of the capture."""
-    touched, points = contacts(clip), sole_points(clip.poses)
-    slid = float(stance_slides(points, touched.resting[:, : points.shape[1]]).max())
+    floor, points = contacts(clip), sole_points(clip.poses)
+    slide = float(stance_slides(points, floor.resting[:, : points.shape[1]]).max())
     turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)
     return BodyContact(
-        touched.clearance, touched.supported, np.any(touched.resting, axis=1), slid,
+        floor.clearance, floor.supported, np.any(floor.resting, axis=1), slide,
         np.linalg.norm(turns, axis=2).max(axis=1, initial=0.0),
     )  # fmt: skip
 
@@ -127,23 +127,23 @@ def body_contact(clip: Clip) -> BodyContact:
 def clip_flights(clip: Clip) -> tuple[tuple[float, float], ...]:
     """Time of the last contact before each flight of a clip and of the first one after it [s].
 
-    Of a closed clip the flights that begin within a lap: one over the seam ends in the next lap.
+    For a closed clip, the flights that begin within a lap: one over the seam ends in the next lap.
     """
-    laps = _laps(clip)
+    laps = _with_second_lap(clip)
     supported = contacts(laps).supported
-    found = [span for span in find_flights(supported, laps.fps) if _within_first_lap(span[0], clip, supported)]
+    found = [span for span in find_flights(supported, laps.fps) if _is_in_first_lap(span[0], clip, supported)]
     return tuple((start / laps.fps, end / laps.fps) for start, end in found)
 
 
-def _laps(clip: Clip) -> Clip:
+def _with_second_lap(clip: Clip) -> Clip:
     """The clip; a closed one with a second lap, so that a flight over the seam is whole."""
     return clip.with_next_lap() if clip.closes() else clip
 
 
-def _within_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
-    """Whether a flight from a frame on begins in the first lap: at its beginning it is the second half of the last one.
+def _is_in_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
+    """Whether a flight that starts at a frame begins in the first lap; one before any support began a lap earlier.
 
-    `supported` are the frames of all laps in which anything bears load.
+    `supported` marks the frames of all laps in which anything bears load.
     """
     return len(supported) == clip.n_frames or int(np.argmax(supported)) <= start < clip.n_frames - 1
 
@@ -157,10 +157,10 @@ def clip_ballistics(
 
     `assumptions` are added to those of the verdict on the flights.
     """
-    laps = _laps(clip)
+    laps = _with_second_lap(clip)
     motion = body_motion(laps)
-    judged = judge_flights(motion, judging.tolerance)
-    flights = tuple(flight for flight in judged if _within_first_lap(flight.fit.start, clip, motion.supported))
+    judgements = judge_flights(motion, judging.tolerance)
+    flights = tuple(flight for flight in judgements if _is_in_first_lap(flight.fit.start, clip, motion.supported))
     bounds = rate_bounds(motion, flights, judging.friction)
     doubts, measures = contact_doubts(body_contact(laps), motion.com, laps.fps, judging.contact)
     verdict = ballistic_verdict(motion, flights, judging.tolerance, doubts, measures)
@@ -178,12 +178,12 @@ def clip_ballistics(
 def _with_initial_state(verdict: Verdict, clip: Clip, flights: tuple[FlightJudgement, ...]) -> Verdict:
     """The verdict with qpos and qvel of the best take-off added to its counterexample, for a simulation."""
     fit = next(flight.fit for flight in flights if flight.verdict == "refuted")
-    take_off = _played(clip, fit, 1.0)
+    take_off = _play_flight(clip, fit, 1.0)
     state = {"qpos": take_off.flown.poses[0], "qvel": take_off.flown.velocities()[0]}
     return replace(verdict, counterexample={**verdict.counterexample, **state})
 
 
-class _Played(NamedTuple):
+class _PlayedFlight(NamedTuple):
     """A flight as recorded and played at a rate, and the same joint motion in free flight."""
 
     recorded: Clip
@@ -192,44 +192,44 @@ class _Played(NamedTuple):
     distance: float
 
 
-def _played(clip: Clip, fit: FlightFit, rate: float) -> _Played:
-    """Rotate and move each pose of a flight as a whole: angular momentum is constant, and the fall the best-fitting."""
-    n = round(fit.duration * _FINE) + 1
-    times = np.arange(n + _AFTER) * fit.duration / (n - 1)
+def _play_flight(clip: Clip, fit: FlightFit, rate: float) -> _PlayedFlight:
+    """Rotate and shift each pose of a flight as a whole, for constant angular momentum and the best-fitting fall."""
+    n = round(fit.duration * _FLIGHT_FPS) + 1
+    times = np.arange(n + _FRAMES_AFTER_LANDING) * fit.duration / (n - 1)
     recorded = Clip(clip_motion(clip, fit.time + times).poses, rate / float(times[1]), clip.name)
-    moved = momentum(recorded)
-    distance, (p, v) = best_fall(moved.com[:n], recorded.fps / rate, rate)
-    turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
+    dynamics = momentum(recorded)
+    distance, (p, v) = best_fall(dynamics.com[:n], recorded.fps / rate, rate)
+    rotation = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
     for k in range(len(times) - 1):
-        R = Rotation.from_quat(turn[k], scalar_first=True)
-        missing = rate * fit.momentum - R.apply(moved.angular[k])
-        spin = R.apply(np.linalg.solve(moved.inertia[k], R.inv().apply(missing)))
-        turn[k + 1] = (Rotation.from_rotvec(spin / recorded.fps) * R).as_quat(scalar_first=True)
+        R = Rotation.from_quat(rotation[k], scalar_first=True)
+        missing = rate * fit.momentum - R.apply(dynamics.angular[k])
+        angular_velocity = R.apply(np.linalg.solve(dynamics.inertia[k], R.inv().apply(missing)))
+        rotation[k + 1] = (Rotation.from_rotvec(angular_velocity / recorded.fps) * R).as_quat(scalar_first=True)
     poses = recorded.poses.copy()
     t = times[:, None] / rate
     fall = p + v * t - np.array([0.0, 0.0, GRAVITY / 2.0]) * t**2
-    poses[:, :3] = fall + quaternions.rotated(turn, poses[:, :3] - moved.com)
-    poses[:, 3:7] = quaternions.product(turn, poses[:, 3:7])
-    return _Played(recorded, moved.com, Clip(poses, recorded.fps, clip.name), distance)
+    poses[:, :3] = fall + quaternions.rotated(rotation, poses[:, :3] - dynamics.com)
+    poses[:, 3:7] = quaternions.product(rotation, poses[:, 3:7])
+    return _PlayedFlight(recorded, dynamics.com, Clip(poses, recorded.fps, clip.name), distance)
 
 
 def fly(clip: Clip, fit: FlightFit, rate: float) -> FlightTrial:
-    """Let the physical figure take off as the certificate predicts and fly a flight of a clip, played at a rate.
+    """Let the physical figure take off as the certificate predicts and perform a flight of a clip, played at a rate.
 
     It follows the clip's joint angles by its own torques; no force acts at its root.
     """
-    played = _played(clip, fit, rate)
-    lifted = Clip(played.flown.poses + np.eye(N_POSE)[2] * _LIFT, played.flown.fps, clip.name)
-    done = tracked_motion(lifted, fit.duration / rate, TrackingConfig(physics_step=2.5e-4))
-    times = done.reference.times
+    flight = _play_flight(clip, fit, rate)
+    lifted = Clip(flight.flown.poses + np.eye(N_POSE)[2] * _FLIGHT_HEIGHT, flight.flown.fps, clip.name)
+    tracked = tracked_motion(lifted, fit.duration / rate, TrackingConfig(physics_step=2.5e-4))
+    times = tracked.reference.times
     frames = np.arange(lifted.n_frames) / lifted.fps
-    com = CubicSpline(frames, played.com)(times)
-    flown = momentum(Clip(done.poses, 1.0 / float(times[1]), clip.name)).com - (0.0, 0.0, _LIFT)
-    turn = pose_difference(clip_motion(played.recorded, times).poses, done.poses)[:, 3:6]
+    com = CubicSpline(frames, flight.com)(times)
+    flown = momentum(Clip(tracked.poses, 1.0 / float(times[1]), clip.name)).com - (0.0, 0.0, _FLIGHT_HEIGHT)
+    turn = pose_difference(clip_motion(flight.recorded, times).poses, tracked.poses)[:, 3:6]
     return FlightTrial(
         rate=rate,
         distance=float(np.linalg.norm(flown - com, axis=1).max()),
-        predicted=played.distance,
+        predicted=flight.distance,
         turn=float(np.linalg.norm(turn, axis=1).max()),
-        residual=float(np.abs(done.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]).max()),
+        residual=float(np.abs(tracked.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]).max()),
     )

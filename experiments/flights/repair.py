@@ -20,10 +20,10 @@ from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 
-_AROUND = 1.0  # time before the first refuted flight and after the last one that may be changed [s]
-_SINKS = 0.01  # floor penetration of captures that is tolerated [m]
-_LIFTING = 0.1  # half width of the filter that smooths a lift in time [s]
-_RELEASE = 0.1  # time in which a foot that leaves the floor takes over the displacement of the body [s]
+_CHANGE_MARGIN = 1.0  # time before the first refuted flight and after the last one that may be changed [s]
+_PENETRATION_TOLERANCE = 0.01  # floor penetration of captures that is tolerated [m]
+_LIFT_FILTER_HALF_WIDTH = 0.1  # half width of the filter that smooths a lift in time [s]
+_RELEASE_TIME = 0.1  # time in which a foot that leaves the floor takes on the displacement of the body [s]
 
 
 class Repaired(NamedTuple):
@@ -94,32 +94,32 @@ def repair_clip(clip: Clip) -> Repaired:
     """
     before, lifted = clip_ballistics(clip), over_the_floor(clip)
     n, closed = clip.n_frames, clip.closes()
-    found, clip = before if lifted is clip else clip_ballistics(lifted), lifted
-    spans = [(f.fit.start, f.fit.end) for f in found.flights if f.verdict != "unknown" and f.fit.end < n]
-    refuted = [f.fit for f in found.flights if f.verdict == "refuted" and f.fit.end < n]
+    current, clip = before if lifted is clip else clip_ballistics(lifted), lifted
+    spans = [(f.fit.start, f.fit.end) for f in current.flights if f.verdict != "unknown" and f.fit.end < n]
+    refuted = [f.fit for f in current.flights if f.verdict == "refuted" and f.fit.end < n]
     if not refuted:
-        return Repaired(clip, before, found, None)
-    around = round(_AROUND * clip.fps)
-    first = max(0, min(fit.start for fit in refuted) - around)
-    last = min(n - 1, max(fit.end for fit in refuted) + around)
-    touched = [(a, b) for a, b in spans if b > first and a < last]
-    first, last = min([first, *(a for a, _ in touched)]), max([last, *(b for _, b in touched)])
+        return Repaired(clip, before, current, None)
+    margin = round(_CHANGE_MARGIN * clip.fps)
+    first = max(0, min(fit.start for fit in refuted) - margin)
+    last = min(n - 1, max(fit.end for fit in refuted) + margin)
+    window_flights = [(a, b) for a, b in spans if b > first and a < last]
+    first, last = min([first, *(a for a, _ in window_flights)]), max([last, *(b for _, b in window_flights)])
     window = slice(first, last + 1)
-    moved, touching = momentum(clip), contacts(clip)
+    dynamics, floor = momentum(clip), contacts(clip)
     lines, leg = leg_lines(clip.poses)
     plan = repair(
         RepairTask(
-            fps=clip.fps, com=moved.com[window], angular=moved.angular[window], clearance=touching.clearance[window],
-            flights=[(a - first, b - first) for a, b in touched], legs=lines[window],
-            standing=touching.loaded[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
+            fps=clip.fps, com=dynamics.com[window], angular=dynamics.angular[window], clearance=floor.clearance[window],
+            flights=[(a - first, b - first) for a, b in window_flights], legs=lines[window],
+            standing=floor.loaded[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
         )
     )  # fmt: skip
-    done = over_the_floor(_carried_out(clip, plan, first, touched, touching.loaded))
-    return Repaired(done, before, clip_ballistics(done), plan)
+    repaired = over_the_floor(_apply_plan(clip, plan, first, window_flights, floor.loaded))
+    return Repaired(repaired, before, clip_ballistics(repaired), plan)
 
 
-def _carried_out(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: Mask) -> Clip:
-    """The clip with the plan's timing and displacement of the body, planted feet kept, at the clip's frame rate."""
+def _apply_plan(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: Mask) -> Clip:
+    """The clip with the plan's timing and body displacement, and with planted feet held, at the clip's frame rate."""
     n, step = clip.n_frames, 1.0 / clip.fps
     times: Array = np.arange(n, dtype=np.float64) * step
     shift = np.zeros((n, 3))
@@ -128,39 +128,39 @@ def _carried_out(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[i
     times[last + 1 :] += times[last] - last * step
     shift[first : last + 1] = plan.shift
     frames = np.arange(round(times[-1] * clip.fps) + 1) * step
-    # By rounding, the last frame may lie half a step beyond the end.
+    # Due to rounding, the last frame may lie half a step beyond the end.
     frames = np.minimum(frames, times[-1])
     poses = clip_motion(clip, np.asarray(PchipInterpolator(times, np.arange(n) * step)(frames))).poses
     shifts = np.asarray(PchipInterpolator(times, shift)(frames))
-    planted = np.stack([np.interp(frames, times, _planted(times, foot)) for foot in standing.T], axis=1)
+    planted = np.stack([np.interp(frames, times, _planted_weight(times, foot)) for foot in standing.T], axis=1)
     for _ in range(3):
         com = momentum(Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)).com
         for (start, end), (p, v) in zip(flights, plan.falls, strict=True):
             t = frames - times[start]
             fall = p + v * t[:, None] - np.outer(GRAVITY / 2.0 * t**2, (0.0, 0.0, 1.0))
             flying = np.flatnonzero((frames >= times[start]) & (frames <= times[end]))
-            missed = np.zeros((len(frames), 3))
-            missed[flying] = (fall - com)[flying]
+            correction = np.zeros((len(frames), 3))
+            correction[flying] = (fall - com)[flying]
             for edge, side in ((flying[0], slice(None, flying[0])), (flying[-1], slice(flying[-1] + 1, None))):
-                missed[side] = missed[edge] * _faded(np.abs(frames[side] - frames[edge]))[:, None]
-            shifts = shifts + missed
-    done = Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
-    within = [np.flatnonzero((frames >= times[start]) & (frames <= times[end])) for start, end in flights]
-    return with_constant_momentum(done, [(int(flying[0]), int(flying[-1])) for flying in within if len(flying) > 2])
+                correction[side] = correction[edge] * _fade_weight(np.abs(frames[side] - frames[edge]))[:, None]
+            shifts = shifts + correction
+    moved = Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
+    spans = [np.flatnonzero((frames >= times[start]) & (frames <= times[end])) for start, end in flights]
+    return with_constant_momentum(moved, [(int(flying[0]), int(flying[-1])) for flying in spans if len(flying) > 2])
 
 
 def over_the_floor(clip: Clip) -> Clip:
     """The clip lifted smoothly in time by at least the depth of its lowest point below the floor.
 
-    A clip whose penetration is nowhere larger than `_SINKS` is left unchanged.
+    A clip whose penetration is nowhere larger than `_PENETRATION_TOLERANCE` is left unchanged.
     """
     below = np.maximum(0.0, -contacts(clip).clearance)
-    if below.max() <= _SINKS:
+    if below.max() <= _PENETRATION_TOLERANCE:
         return clip
     if clip.closes():
         # Three laps, so that the filters are periodic.
         below = np.concatenate([below[:-1], below[:-1], below])
-    width = max(1, round(_LIFTING * clip.fps))
+    width = max(1, round(_LIFT_FILTER_HALF_WIDTH * clip.fps))
     # The maximum over the reach of both mean filters, so that the smoothed lift is nowhere below what is needed.
     needed = maximum_filter1d(below, 4 * width + 1, mode="nearest")
     lift = uniform_filter1d(uniform_filter1d(needed, 2 * width + 1, mode="nearest"), 2 * width + 1, mode="nearest")
@@ -171,14 +171,14 @@ def over_the_floor(clip: Clip) -> Clip:
     return Clip(poses, clip.fps, clip.name)
 
 
-def _planted(times: Array, standing: Mask) -> Array:
+def _planted_weight(times: Array, standing: Mask) -> Array:
     """Weight of a planted foot: 1 while it stands, fading to 0 before and after, shape (n,)."""
     if not standing.any():
         return np.zeros(len(times))
-    return _faded(np.abs(times[:, None] - times[standing]).min(axis=1))
+    return _fade_weight(np.abs(times[:, None] - times[standing]).min(axis=1))
 
 
-def _faded(age: Array) -> Array:
-    """C¹ weight by time from a stance or flight [s]: 1 at 0, 0 from `_RELEASE` on."""
-    x = np.clip(age / _RELEASE, 0.0, 1.0)
+def _fade_weight(age: Array) -> Array:
+    """C¹ weight by time from a stance or flight [s]: 1 at 0, 0 from `_RELEASE_TIME` on."""
+    x = np.clip(age / _RELEASE_TIME, 0.0, 1.0)
     return (1.0 - x) ** 2 * (1.0 + 2.0 * x)

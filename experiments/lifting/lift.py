@@ -1,8 +1,8 @@
 """Lifting of clips by name or file: a curve for each, and one haptic map with all of them.
 
-A closed clip shorter than a second is repeated along its curve, since no hand can be led evenly round a lap in half a
-second: a captured run of 0.55 s a stride had a residual of 21 % of weight with one stride in a lap, and of 11 % with
-two.
+A closed clip shorter than `_MIN_LAP_DURATION` is repeated along its curve, since no hand can be led evenly round a lap
+in half a second: a captured run with strides of 0.55 s had a residual of 21 % of body weight with one stride a lap, and
+of 11 % with two.
 """
 
 import math
@@ -31,7 +31,7 @@ from models.one_blas_thread import on_one_blas_thread
 from sim.errors import SimError
 from sim.world.world import phantom_angles
 
-_SHORTEST = 2.0  # [s] least duration of a lap: with 4 s a sprint goes round 8 times, and falls by encoder noise
+_MIN_LAP_DURATION = 2.0  # [s]; with 4 s a sprint is repeated 8 times, and the figure falls because of encoder noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class LiftedClips:
     clips : tuple of Clip
         The clips as lifted.
     turned : tuple of bool
-        Whether each is continued by its reversal (`there_and_back`).
+        Whether each is followed by its reversal (`there_and_back`).
     rounds : tuple of int
         How often each is repeated in a lap.
     names : tuple of str
@@ -99,7 +99,7 @@ def check_workspace(room: Room) -> None:
 def lift_clips(
     names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
 ) -> LiftedClips:
-    """Lift clips by name or file; an open clip nearly at rest at both ends is continued back (`there_and_back`).
+    """Lift clips by name or file; an open clip nearly at rest at both ends goes back (`there_and_back`).
 
     Parameters
     ----------
@@ -132,9 +132,9 @@ def lift_clips(
         for clip, name in zip(loaded, names, strict=True)
     )
     turned = tuple(clip.n_frames > as_loaded.n_frames for clip, as_loaded in zip(clips, loaded, strict=True))
-    rounds = tuple(math.ceil(_SHORTEST / clip.duration) if clip.closes() else 1 for clip in clips)
-    clips = tuple(_round(clip, times) for clip, times in zip(clips, rounds, strict=True))
-    labels = _labels(names)
+    rounds = tuple(math.ceil(_MIN_LAP_DURATION / clip.duration) if clip.closes() else 1 for clip in clips)
+    clips = tuple(_repeat(clip, times) for clip, times in zip(clips, rounds, strict=True))
+    labels = _unique_labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
     transitions = [MapTransition(at.first, at.second, at.angle, at.pose, at.velocity) for at in lifting.transitions]
@@ -145,13 +145,13 @@ def lift_clips(
     return LiftedClips(clips, turned, rounds, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
 
 
-def _round(clip: Clip, times: int) -> Clip:
+def _repeat(clip: Clip, times: int) -> Clip:
     """A closed clip repeated several times."""
     poses, first = around(clip, (times - 1) * (clip.n_frames - 1))
     return replace(clip, poses=poses[first:])
 
 
-def _labels(names: Sequence[str]) -> tuple[str, ...]:
+def _unique_labels(names: Sequence[str]) -> tuple[str, ...]:
     """A unique name for every clip: its name or file stem, with a number appended if it is taken."""
     labels: list[str] = []
     for name in names:

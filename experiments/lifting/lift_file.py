@@ -12,11 +12,11 @@ from experiments.lifting.lift import lift_clips
 from experiments.lifting.lift_report import LiftReport, report_lift
 from sim.errors import SimError
 
-_DEFAULT = Room()
+_DEFAULT_ROOM = Room()
 
 
 def lift_into(
-    names: Sequence[str | Path], out: str | Path, *, room: Room = _DEFAULT, cyclic: Sequence[str | Path] = (),
+    names: Sequence[str | Path], out: str | Path, *, room: Room = _DEFAULT_ROOM, cyclic: Sequence[str | Path] = (),
     seed: int = 1, overwrite: bool = False, raw: bool = False,
 ) -> LiftReport:  # fmt: skip
     """Lift clips: a curve for each, and one haptic map with all of them, which is measured and written to a file.
@@ -26,7 +26,7 @@ def lift_into(
     names : sequence of str or path
         Names of embedded clips, or motion files, which are prepared.
     out : path
-        File to write (.npz), at the very end.
+        File to write (.npz); it is written last.
     room : Room
         Where the curves may lie.
     cyclic : sequence of str or path
@@ -34,14 +34,14 @@ def lift_into(
     seed : int
         Seed of the initial arrangement of the curves.
     overwrite : bool
-        Replace a file that is there.
+        Replace an existing file.
     raw : bool
         Take motion files as captured, not prepared.
 
     Raises
     ------
     ModelError, ControllerError, SimError
-        As `lift_clips`; or if an argument is of another kind, the file is not a .npz, or exists and is not to be
+        As `lift_clips`; or if an argument is of the wrong kind, or the file is not a .npz or exists and is not to be
         replaced.
     OSError
         If it cannot be written.

@@ -30,8 +30,8 @@ class LiftReport(NamedTuple):
         lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
         if len(names) > 1:
             lines = [
-                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_apart(after)} (before the arrangement "
-                f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
+                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_separation(after)} (before the arrangement "
+                f"{_separation(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
                 f"(before {100 * before.stress:.0f} %)."
             ]
         for name, clip, curve, turned, rounds, closed in zip(
@@ -57,7 +57,7 @@ class LiftReport(NamedTuple):
             lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
         lines += [
             f"  {', '.join(names[i] for i in group)} are the same motion: one of them would do"
-            for group in _groups(lifting.same)
+            for group in _same_motion_groups(lifting.same)
         ]
         lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
         lines += [f"  {remark}" for remark in not_blendable(self.lifted.clips)]
@@ -73,8 +73,8 @@ class LiftReport(NamedTuple):
                 f"{100 * quality.roughness[1]:.0f} %.",
             ]
         lines += [
-            *(f"  in-between {pair}: {_wrong(measure)}" for pair, measure in quality.between.items()),
-            f"  the clips themselves: {_wrong(quality.clips)}",
+            *(f"  in-between {pair}: {_fault_text(measure)}" for pair, measure in quality.between.items()),
+            f"  the clips themselves: {_fault_text(quality.clips)}",
         ]
         if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
             lines.append(
@@ -92,8 +92,8 @@ class LiftReport(NamedTuple):
             "clips": list(self.lifted.names),
             "closed": list(self.lifted.haptic_map.closed),
             "seconds": self.lifted.seconds,
-            "before": _arrangement(lifting.before),
-            "after": _arrangement(lifting.after),
+            "before": _arrangement_data(lifting.before),
+            "after": _arrangement_data(lifting.after),
             "same": [list(pair) for pair in lifting.same],
             "still": list(lifting.still),
             "quality": self.quality._asdict()
@@ -104,7 +104,7 @@ class LiftReport(NamedTuple):
         }
 
 
-def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
+def _same_motion_groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
     """Groups of clips that are the same motion."""
     groups: dict[int, list[int]] = {}
     for first, second in sorted(pairs):
@@ -113,11 +113,11 @@ def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _apart(measure: ArrangementMeasure) -> str:
+def _separation(measure: ArrangementMeasure) -> str:
     return f"{1e3 * measure.separation:.1f} mm or more apart at one angle, {1e3 * measure.nearest:.1f} mm in space"
 
 
-def _wrong(measure: MotionMeasure) -> str:
+def _fault_text(measure: MotionMeasure) -> str:
     return (
         f"joints {np.degrees(measure.limits):.1f}° beyond their limits, soles slide {100 * measure.slide:.1f} cm, "
         f"{100 * measure.penetration:.1f} cm below the floor, flights {100 * measure.ballistic:.1f} cm from free fall"
@@ -129,7 +129,7 @@ def _is_motion(measure: MotionMeasure) -> bool:
     return measure.slide <= SKATES and measure.limits <= BEYOND and measure.penetration <= SINKS
 
 
-def _arrangement(measure: ArrangementMeasure) -> dict[str, object]:
+def _arrangement_data(measure: ArrangementMeasure) -> dict[str, object]:
     return {
         "separation": measure.separation,
         "nearest": measure.nearest,

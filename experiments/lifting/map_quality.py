@@ -15,7 +15,7 @@ from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.motion.clip import Clip
 
 SAMPLES = 96  # samples of the lap
-_PROBES = 400  # random places at which smoothness is measured
+_PROBE_COUNT = 400  # random places at which smoothness is measured
 _STEP = 1e-5  # [m] step of the differences of h_*
 _FPS = 60.0  # frame rate of in-betweens [1/s]
 
@@ -23,28 +23,28 @@ _FPS = 60.0  # frame rate of in-betweens [1/s]
 def body_weights() -> Array:
     """RMS displacement of the default figure's mass by a radian of root and joints [m/rad], shape (18,).
 
-    √(I_k / M), with I_k the mean moment of inertia, about joint k, of the segments that it carries in the rest pose;
-    the root rotates the body about its centre of mass.
+    √(I_k / M), with I_k the mean moment of inertia, about joint k, of the segments distal to it in the rest pose; the
+    root rotates the body about its centre of mass.
     """
     model = figure_model()
     data = mujoco.MjData(model)
     data.qpos = rest_pose()
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    mass, middle = model.body_mass, data.xipos
+    mass, centres = model.body_mass, data.xipos
     weights: list[float] = []
     for body in range(1, model.nbody):
-        about = data.subtree_com[1] if body == 1 else data.xpos[body]
-        carried = [b for b in range(1, model.nbody) if _carries(model, body, b)]
+        pivot = data.subtree_com[1] if body == 1 else data.xpos[body]
+        subtree = [b for b in range(1, model.nbody) if _is_ancestor(model, body, b)]
         inertia = sum(
-            float(2.0 / 3.0 * mass[b] * ((middle[b] - about) ** 2).sum() + model.body_inertia[b].mean())
-            for b in carried
+            float(2.0 / 3.0 * mass[b] * ((centres[b] - pivot) ** 2).sum() + model.body_inertia[b].mean())
+            for b in subtree
         )
         weights.append(float(np.sqrt(inertia / mass.sum())))
     return np.array(weights)
 
 
-def _carries(model: mujoco.MjModel, body: int, other: int) -> bool:
+def _is_ancestor(model: mujoco.MjModel, body: int, other: int) -> bool:
     while other > body:
         other = int(model.body_parentid[other])
     return other == body
@@ -109,33 +109,33 @@ def measure_map(layout: Layout, clips: tuple[Clip, ...], rng: np.random.Generato
     pairs, sites, n = layout.neighbours(), layout.sites, len(layout.names)
     distance = [np.linalg.norm(sites[:, i] - sites[:, j], axis=1).min() for i, j in combinations(range(n), 2)]
     angles = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
-    along = [_condition(layout, scale, angles, sites[:, i]) for i in range(n)]
-    halfway = [_condition(layout, scale, angles, 0.5 * (sites[:, i] + sites[:, j])) for i, j in pairs]
+    along = [_condition_numbers(layout, scale, angles, sites[:, i]) for i in range(n)]
+    halfway = [_condition_numbers(layout, scale, angles, 0.5 * (sites[:, i] + sites[:, j])) for i, j in pairs]
     return MapQuality(
         separation=float(min(distance, default=np.inf)),
-        conditioning=_spread(np.concatenate(along)),
-        conditioning_between=_spread(np.concatenate(halfway)) if pairs else (np.nan, np.nan),
+        conditioning=_median_and_p90(np.concatenate(along)),
+        conditioning_between=_median_and_p90(np.concatenate(halfway)) if pairs else (np.nan, np.nan),
         roughness=_roughness(layout, scale, pairs, rng),
         between={f"{layout.names[i]} – {layout.names[j]}": measure_motion(in_between(layout, i, j)) for i, j in pairs},
         clips=MotionMeasure.worst([measure_motion(clip) for clip in clips]),
     )
 
 
-def _spread(values: Array) -> tuple[float, float]:
-    # No interpolation, since a map may be singular in some places, where the value is infinite.
+def _median_and_p90(values: Array) -> tuple[float, float]:
+    # Without interpolation: the value is infinite where the map is singular.
     middle, high = np.quantile(values, [0.5, 0.9], method="higher")
     return float(middle), float(high)
 
 
-def _stylus(angle: float, site: Array) -> Array:
+def _stylus_pose(angle: float, site: Array) -> Array:
     return np.array([site[0] * np.cos(angle), site[0] * np.sin(angle), site[1], 1.0, 0.0, 0.0, 0.0])
 
 
-def _condition(layout: Layout, scale: Array, angles: Array, places: Array) -> Array:
+def _condition_numbers(layout: Layout, scale: Array, angles: Array, places: Array) -> Array:
     numbers: list[float] = []
     for angle, place in zip(angles, places, strict=True):
-        sizes = np.linalg.svd(scale * layout.haptic_map.jacobian(_stylus(angle, place))[:, :3], compute_uv=False)
-        numbers.append(float(sizes[0] / sizes[2]) if sizes[2] > 1e-9 * sizes[0] else np.inf)
+        sigma = np.linalg.svd(scale * layout.haptic_map.jacobian(_stylus_pose(angle, place))[:, :3], compute_uv=False)
+        numbers.append(float(sigma[0] / sigma[2]) if sigma[2] > 1e-9 * sigma[0] else np.inf)
     return np.array(numbers)
 
 
@@ -145,31 +145,31 @@ def _roughness(
     if not pairs:
         return np.nan, np.nan
     changes: list[float] = []
-    for _ in range(_PROBES):
+    for _ in range(_PROBE_COUNT):
         i, j = pairs[int(rng.integers(len(pairs)))]
         row, share = int(rng.integers(SAMPLES)), float(rng.uniform())
         place = (1.0 - share) * layout.sites[row, i] + share * layout.sites[row, j]
-        x = _stylus(2.0 * np.pi * row / SAMPLES, place)
-        way = np.concatenate([rng.normal(size=3), np.zeros(4)])
-        way *= _STEP / np.linalg.norm(way)
-        here, there = (scale * layout.haptic_map.jacobian(x + side * way)[:, :3] for side in (-0.5, 0.5))
+        x = _stylus_pose(2.0 * np.pi * row / SAMPLES, place)
+        step = np.concatenate([rng.normal(size=3), np.zeros(4)])
+        step *= _STEP / np.linalg.norm(step)
+        here, there = (scale * layout.haptic_map.jacobian(x + side * step)[:, :3] for side in (-0.5, 0.5))
         changes.append(float(np.linalg.norm(there - here) / (np.linalg.norm(here) * _STEP)) / 1e3)
-    return _spread(np.array(changes))
+    return _median_and_p90(np.array(changes))
 
 
 def in_between(layout: Layout, i: int, j: int) -> Clip:
     """The animation of a lap half way between two clips, with the mean of their timings."""
     lap = 0.5 * (layout.times[:, i] + layout.times[:, j])
     frames = max(8, round(float(lap[-1]) * _FPS))
-    # Without the end point, which is the first frame of the next lap.
-    at = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(SAMPLES + 1))
+    # The end point is left out: it is the first frame of the next lap.
+    samples = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(SAMPLES + 1))
     closed = np.concatenate([layout.sites, layout.sites[:1]])
     middle = 0.5 * (closed[:, i] + closed[:, j])
-    places = np.stack([np.interp(at, np.arange(SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
+    places = np.stack([np.interp(samples, np.arange(SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
     memory = layout.haptic_map.compiled().memory
     poses = [
-        layout.haptic_map.pose(_stylus(2.0 * np.pi * row / SAMPLES, place), memory)
-        for row, place in zip(at, places, strict=True)
+        layout.haptic_map.pose(_stylus_pose(2.0 * np.pi * row / SAMPLES, place), memory)
+        for row, place in zip(samples, places, strict=True)
     ]
     return Clip(np.array(poses), frames / float(lap[-1]), f"{layout.names[i]}-{layout.names[j]}")
 

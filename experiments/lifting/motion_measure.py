@@ -1,4 +1,4 @@
-"""Measures of a motion that a map has made: joint limits, foot skate, floor penetration, flights."""
+"""Measures of a motion that a map generates: joint limits, foot skate, floor penetration, flights."""
 
 from typing import NamedTuple
 
@@ -44,13 +44,13 @@ def measure_motion(clip: Clip) -> MotionMeasure:
     turns = pose_difference(np.broadcast_to(rest_pose(), clip.poses.shape), clip.poses)[:, 6:]
     turns = turns.reshape(-1, N_JOINTS, 3)
     low, high = joint_range()[..., 0], joint_range()[..., 1]
-    touched, feet = contacts(clip), Soles(SceneConfig())
+    floor, feet = contacts(clip), Soles(SceneConfig())
     feet.add(clip.poses)
     com = momentum(clip).com
-    spans = find_flights(touched.supported, clip.fps)
+    spans = find_flights(floor.supported, clip.fps)
     return MotionMeasure(
         limits=float(np.maximum(low - turns, turns - high).clip(min=0.0).max()),
         slide=feet.slide,
-        penetration=float(max(0.0, -touched.clearance.min())),
+        penetration=float(max(0.0, -floor.clearance.min())),
         ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
     )

@@ -63,8 +63,8 @@ class StudyResult:
     def to_json(self) -> str:
         """Sentences, counts, contrasts and interactions as JSON."""
         contrasts = [asdict(contrast) for contrast in self.found.contrasts]
-        told = {"sentences": self.sentences, "trials": len(self.table), "ran": self.ran, "failed": self.failed}
-        return json_text(told | {"contrasts": contrasts, "interactions": self.found.interactions})
+        summary = {"sentences": self.sentences, "trials": len(self.table), "ran": self.ran, "failed": self.failed}
+        return json_text(summary | {"contrasts": contrasts, "interactions": self.found.interactions})
 
 
 @dataclass(frozen=True)
@@ -154,8 +154,8 @@ class Study:
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             self._refuse_fewer(folder, database)
             warm((trial.config for trial in trials), SHELF, console)
-            with executor(where) as runs:
-                ran = run_missing(trials, database, runs, self.config.recordings, console, _descriptions(trials))
+            with executor(where) as pool:
+                ran = run_missing(trials, database, pool, self.config.recordings, console, _descriptions(trials))
             planned_keys = {trial.key for trial in trials}
             rows = {row.key: row for row in database.rows() if row.key in planned_keys}
         frame = table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})
@@ -166,21 +166,23 @@ class Study:
         from experiments.trials.analysis.report import write_report  # pandas, statsmodels and matplotlib take seconds
 
         with console.status("analysing"):
-            found, sentences = write_report(self.config, self._text(), self.trials, frame, folder / REPORT, _made(rows))
+            found, sentences = write_report(
+                self.config, self._text(), self.trials, frame, folder / REPORT, _provenance(rows)
+            )
         failed = int(frame["state"].eq("failed").sum())
         result = StudyResult(folder, frame, found, sentences, ran, failed)
         (folder / SUMMARY).write_text(result.to_json() + "\n", encoding="utf-8")
         return result
 
     def _refuse_fewer(self, folder: Path, database: Database) -> None:
-        """Refuse fewer users or repetitions than the folder has: their tables and report would replace those of all."""
-        asked = {"user": self.config.users.number, "repetition": self.config.repetitions}
-        for name, number in asked.items():
-            held = database.most(name) + 1
-            if held > number:
+        """Refuse fewer users or repetitions than the folder has: its tables and report would lose trials."""
+        requested = {"user": self.config.users.number, "repetition": self.config.repetitions}
+        for name, number in requested.items():
+            saved = database.most(name) + 1
+            if saved > number:
                 raise StudyError(
-                    f"{folder}: holds this study with {held} {name}s, whose tables and report those of {number} would "
-                    f"replace; expected {held} {name}s or more, or another --out"
+                    f"{folder}: holds this study with {saved} {name}s, whose tables and report those of {number} would "
+                    f"replace; expected {saved} {name}s or more, or another --out"
                 )
 
     def _text(self) -> str:
@@ -189,64 +191,64 @@ class Study:
     def _identity(self) -> str:
         """Hash of the study without its numbers of users and repetitions, name, question, measures and recordings."""
         users = replace(self.config.users, number=1)
-        same = replace(
+        comparable = replace(
             self.config, users=users, repetitions=1, name="", question="", measures=(), recordings="",
             ease=StudyConfig.ease, cost=StudyConfig.cost,
         )  # fmt: skip
-        return hashlib.sha256(to_json(same).encode()).hexdigest()[:32]
+        return hashlib.sha256(to_json(comparable).encode()).hexdigest()[:32]
 
     def _measures(self) -> tuple[str, ...]:
         config = self.config
         kinds = {trial.config.figure.kind for trial in planned(replace(config, repetitions=1))}
-        there = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
-        unasked = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # defaults may be missing for the figure
+        available = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
+        optional = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure may lack default measures
         for word, name in (("ease", config.ease), ("cost", config.cost)):
             if name in OF_CONDITIONS:
                 raise StudyError(f"study {config.name!r}: {word} = {name!r} is of a condition; expected one of a trial")
         for name in (*config.measures, config.ease, config.cost):
             if name not in MEASURES:
                 raise StudyError(f"study {config.name!r}: no measure {name!r}; there are {', '.join(MEASURES)}")
-            if name not in there and name not in unasked:
+            if name not in available and name not in optional:
                 needed = MEASURES[name].figure
                 raise StudyError(
                     f"study {config.name!r}: {name!r} needs a figure that is {needed}; expected figure = {needed!r}"
                 )
         return tuple(
-            name for name in there if not config.measures or name in (*config.measures, config.ease, config.cost)
+            name for name in available if not config.measures or name in (*config.measures, config.ease, config.cost)
         )
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
-        return {trial.meeting.number: kept_stability(trial.config).used for trial in _one_each(trials)}
+        return {trial.meeting.number: kept_stability(trial.config).used for trial in _one_per_condition(trials)}
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a folder without this study that holds files of the names that a study writes."""
+    """Refuse a folder that has no database of a study but files with the names that a study writes."""
     names = (REPORT, SUMMARY, TABLE_PARQUET, TABLE_CSV)
-    taken = [] if (folder / DATABASE).exists() else [name for name in names if (folder / name).exists()]
-    if taken:
-        raise StudyError(f"{folder}: holds {', '.join(taken)}, not of a study; choose another --out")
+    existing = [] if (folder / DATABASE).exists() else [name for name in names if (folder / name).exists()]
+    if existing:
+        raise StudyError(f"{folder}: holds {', '.join(existing)}, not of a study; choose another --out")
 
 
-def _one_each(trials: Sequence[Trial]) -> list[Trial]:
+def _one_per_condition(trials: Sequence[Trial]) -> list[Trial]:
     """One trial of each condition."""
     return list({trial.meeting.number: trial for trial in trials}.values())
 
 
 def _descriptions(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
     """Descriptions of the trials for readers of the database, by key."""
-    told: dict[str, dict[str, object]] = {}
+    descriptions: dict[str, dict[str, object]] = {}
     for key, met, config in trials:
         place: dict[str, object] = {"user": met.user, "repetition": met.repetition, "position": met.position}
-        told[key] = {**met.condition.levels, **place, "seed": config.seed}
-    return told
+        descriptions[key] = {**met.condition.levels, **place, "seed": config.seed}
+    return descriptions
 
 
-def _made(rows: Mapping[str, Row]) -> str:
+def _provenance(rows: Mapping[str, Row]) -> str:
     processors = sorted({row.processor for row in rows.values()} - {""})
-    spent = sum(row.seconds for row in rows.values())
+    seconds = sum(row.seconds for row in rows.values())
     return (
         f"Made with code {code_hash()}, Python {platform.python_version()}, on {', '.join(processors)}: "
-        f"{len(rows)} trials took {spent:.0f} s of processor time, {spent / max(1, len(rows)):.3f} s each."
+        f"{len(rows)} trials took {seconds:.0f} s of processor time, {seconds / max(1, len(rows)):.3f} s each."
         + (" More than one kind of processor: their last bits may differ." if len(processors) > 1 else "")
     )

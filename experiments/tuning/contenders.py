@@ -73,7 +73,7 @@ def contenders(
     rule = half_critical(config)
     if rule is not None:
         values["half the critical gain"] = rule
-    return [_judged(config, name, its, panel) for name, its in values.items()]
+    return [_evaluate(config, name, own, panel) for name, own in values.items()]
 
 
 def half_critical(config: TuneConfig) -> dict[str, float] | None:
@@ -92,14 +92,14 @@ def half_critical(config: TuneConfig) -> dict[str, float] | None:
     return {"stiffness": HALF * min(float(critical_stiffness(loop, river.b_d).min()) for loop in loops)}
 
 
-def _judged(config: TuneConfig, name: str, values: dict[str, float], panel: Panel) -> Contender:
-    made = config.config(values)
-    stability = kept_stability(made)
+def _evaluate(config: TuneConfig, name: str, values: dict[str, float], panel: Panel) -> Contender:
+    candidate = config.config(values)
+    stability = kept_stability(candidate)
     if violation_of(config, stability) > 0.0 and stability.verdict == "refuted":
-        never = np.full((config.held_back.number, len(config.objectives)), np.nan)
-        return Contender(name, values, made, stability, never)
-    runs = panel_runs(config, made, config.held_back)
-    return Contender(name, values, made, stability, panel.objectives(config, runs, stability.margin))
+        no_results = np.full((config.held_back.number, len(config.objectives)), np.nan)
+        return Contender(name, values, candidate, stability, no_results)
+    runs = panel_runs(config, candidate, config.held_back)
+    return Contender(name, values, candidate, stability, panel.objectives(config, runs, stability.margin))
 
 
 def interval(differences: Array, seed: int) -> tuple[float, float]:
@@ -109,9 +109,9 @@ def interval(differences: Array, seed: int) -> tuple[float, float]:
     if len(differences) < 3 or not np.all(np.isfinite(differences)) or np.ptp(differences) == 0.0:
         return float("nan"), float("nan")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # warned: a degenerate sample; its interval is NaN
-        found = bootstrap((differences,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(seed))
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+        warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN
+        result = bootstrap((differences,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(seed))
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
 def wins(contender: Contender, tuned: Contender, directions: Sequence[str]) -> Array:

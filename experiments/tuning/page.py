@@ -55,10 +55,10 @@ def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Se
         cells = ""
         for k, objective in enumerate(config.objectives):
             gain = gains.get((contender.name, objective))
-            told = "" if gain is None else short(gain.better_by)
+            gain_text = "" if gain is None else short(gain.better_by)
             if gain is not None and math.isfinite(gain.low):
-                told += f" ({gain.low:.3g} to {gain.high:.3g})"
-            cells += f"<td>{short(float(contender.means[k]))}</td><td>{told}</td>"
+                gain_text += f" ({gain.low:.3g} to {gain.high:.3g})"
+            cells += f"<td>{short(float(contender.means[k]))}</td><td>{gain_text}</td>"
         margin = "–" if contender.stability.margin is None else f"{contender.stability.margin:.3g}"
         rows.append(f"<tr><td>{html.escape(contender.name)}</td><td>{values}</td><td>{margin}</td>{cells}</tr>")
     return "".join(rows)

@@ -19,17 +19,17 @@ from sim.users.person.population import population
 
 
 def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[list[RunConfig]]:
-    """Runs of a candidate by user, with the same seeds for every candidate, so that differences are the candidates'."""
+    """Runs of a candidate by user; all candidates have the same seeds, so that only their values differ."""
     runs: list[list[RunConfig]] = []
     for number, person in enumerate(population(users.number, users.seed)):
-        own: list[RunConfig] = []
-        for k, does in enumerate(config.tasks or (users.does,)):
-            user = User(does=does, person=person)  # pyright: ignore[reportArgumentType]
+        user_runs: list[RunConfig] = []
+        for k, task in enumerate(config.tasks or (users.does,)):
+            user = User(does=task, person=person)  # pyright: ignore[reportArgumentType]
             for repetition in range(config.repetitions):
                 entropy = (config.seed, users.seed, number, k * config.repetitions + repetition)
                 seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
-                own.append(replace(candidate, user=user, seed=seed))
-        runs.append(own)
+                user_runs.append(replace(candidate, user=user, seed=seed))
+        runs.append(user_runs)
     return runs
 
 
@@ -59,23 +59,23 @@ class Panel:
             If no trial has one of the measures.
         """
         keys = [[key_of(run) for run in own] for own in runs]
-        wanted = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}
-        missing = [Task(key, to_json(run)) for key, run in wanted.items() if key not in self._rows]
+        run_by_key = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}
+        missing = [Task(key, to_json(run)) for key, run in run_by_key.items() if key not in self._rows]
         for row in self._executor.rows(missing) if missing else ():
             self._database.add(row, {})
             self._rows[row.key] = row
         by_user = [[self._rows[key] for key in of] for of in keys]
-        found = np.array([[_mean(rows, name, margin) for name in config.objectives] for rows in by_user])
-        lacking = [name for k, name in enumerate(config.objectives) if np.all(np.isnan(found[:, k]))]
-        if lacking:
+        values = np.array([[_mean_objective(rows, name, margin) for name in config.objectives] for rows in by_user])
+        absent = [name for k, name in enumerate(config.objectives) if np.all(np.isnan(values[:, k]))]
+        if absent:
             raise StudyError(
-                f"tuning {config.name!r}: no trial of its users has {lacking[0]!r}; expected tasks that have it, such "
+                f"tuning {config.name!r}: no trial of its users has {absent[0]!r}; expected tasks that have it, such "
                 "as tasks = ['trace', 'exaggerate']"
             )
-        return found
+        return values
 
 
-def _mean(rows: Sequence[Row], objective: str, margin: float | None) -> float:
+def _mean_objective(rows: Sequence[Row], objective: str, margin: float | None) -> float:
     if objective == MARGIN:
         return margin or 0.0
     if any(row.state == "failed" for row in rows):

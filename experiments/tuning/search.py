@@ -12,7 +12,7 @@ from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.samplers import REFUSED_MOST, STARTUP, sampler_of
 from experiments.tuning.tune_config import TuneConfig
 
-_TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
+_FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 class Candidate(NamedTuple):
@@ -73,25 +73,25 @@ def search(
         word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
         for word, span in config.space.items()
     }
-    for begun in study.get_trials(states=(TrialState.RUNNING,)):
-        study.tell(begun.number, state=TrialState.FAIL)  # interrupted with the search: it is proposed again
+    for interrupted in study.get_trials(states=(TrialState.RUNNING,)):
+        study.tell(interrupted.number, state=TrialState.FAIL)  # it is proposed again
     while True:
-        simulated, all_of_them = _simulated(study), len(study.get_trials(deepcopy=False, states=_TOLD))
+        simulated, proposed = _count_simulated(study), len(study.get_trials(deepcopy=False, states=_FINISHED))
         progress(simulated)
-        if simulated >= config.candidates or all_of_them >= REFUSED_MOST * config.candidates:
+        if simulated >= config.candidates or proposed >= REFUSED_MOST * config.candidates:
             return candidates_of(study)
-        study.sampler = sampler_of(sampler, config.seed, all_of_them)
-        _try(config, study, study.ask(space), panel)
+        study.sampler = sampler_of(sampler, config.seed, proposed)
+        _try_candidate(config, study, study.ask(space), panel)
 
 
-def _simulated(study: optuna.Study) -> int:
-    trials = study.get_trials(deepcopy=False, states=_TOLD)
+def _count_simulated(study: optuna.Study) -> int:
+    trials = study.get_trials(deepcopy=False, states=_FINISHED)
     return sum(t.state.is_finished() and t.user_attrs.get("violation", 1.0) <= 0.0 for t in trials)
 
 
-def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
-    made = config.config(trial.params)
-    stability = kept_stability(made)
+def _try_candidate(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
+    candidate = config.config(trial.params)
+    stability = kept_stability(candidate)
     violation = violation_of(config, stability)
     trial.set_user_attr("verdict", stability.verdict)
     trial.set_user_attr("margin", stability.margin)
@@ -100,7 +100,7 @@ def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Pa
     if violation > 0.0:
         study.tell(trial, state=TrialState.PRUNED)
         return
-    values = _objectives(config, trial, panel, stability)
+    values = _panel_means(config, trial, panel, stability)
     if values is None or not np.all(np.isfinite(values)):
         study.tell(trial, state=TrialState.PRUNED)
     else:
@@ -108,7 +108,7 @@ def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Pa
 
 
 def violation_of(config: TuneConfig, stability: Stability) -> float:
-    """How far a candidate violates the constraint of the certificate; 0 if it may be tried."""
+    """By how much a candidate violates the constraint of the certificate; 0 if it may be tried."""
     if stability.verdict == "refuted":
         return 1.0 - min(0.0, stability.margin or 0.0)
     if stability.verdict == "unknown" and not config.allow_unknown:
@@ -116,31 +116,31 @@ def violation_of(config: TuneConfig, stability: Stability) -> float:
     return 0.0 if stability.margin is None else max(0.0, config.least_margin - stability.margin)
 
 
-def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability: Stability) -> list[float] | None:
+def _panel_means(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability: Stability) -> list[float] | None:
     """Mean objectives over the panel; None if the candidate is given up after part of the panel."""
     by_user = panel_runs(config, config.config(trial.params), config.users)
     third = max(1, len(by_user) // 3)
     parts = [by_user[:third], by_user[third:]] if config.prune and len(config.objectives) == 1 else [by_user]
-    found = np.empty((0, len(config.objectives)))
+    values = np.empty((0, len(config.objectives)))
     for step, part in enumerate(parts):
-        found = np.vstack((found, panel.objectives(config, part, stability.margin)))
+        values = np.vstack((values, panel.objectives(config, part, stability.margin)))
         if step + 1 < len(parts):
-            trial.report(float(np.mean(found)), step + 1)
+            trial.report(float(np.mean(values)), step + 1)
             if trial.should_prune():
                 return None
-    return [float(mean) for mean in np.mean(found, axis=0)]
+    return [float(mean) for mean in np.mean(values, axis=0)]
 
 
 def candidates_of(study: optuna.Study) -> list[Candidate]:
-    """All proposed candidates, in their order."""
-    made: list[Candidate] = []
-    for t in study.get_trials(deepcopy=False, states=_TOLD):
+    """All proposed candidates, in the order of their proposal."""
+    candidates: list[Candidate] = []
+    for t in study.get_trials(deepcopy=False, states=_FINISHED):
         attributes: dict[str, Any] = t.user_attrs
-        complete = t.state == TrialState.COMPLETE  # a candidate that is given up has values of part of the panel only
+        complete = t.state == TrialState.COMPLETE  # a candidate that is given up has values for part of the panel only
         state = "refused" if attributes["violation"] > 0.0 else "tried" if complete else "given up"
         values = tuple(t.values) if complete else None
-        made.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
-    return made
+        candidates.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
+    return candidates
 
 
 def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
@@ -155,7 +155,7 @@ def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Ca
 
 
 def chosen(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
-    """The best candidate of one objective; of several the one of the front nearest to the ideal point.
+    """The best candidate for one objective; for several, the candidate on the front nearest to the ideal point.
 
     Objectives are scaled to their range on the front. None if no candidate was tried.
     """

@@ -1,4 +1,4 @@
-"""Storage of a search, from which it can be continued: a journal file, or a database by SQLAlchemy."""
+"""Storage of a search, from which it can be continued: a journal file, or a database through SQLAlchemy."""
 
 import json
 from pathlib import Path
@@ -26,8 +26,8 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
         try:
             with open(where, "a+b") as file:
                 file.seek(0)
-                first = file.readline()
-            if first and "op_code" not in json.loads(first):  # a line alone, whatever it says, Optuna takes for torn
+                first_line = file.readline()
+            if first_line and "op_code" not in json.loads(first_line):  # Optuna takes any single line for unfinished
                 raise ValueError
             return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
         except OSError as error:
@@ -39,7 +39,7 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
     try:
         return optuna.storages.RDBStorage(str(where))
     except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer
-        said = str(error).strip().splitlines()[0]
+        message = str(error).strip().splitlines()[0]
         raise StudyError(
-            f"{where}: no storage for a search ({said}); expected a URL of SQLAlchemy such as sqlite:///tune.db"
+            f"{where}: no storage for a search ({message}); expected a URL of SQLAlchemy such as sqlite:///tune.db"
         ) from None

@@ -122,8 +122,8 @@ def tune(
     Raises
     ------
     ParameterError
-        If the space is empty or has an unknown parameter, a range that is none or a bound that a parameter cannot have,
-        none of its candidates may be tried, or a cost is no number or not finite.
+        If the space is empty, or has an unknown parameter, an invalid range or a bound that a parameter cannot have; if
+        none of its candidates may be tried; or if a cost is not a finite number.
     """
     import optuna  # an optional dependency, which takes half a second to import
 
@@ -139,20 +139,20 @@ def tune(
     _check_space(space)
     for edge in range(2):
         with_values(sim, {path: bounds[edge] for path, bounds in space.items()})
-    # A session in the middle of the space: compiles the units before any run.
+    # A session in the middle of the space compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
-    study = _study(search, _name(sim, space, cost, len(users), seconds, search))
-    complete, ranges = (optuna.trial.TrialState.COMPLETE,), _ranges(space)
-    for asked in range(len(study.trials), REFUSED_MOST * search.candidates):
+    study = _create_study(search, _study_name(sim, space, cost, len(users), seconds, search))
+    complete, distributions = (optuna.trial.TrialState.COMPLETE,), _distributions(space)
+    for number in range(len(study.trials), REFUSED_MOST * search.candidates):
         if len(study.get_trials(states=complete)) >= search.candidates:
             break
-        trial = _asked(study, search, ranges, asked)
+        trial = _ask_candidate(study, search, distributions, number)
         candidate = with_values(sim, trial.params)
         verdict = certify(candidate).stability.verdict
         allowed = verdict == "certified" or (verdict == "unknown" and search.allow_unknown)
         trial.set_constraint("certificate", 0.0 if allowed else 1.0)
         if allowed:
-            study.tell(trial, _means(candidate, users, cost, seconds, search, trial.params))
+            study.tell(trial, _mean_costs(candidate, users, cost, seconds, search, trial.params))
         else:
             study.tell(trial, state=optuna.trial.TrialState.PRUNED)
     tried = len(study.get_trials(states=complete))
@@ -165,7 +165,7 @@ def tune(
 
 
 def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse a space without parameters, and a range that is none."""
+    """Refuse a space without parameters, and an invalid range."""
     of_kind("space", space, Mapping)
     if not space:
         raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
@@ -176,45 +176,45 @@ def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
 
 
-def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def _distributions(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     import optuna
 
     return {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
 
 
-def _name(
+def _study_name(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: int, seconds: float, search: Search
 ) -> str:
-    """Name of a search in its journal; it differs for another simulation, space or cost, so that none is mixed up."""
+    """Name of a search in its journal; it depends on simulation, space, cost and settings, so that none is mixed up."""
     code = getattr(cost, "__code__", None)
-    does = (
+    cost_code = (
         (code.co_code, code.co_names, [str(value) for value in code.co_consts if not isinstance(value, CodeType)])
         if code
         else type(cost).__qualname__
     )
-    means = (search.sampler, search.seed, search.costs, search.allow_unknown)
-    return f"hvf.tune {hash_of((sim.description(), sorted(space.items()), does, users, seconds, means))}"
+    settings = (search.sampler, search.seed, search.costs, search.allow_unknown)
+    return f"hvf.tune {hash_of((sim.description(), sorted(space.items()), cost_code, users, seconds, settings))}"
 
 
-def _study(search: Search, name: str) -> Any:
+def _create_study(search: Search, name: str) -> Any:
     import optuna
 
     from experiments.tuning.storage import storage_of
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    kept = None if search.journal is None else storage_of(search.journal)
+    storage = None if search.journal is None else storage_of(search.journal)
     directions: list[Literal["minimize", "maximize"]] = ["minimize"] * search.costs
-    return optuna.create_study(storage=kept, study_name=name, load_if_exists=True, directions=directions)
+    return optuna.create_study(storage=storage, study_name=name, load_if_exists=True, directions=directions)
 
 
-def _asked(study: Any, search: Search, ranges: Mapping[str, Any], number: int) -> Any:
+def _ask_candidate(study: Any, search: Search, distributions: Mapping[str, Any], number: int) -> Any:
     from experiments.tuning.samplers import sampler_of
 
     study.sampler = sampler_of(search.sampler, search.seed, number)
-    return study.ask(dict(ranges))
+    return study.ask(dict(distributions))
 
 
-def _means(
+def _mean_costs(
     candidate: Simulation, users: Sequence[User], cost: Cost, seconds: float, search: Search, values: Mapping[str, Any]
 ) -> list[float]:  # fmt: skip
     """Costs of a candidate, means over the users."""
@@ -223,16 +223,16 @@ def _means(
         return replace(candidate, user=user).run(seconds)
 
     with ThreadPoolExecutor(max(1, search.threads)) as pool:
-        costs = [_finite(cost(run), search.costs, values) for run in pool.map(run, users)]
+        costs = [_finite_costs(cost(run), search.costs, values) for run in pool.map(run, users)]
     return [float(mean) for mean in np.mean(costs, axis=0)]
 
 
-def _finite(cost: object, count: int, values: Mapping[str, Any]) -> Array:
-    """The cost of a run as `count` numbers; anything else is refused, with the values at which it is."""
+def _finite_costs(cost: object, count: int, values: Mapping[str, Any]) -> Array:
+    """The cost of a run as `count` finite numbers; anything else is refused, with the values of the candidate."""
     with suppress(ParameterError):
-        found = np.atleast_1d(numbers_of("the cost", cast(Any, cost)))
-        if found.shape == (count,) and np.all(np.isfinite(found)):
-            return found
+        costs = np.atleast_1d(numbers_of("the cost", cast(Any, cost)))
+        if costs.shape == (count,) and np.all(np.isfinite(costs)):
+            return costs
     raise ParameterError(
         f"the cost at {dict(values)} is {cost!r}; expected {count} finite number{'s' if count > 1 else ''}"
     )

@@ -99,7 +99,7 @@ class TuneConfig:
     storage: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse more trials than a study may have, also where another number of candidates is set.
+        """Refuse more trials than a study may have; this also checks a number of candidates that is set later.
 
         Raises
         ------
@@ -107,9 +107,9 @@ class TuneConfig:
             If there are too many.
         """
         tasks = max(1, len(self.tasks))
-        for users, times, of in ((self.users, self.candidates, "candidates"), (self.held_back, 1, "result")):
-            made_of = f"{times} {of}, {users.number} users, {tasks} tasks, {self.repetitions} repetitions"
-            check_trials(f"tuning {self.name!r}", times * users.number * tasks * self.repetitions, made_of)
+        for users, count, label in ((self.users, self.candidates, "candidates"), (self.held_back, 1, "result")):
+            sizes = f"{count} {label}, {users.number} users, {tasks} tasks, {self.repetitions} repetitions"
+            check_trials(f"tuning {self.name!r}", count * users.number * tasks * self.repetitions, sizes)
 
     @property
     def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:
@@ -122,7 +122,7 @@ class TuneConfig:
         Raises
         ------
         StudyError
-            If a word is unknown or has no meaning with the others, or a number is out of its interval.
+            If a word is unknown or meaningless with the others, or a number is out of its interval.
         """
         words: Words = self.run | dict(values) | {"seconds": self.seconds}
         if does is not None:
@@ -185,21 +185,21 @@ def _check_space(config: TuneConfig, where: str) -> None:
             )
         if word in ("seed", "seconds"):
             raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
-    # A candidate lies anywhere between the bounds, where whole numbers are none.
+    # Candidates lie anywhere between the bounds, so parameters that must be whole numbers are refused here.
     config.config({word: span.low + (span.high - span.low) / math.pi for word, span in config.space.items()})
 
 
 def _check_objectives(config: TuneConfig, where: str) -> None:
-    every = [name for name in MEASURES if name not in OF_CONDITIONS]
+    trial_measures = [name for name in MEASURES if name not in OF_CONDITIONS]
     for name in config.objectives:
-        if name != MARGIN and name not in every:
-            raise StudyError(f"{where}: no objective {name!r}; there are {', '.join([*every, MARGIN])}")
+        if name != MARGIN and name not in trial_measures:
+            raise StudyError(f"{where}: no objective {name!r}; there are {', '.join([*trial_measures, MARGIN])}")
     if not config.objectives or set(config.objectives) == {MARGIN}:
         raise StudyError(f"{where} has no measure among its objectives; expected one, such as tracking_error")
     if len(set(config.objectives)) < len(config.objectives):
         raise StudyError(f"{where}: an objective stands twice; expected {', '.join(dict.fromkeys(config.objectives))}")
     for end in ("low", "high"):
-        made = config.config({word: getattr(span, end) for word, span in config.space.items()})
-        lacking = [n for n in config.objectives if n != MARGIN and n not in measures_of(made.figure.kind)]
-        if lacking:
-            raise StudyError(f"{where}: {lacking[0]!r} needs a figure that is {MEASURES[lacking[0]].figure}")
+        candidate = config.config({word: getattr(span, end) for word, span in config.space.items()})
+        missing = [n for n in config.objectives if n != MARGIN and n not in measures_of(candidate.figure.kind)]
+        if missing:
+            raise StudyError(f"{where}: {missing[0]!r} needs a figure that is {MEASURES[missing[0]].figure}")

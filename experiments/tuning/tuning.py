@@ -88,10 +88,10 @@ class Tuned:
 
     def to_json(self) -> str:
         """The result without the folder, as JSON."""
-        told = {"values": self.values, "sentences": self.sentences, "importances": self.importances}
+        summary = {"values": self.values, "sentences": self.sentences, "importances": self.importances}
         comparisons = [asdict(comparison) for comparison in self.comparisons]
         candidates = [candidate._asdict() for candidate in self.candidates]
-        return json_text(told | {"comparisons": comparisons, "candidates": candidates})
+        return json_text(summary | {"comparisons": comparisons, "candidates": candidates})
 
 
 def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | None = None) -> Tuned:
@@ -117,9 +117,9 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
         warm(panel_runs(config, config.config({}), replace(config.users, number=1))[0], SHELF, console)
-        with executor(where or Where()) as runs:
-            panel, storage = Panel(database, runs), storage_of(config.storage or out / JOURNAL)
-            found = _searched(config, storage, identity, panel, config.sampler, console)
+        with executor(where or Where()) as pool:
+            panel, storage = Panel(database, pool), storage_of(config.storage or out / JOURNAL)
+            found = _run_search(config, storage, identity, panel, config.sampler, console)
             best = chosen(found, config.directions)
             if best is None:
                 refused = sum(c.state == "refused" for c in found)
@@ -129,14 +129,14 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
                 )
             others: dict[str, Candidate | None] = {}
             if config.sampler != "random":
-                drawn = _searched(config, storage, identity, panel, "random", console)
-                others[RANDOM] = chosen(drawn, config.directions)
+                random_candidates = _run_search(config, storage, identity, panel, "random", console)
+                others[RANDOM] = chosen(random_candidates, config.directions)
             with console.status("held-back users"):
                 judged = contenders(config, best, others, panel)
-    return _written(config, out, text, found, best, judged)
+    return _write_results(config, out, text, found, best, judged)
 
 
-def _searched(
+def _run_search(
     config: TuneConfig, storage: BaseStorage, identity: str, panel: Panel, sampler: str, console: Console
 ) -> list[Candidate]:
     columns = (TextColumn(f"{sampler} candidates"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
@@ -145,7 +145,7 @@ def _searched(
         return search(config, storage, identity, panel, sampler, lambda n: progress.update(bar, completed=n))
 
 
-def _written(
+def _write_results(
     config: TuneConfig, out: Path, text: str, found: Sequence[Candidate], best: Candidate, judged: Sequence[Contender]
 ) -> Tuned:
     tuned = judged[0]
@@ -171,14 +171,14 @@ def _gains(contender: Contender) -> dict[str, float]:
 
 def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison]:
     """Comparisons of every other contender with the first one, which is the tuned one, on every objective."""
-    made: list[Comparison] = []
+    comparisons: list[Comparison] = []
     for contender in judged[1:]:
-        better = wins(contender, judged[0], config.directions)
+        gains = wins(contender, judged[0], config.directions)
         for k, objective in enumerate(config.objectives):
-            low, high = interval(better[:, k], config.seed)
+            low, high = interval(gains[:, k], config.seed)
             means = float(contender.means[k]), float(judged[0].means[k])
-            made.append(Comparison(contender.name, objective, *means, float(np.mean(better[:, k])), low, high))
-    return made
+            comparisons.append(Comparison(contender.name, objective, *means, float(np.mean(gains[:, k])), low, high))
+    return comparisons
 
 
 def importances_of(config: TuneConfig, candidates: Sequence[Candidate]) -> dict[str, dict[str, float]]:
@@ -199,8 +199,8 @@ def importances_of(config: TuneConfig, candidates: Sequence[Candidate]) -> dict[
             value = cast(tuple[float, ...], c.objectives)[k]
             study.add_trial(optuna.trial.create_trial(params=c.values, distributions=space, value=value))
         evaluator = optuna.importance.PedAnovaImportanceEvaluator()
-        found = optuna.importance.get_param_importances(study, evaluator=evaluator)
-        shares[objective] = {word: float(share) for word, share in found.items()}
+        importances = optuna.importance.get_param_importances(study, evaluator=evaluator)
+        shares[objective] = {word: float(share) for word, share in importances.items()}
     return shares
 
 

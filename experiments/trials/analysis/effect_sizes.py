@@ -8,7 +8,7 @@ ALIKE = 1e-6  # relative spread below which differences count as equal
 
 
 def spreads(sample: Array) -> bool:
-    """Whether the values of a sample differ by more than rounding."""
+    """Whether the values of a sample differ by more than rounding errors."""
     return bool(np.ptp(sample) > ALIKE * np.max(np.abs(sample)))
 
 
@@ -21,10 +21,10 @@ def cohen_dz(differences: Array) -> float:
 
 def hedges_g(one: Array, other: Array) -> float:
     """Hedges' g: difference of means over pooled standard deviation, corrected for small samples (Hedges, 1981)."""
-    freedom = len(one) + len(other) - 2
-    if freedom < 1:
+    dof = len(one) + len(other) - 2
+    if dof < 1:
         return float("nan")
-    pooled = np.sqrt(((len(one) - 1) * np.var(one, ddof=1) + (len(other) - 1) * np.var(other, ddof=1)) / freedom)
+    pooled = np.sqrt(((len(one) - 1) * np.var(one, ddof=1) + (len(other) - 1) * np.var(other, ddof=1)) / dof)
     if not pooled > 0.0:
         return float("nan")
-    return float((np.mean(one) - np.mean(other)) / pooled * (1.0 - 3.0 / (4.0 * freedom - 1.0)))
+    return float((np.mean(one) - np.mean(other)) / pooled * (1.0 - 3.0 / (4.0 * dof - 1.0)))

@@ -22,7 +22,7 @@ from experiments.trials.analysis.effect_sizes import spreads
 def interactions_of(
     cells_of: Mapping[str, Any], factors: Mapping[str, Sequence[str]], between: Sequence[str]
 ) -> dict[str, float]:
-    """Least corrected p of the two-factor interactions of each measure; measures without a test are left out.
+    """Smallest corrected p of the two-factor interactions of each measure; measures without a test are left out.
 
     Parameters
     ----------
@@ -35,42 +35,42 @@ def interactions_of(
     """
     from statsmodels.stats.multitest import multipletests
 
-    found: list[tuple[str, float]] = []
+    p_values: list[tuple[str, float]] = []
     for measure, cells in cells_of.items():
         varied = [name for name in cells.index.names if name != "user"]
         for one, other in itertools.combinations(varied, 2):
             if one in between and other in between:
                 continue
-            own, across = (other, one) if one in between else (one, other)
-            for level, at in itertools.product(factors[own][1:], factors[across][1:]):
-                p = _p(cells, (own, level, factors[own][0]), (across, at, factors[across][0]), across in between)
-                found += [(measure, p)] if np.isfinite(p) else []
-    if not found:
+            inner, outer = (other, one) if one in between else (one, other)
+            for level, outer_level in itertools.product(factors[inner][1:], factors[outer][1:]):
+                p = _p_value(
+                    cells, (inner, level, factors[inner][0]), (outer, outer_level, factors[outer][0]), outer in between
+                )
+                p_values += [(measure, p)] if np.isfinite(p) else []
+    if not p_values:
         return {}
-    corrected = np.asarray(multipletests([p for _, p in found], method="holm")[1], dtype=np.float64)
-    least: dict[str, float] = {}
-    for (measure, _), p in zip(found, corrected, strict=True):
-        least[measure] = min(float(p), least.get(measure, 1.0))
-    return least
+    corrected = np.asarray(multipletests([p for _, p in p_values], method="holm")[1], dtype=np.float64)
+    smallest: dict[str, float] = {}
+    for (measure, _), p in zip(p_values, corrected, strict=True):
+        smallest[measure] = min(float(p), smallest.get(measure, 1.0))
+    return smallest
 
 
-def _p(cells: Any, own: tuple[str, str, str], across: tuple[str, str, str], between: bool) -> float:
+def _p_value(cells: Any, inner: tuple[str, str, str], outer: tuple[str, str, str], between: bool) -> float:
     from scipy.stats import ttest_1samp, ttest_ind
 
-    factor, level, reference = own
+    factor, level, reference = inner
     table = cells.unstack(factor)
     if level not in table or reference not in table:
         return float("nan")
-    differences = (
-        (table[level] - table[reference]).dropna().groupby(level=[across[0], "user"]).mean().unstack(across[0])
-    )
-    if across[1] not in differences or across[2] not in differences:
+    differences = (table[level] - table[reference]).dropna().groupby(level=[outer[0], "user"]).mean().unstack(outer[0])
+    if outer[1] not in differences or outer[2] not in differences:
         return float("nan")
     samples: tuple[Array, ...]
     if between:
-        samples = tuple(differences[name].dropna().to_numpy() for name in across[1:])
+        samples = tuple(differences[name].dropna().to_numpy() for name in outer[1:])
     else:
-        samples = ((differences[across[1]] - differences[across[2]]).dropna().to_numpy(),)
+        samples = ((differences[outer[1]] - differences[outer[2]]).dropna().to_numpy(),)
     if any(len(sample) < 3 for sample in samples) or not any(map(spreads, samples)):
         return float("nan")
     test: Any = ttest_ind(*samples, equal_var=False) if between else ttest_1samp(samples[0], 0.0)

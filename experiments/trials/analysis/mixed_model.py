@@ -9,11 +9,11 @@ with x = ½ at the level and −½ at the reference; c is the condition of the o
 that β is the mean over these conditions also if factors interact. The random slope v_i is used for within-subject
 factors only; without it the repetitions of a user would count as independent users (D. J. Barr et al., "Random effects
 structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Intercepts
-and slopes are independent: a correlation of a few users is mostly estimated as ±1, which changes p by a third.
+and slopes are independent: a correlation estimated from a few users is mostly ±1, which changes p by a third.
 Fitted by REML (statsmodels). β over its standard error is compared with Student's t, whose degrees of freedom are the
 number of users less one, or less the number of groups (between-within: M. D. Schluchter & J. T. Elashoff, 1990). In a
-balanced design this is the paired t test of the users' means, or a more conservative one where users differ in the
-effect by less than their repetitions would let expect: the variance of slopes is estimated as zero then.
+balanced design this is the paired t test of the users' means, or a more conservative test if users differ in the
+effect by less than the scatter of their repetitions implies: the variance of slopes is then estimated as zero.
 """
 
 import warnings
@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 LEVEL = 0.95
-_METHODS = ["bfgs", "lbfgs", "cg", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
+_OPTIMISERS = ["bfgs", "lbfgs", "cg", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
 
 
 class Fit(NamedTuple):
@@ -78,22 +78,22 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     if freedom < 1 or not scale > 0.0:
         return NO_FIT
     centre = float(data[measure].mean())
-    # Without the factors' own columns: in the formula a factor named "C" would hide patsy's function of that name.
+    # The factors' own columns are dropped: a factor named "C" would hide patsy's function C in the formula.
     data = data[["user", "_c"]].assign(_y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]) - 0.5)
     fixed = "_y ~ _x * C(_c, Sum)" if data["_c"].nunique() > 1 else "_y ~ _x"
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warned: variance at the boundary zero, as expected for identical people
+            warnings.simplefilter("ignore")  # a variance of zero, expected for identical people
             slopes = {"slopes": "0 + _x"} if within else None
-            made = smf.mixedlm(fixed, data, groups="user", re_formula="~1", vc_formula=slopes)
-            model = made.fit(reml=True, method=_METHODS)
-            estimate, error = scale * float(model.params["_x"]), scale * float(model.bse["_x"])
+            model = smf.mixedlm(fixed, data, groups="user", re_formula="~1", vc_formula=slopes)
+            result = model.fit(reml=True, method=_OPTIMISERS)
+            estimate, standard_error = scale * float(result.params["_x"]), scale * float(result.bse["_x"])
     except (np.linalg.LinAlgError, ValueError):
         return NO_FIT
-    if not (np.isfinite(error) and error > 0.0):
+    if not (np.isfinite(standard_error) and standard_error > 0.0):
         return NO_FIT
-    if not model.converged:
+    if not result.converged:
         return NO_FIT._replace(doubtful=True)
-    reach = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * error
-    p = 2.0 * float(t.sf(abs(estimate) / error, freedom))
-    return Fit(estimate, estimate - reach, estimate + reach, p, False)
+    half_width = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * standard_error
+    p = 2.0 * float(t.sf(abs(estimate) / standard_error, freedom))
+    return Fit(estimate, estimate - half_width, estimate + half_width, p, False)

@@ -57,7 +57,7 @@ class Report:
     failures : mapping of str to int
         Number of failed trials, by reason.
     replays : sequence of Replay
-        Trials that are shown.
+        Replays of single trials.
     made : str
         Code, libraries and processors that the study was made with.
     """
@@ -110,8 +110,8 @@ def _table(contrasts: Sequence[Contrast]) -> str:
 def _row(c: Contrast) -> str:
     agree = f"{c.agree} of {c.users}" if c.agree else str(c.users)
     numbers = (
-        short(c.mean), short(c.reference_mean), _between(c.difference, c.low, c.high),
-        _between(c.model, c.model_low, c.model_high), _p(c.p), _p(c.p_holm), short(c.effect), agree,
+        short(c.mean), short(c.reference_mean), _with_interval(c.difference, c.low, c.high),
+        _with_interval(c.model, c.model_low, c.model_high), _p_text(c.p), _p_text(c.p_holm), short(c.effect), agree,
     )  # fmt: skip
     weak = "" if c.shown else " class=weak"
     cells = "".join(f"<td>{number}</td>" for number in numbers)
@@ -119,22 +119,22 @@ def _row(c: Contrast) -> str:
     return f"<tr{weak}><td>{html.escape(MEASURES[c.measure].label)}</td>{levels}{cells}</tr>"
 
 
-def _between(value: float, low: float, high: float) -> str:
+def _with_interval(value: float, low: float, high: float) -> str:
     ends = f" ({low:.3g} to {high:.3g})" if math.isfinite(low) and math.isfinite(high) else ""
     return short(value) + ends
 
 
-def _p(value: float) -> str:
+def _p_text(value: float) -> str:
     return "–" if not math.isfinite(value) else "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def _interactions(found: Statistics) -> str:
     if not found.interactions:
         return ""
-    told = ", ".join(f"{MEASURES[name].name.replace('_', ' ')} {_p(p)}" for name, p in found.interactions.items())
+    texts = ", ".join(f"{MEASURES[name].name.replace('_', ' ')} {_p_text(p)}" for name, p in found.interactions.items())
     return (
         "Whether what a factor does depends on another one (least p of differences of differences, by Holm's method): "
-        f"{html.escape(told)}."
+        f"{html.escape(texts)}."
     )
 
 

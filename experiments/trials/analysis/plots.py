@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.trial.measures import MEASURES
 
-_USER, _MEAN = "#9aa6b8", "#1f5fbf"
+_USER_COLOUR, _MEAN_COLOUR = "#9aa6b8", "#1f5fbf"
 
 
 def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence[str], measure: str) -> Figure:
@@ -23,8 +23,8 @@ def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence
     for axis, (title, part) in zip(axes, panels, strict=True):
         means = part.groupby(["user", factor])[measure].mean().unstack().reindex(columns=list(levels))
         for values in means.to_numpy():
-            axis.plot(range(len(levels)), values, color=_USER, lw=0.8, marker="o", ms=3, alpha=0.7)
-        axis.plot(range(len(levels)), means.mean(), color=_MEAN, lw=0, marker="_", ms=28, mew=3)
+            axis.plot(range(len(levels)), values, color=_USER_COLOUR, lw=0.8, marker="o", ms=3, alpha=0.7)
+        axis.plot(range(len(levels)), means.mean(), color=_MEAN_COLOUR, lw=0, marker="_", ms=28, mew=3)
         axis.set_xticks(range(len(levels)), list(levels))
         axis.set_title(title, fontsize=10)
         axis.set_xlim(-0.5, len(levels) - 0.5)

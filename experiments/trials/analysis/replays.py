@@ -1,4 +1,4 @@
-"""Replays of the median and the worst trial of a study, which are run once more for them."""
+"""Replays of the median and the worst trial of a study, which are run again with a recording."""
 
 import tempfile
 from pathlib import Path
@@ -40,19 +40,19 @@ def chosen_trials(frame: Any, measure: str) -> dict[str, int]:
 def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay, ...]:
     """Run the median and the worst trial again, recorded, and make their replays."""
     shown: list[Replay] = []
-    for what, place in chosen_trials(frame, measure).items():
-        trial, value = trials[place], float(frame[measure].iloc[place])
-        met = trial.meeting
-        levels = ", ".join(f"{factor} {level}" for factor, level in met.condition.levels.items())
+    for rank, row in chosen_trials(frame, measure).items():
+        trial, value = trials[row], float(frame[measure].iloc[row])
+        meeting = trial.meeting
+        levels = ", ".join(f"{factor} {level}" for factor, level in meeting.condition.levels.items())
         title = (
-            f"The {what} trial by {MEASURES[measure].label}, {value:.3g}: user {met.user}, {levels}, repetition "
-            f"{met.repetition + 1}"
+            f"The {rank} trial by {MEASURES[measure].label}, {value:.3g}: user {meeting.user}, {levels}, repetition "
+            f"{meeting.repetition + 1}"
         )
-        shown.append(Replay(title, _page(trial)))
+        shown.append(Replay(title, _replay_page(trial)))
     return tuple(shown)
 
 
-def _page(trial: Trial) -> str:
+def _replay_page(trial: Trial) -> str:
     session = Shelf().session(trial.config)
     with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
         recorded(trial.config, session, TrialLog(session.servo, session.world), Path(folder))

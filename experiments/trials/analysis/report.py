@@ -15,7 +15,7 @@ from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
 
-_CONTRASTS = "contrasts.csv"
+_CONTRASTS_FILE = "contrasts.csv"
 
 
 def write_report(
@@ -48,12 +48,12 @@ def write_report(
         MEASURES[measure].says: levels_figure(frame, factor, factors[factor], rest, measure)
         for measure in dict.fromkeys((study.ease, study.cost)) if measure in measures
     }  # fmt: skip
-    shown_by = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
-    shown = replays(tuple(trials), frame, shown_by) if shown_by else ()
+    replay_measure = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
+    shown = replays(tuple(trials), frame, replay_measure) if replay_measure else ()
     counts = {str(reason): int(count) for reason, count in failures.items()}
     page = Report(study, text, sentences, found, plots, effects_figure(found, factor), counts, shown, made).page()
     path.write_text(page, encoding="utf-8")
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
-    pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS), index=False)
+    pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)
     return found, sentences

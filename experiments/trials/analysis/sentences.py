@@ -24,27 +24,27 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
-    ended = "all of which came to their end" if not failed else f"of which {failed} failed"
+    outcome = "all of which came to their end" if not failed else f"of which {failed} failed"
     first = (
         f"{_people(study.users.number)} met {counts} conditions ({', '.join(study.factors)}), "
-        f"{_times(study.repetitions)} each: {len(frame)} trials of {study.seconds:g} s, {ended}."
+        f"{_times(study.repetitions)} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
     )
     ease, cost = (
-        _answer(found.of(measure, factor), measure, factor, _unknown(frame, measure))
+        _answer(found.of(measure, factor), measure, factor, _missing_reason(frame, measure))
         for measure in (study.ease, study.cost)
     )
     return first, ease, cost
 
 
-def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, unknown: str) -> str:
+def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, reason: str) -> str:
     name = MEASURES[measure].name.replace("_", " ")
     if not contrasts:
-        return f"Of {name}, nothing can be said: {unknown}."
-    told = "; ".join(_compared(contrast) for contrast in contrasts)
-    return f"{name[0].upper()}{name[1:]}, by {factor}: {told}."
+        return f"Of {name}, nothing can be said: {reason}."
+    comparisons = "; ".join(_comparison(contrast) for contrast in contrasts)
+    return f"{name[0].upper()}{name[1:]}, by {factor}: {comparisons}."
 
 
-def _unknown(frame: Any, measure: str) -> str:
+def _missing_reason(frame: Any, measure: str) -> str:
     """Why a measure has no contrast, in words."""
     if measure not in frame:
         return f"it needs a {MEASURES[measure].figure} figure"
@@ -54,27 +54,27 @@ def _unknown(frame: Any, measure: str) -> str:
     return "it was the same in all trials" if values.nunique() == 1 else "no level has both it and one to hold against"
 
 
-def _compared(c: Contrast) -> str:
+def _comparison(c: Contrast) -> str:
     unit = f" {MEASURES[c.measure].unit}" if MEASURES[c.measure].unit else ""
-    held = f"{_number(c.mean)} against {_number(c.reference_mean)}{unit}"
+    pair = f"{_format_number(c.mean)} against {_format_number(c.reference_mean)}{unit}"
     if not (math.isfinite(c.low) and math.isfinite(c.high)):
-        return f"{held} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
-    interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
+        return f"{pair} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
+    interval = f"95 % interval of the difference {_format_number(c.low)} to {_format_number(c.high)}{unit}"
     if not c.shown:
         # An interval may exclude zero by itself, but not among all comparisons.
-        corrected = f"; p = {_number(c.p_holm)} corrected after Holm" if math.isfinite(c.p_holm) else ""
-        return f"no difference shown between {c.level} and {c.reference} ({held}; {interval}{corrected})"
+        corrected = f"; p = {_format_number(c.p_holm)} corrected after Holm" if math.isfinite(c.p_holm) else ""
+        return f"no difference shown between {c.level} and {c.reference} ({pair}; {interval}{corrected})"
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
     agree = f", {c.agree} of {c.users} users" if c.agree else ""
-    apart = c.most - c.least > ALIKE * abs(c.difference)
-    agree += f"; {_number(c.least)} to {_number(c.most)} by condition" if apart else ""
+    varies = c.most - c.least > ALIKE * abs(c.difference)
+    agree += f"; {_format_number(c.least)} to {_format_number(c.most)} by condition" if varies else ""
     return (
-        f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({held}; {interval}{agree})"
+        f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({pair}; {interval}{agree})"
     )
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return f"{value:.3g}"
 
 

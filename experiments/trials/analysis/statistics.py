@@ -23,8 +23,8 @@ from experiments.trials.analysis.interactions import interactions_of
 from experiments.trials.analysis.mixed_model import LEVEL, NO_FIT, Fit, fitted
 
 RESAMPLES = 4999
-"""Bootstrap resamples, such that the ends of an interval fall on one: (4999 + 1) × 2.5 % is whole (Davison & Hinkley
-1997, Bootstrap methods and their application)."""
+"""Number of bootstrap resamples; (4999 + 1) × 2.5 % is whole, so that the ends of a percentile interval are resamples
+(Davison & Hinkley 1997, Bootstrap methods and their application)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Contrast:
     Attributes
     ----------
     measure, factor, level, reference : str
-        What is compared.
+        Names of the measure, of the factor, and of its two levels that are compared.
     users : int
         Number of users in the comparison.
     mean, reference_mean : float
@@ -89,9 +89,9 @@ class Statistics:
     contrasts : tuple of Contrast
         Contrasts, ordered by measure, factor and level.
     interactions : dict of str to float
-        By measure, the least corrected p of an interaction; see `experiments.trials.analysis.interactions`.
+        By measure, the smallest corrected p of an interaction; see `experiments.trials.analysis.interactions`.
     remarks : tuple of str
-        Remarks, such as on models that did not converge.
+        Remarks, for example on models that did not converge.
     """
 
     contrasts: tuple[Contrast, ...]
@@ -121,7 +121,7 @@ def statistics(
     seed : int
         Seed of the bootstrap.
     """
-    found: list[Contrast] = []
+    contrasts: list[Contrast] = []
     cells_of: dict[str, Any] = {}
     remarks: dict[str, list[str]] = {}
     for measure in measures:
@@ -132,21 +132,21 @@ def statistics(
         cells_of[measure] = cells = rows.groupby([*varied, "user"])[measure].mean()
         for factor in varied:
             for level in factors[factor][1:]:
-                of = (measure, factor, level, factors[factor][0])
-                rng = np.random.default_rng([seed, len(found)])
-                made = _contrast(cells, of, factor in between, rng)
-                if made is not None:
-                    found.append(_modelled(made, rows, varied, between, remarks))
-    told = tuple(f"{', '.join(names).replace('_', ' ')}: {remark}" for remark, names in remarks.items())
+                labels = (measure, factor, level, factors[factor][0])
+                rng = np.random.default_rng([seed, len(contrasts)])
+                contrast = _contrast(cells, labels, factor in between, rng)
+                if contrast is not None:
+                    contrasts.append(_with_model(contrast, rows, varied, between, remarks))
+    remark_lines = tuple(f"{', '.join(names).replace('_', ' ')}: {remark}" for remark, names in remarks.items())
     interactions = interactions_of(cells_of, factors, between)
-    return Statistics(_corrected(found), interactions, told)
+    return Statistics(_with_corrected_p(contrasts), interactions, remark_lines)
 
 
-_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
-_DOUBTFUL = "the mixed model did not converge; the bootstrap interval stands alone"
+_NO_MODEL_REMARK = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
+_NOT_CONVERGED_REMARK = "the mixed model did not converge; the bootstrap interval stands alone"
 
 
-def _modelled(
+def _with_model(
     c: Contrast, rows: Any, varied: Sequence[str], between: Sequence[str], remarks: dict[str, list[str]]
 ) -> Contrast:
     """The contrast with the results of the mixed model added."""
@@ -155,15 +155,15 @@ def _modelled(
     fit: Fit = fitted(
         rows, c.measure, c.factor, (c.level, c.reference), others, c.users - groups, c.factor not in between
     )
-    remark = _DOUBTFUL if fit.doubtful else _NO_MODEL if not np.isfinite(fit.p) else ""
+    remark = _NOT_CONVERGED_REMARK if fit.doubtful else _NO_MODEL_REMARK if not np.isfinite(fit.p) else ""
     if remark:
         remarks.setdefault(remark, []).append(f"{c.measure} with {c.level}")
     return replace(c, model=fit.estimate, model_low=fit.low, model_high=fit.high, p=fit.p)
 
 
-def _contrast(cells: Any, of: tuple[str, str, str, str], between: bool, rng: np.random.Generator) -> Contrast | None:
+def _contrast(cells: Any, names: tuple[str, str, str, str], between: bool, rng: np.random.Generator) -> Contrast | None:
     """Difference, interval and effect size, from users' means in every condition; None if a level has no users."""
-    measure, factor, level, reference = of
+    measure, factor, level, reference = names
     table = cells.unstack(factor)
     if level not in table or reference not in table:
         return None
@@ -181,25 +181,25 @@ def _contrast(cells: Any, of: tuple[str, str, str, str], between: bool, rng: np.
         return None
     return Contrast(
         measure, factor, level, reference, users, float(one.mean()), float(other.mean()), float(_difference(*samples)),
-        *_bootstrapped(samples, rng), *_by_condition(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
+        *_bootstrap_interval(samples, rng), *_difference_range(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
         effect=effect, agree=agree,
     )  # fmt: skip
 
 
-def _by_condition(table: Any, level: str, reference: str) -> tuple[float, float]:
+def _difference_range(table: Any, level: str, reference: str) -> tuple[float, float]:
     others = [name for name in table.index.names if name != "user"]
     means = table.groupby(level=others).mean() if others else table
     differences = means[level] - means[reference] if others else means[level].mean() - means[reference].mean()
     return float(np.min(differences)), float(np.max(differences))
 
 
-def _bootstrapped(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
+def _bootstrap_interval(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
     from scipy.stats import bootstrap
 
     if not (all(len(sample) > 2 for sample in samples) and any(map(spreads, samples))):
         return float("nan"), float("nan")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # warned: a degenerate sample; its interval is NaN and shown as such
+        warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN, and is shown so
         ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
     return float(ends.confidence_interval.low), float(ends.confidence_interval.high)
 
@@ -210,13 +210,13 @@ def _difference(*samples: Array, axis: int = -1) -> Array:
     return means[0] if len(means) == 1 else means[0] - means[1]
 
 
-def _corrected(found: Sequence[Contrast]) -> tuple[Contrast, ...]:
+def _with_corrected_p(found: Sequence[Contrast]) -> tuple[Contrast, ...]:
     from statsmodels.stats.multitest import multipletests
 
     tested = [k for k, contrast in enumerate(found) if np.isfinite(contrast.p)]
-    made = list(found)
+    contrasts = list(found)
     if tested:
         corrected = multipletests([found[k].p for k in tested], method="holm")[1]
         for k, p in zip(tested, np.asarray(corrected, dtype=np.float64), strict=True):
-            made[k] = replace(found[k], p_holm=float(p))
-    return tuple(made)
+            contrasts[k] = replace(found[k], p_holm=float(p))
+    return tuple(contrasts)

@@ -10,7 +10,7 @@ from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
 from experiments.trials.trial.run_trial import Row
 
 TABLE_CSV, TABLE_PARQUET = "trials.csv", "trials.parquet"
-_MISSING = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"
+_INSTALL_HINT = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"
 
 
 def table(
@@ -37,19 +37,19 @@ def table(
     try:
         import pandas as pd
     except ImportError:
-        raise StudyError(_MISSING) from None
-    lacking = [trial for trial in trials if trial.key not in rows]
-    if lacking:
-        raise StudyError(f"{len(lacking)} of {len(trials)} trials have not run yet; start the study again to go on")
+        raise StudyError(_INSTALL_HINT) from None
+    missing = [trial for trial in trials if trial.key not in rows]
+    if missing:
+        raise StudyError(f"{len(missing)} of {len(trials)} trials have not run yet; start the study again to go on")
     records: list[dict[str, object]] = []
     for trial in trials:
-        met, row = trial.meeting, rows[trial.key]
-        found = {name: row.measures.get(name, float("nan")) for name in measures}
+        meeting, row = trial.meeting, rows[trial.key]
+        values = {name: row.measures.get(name, float("nan")) for name in measures}
         if row.state == "done":
-            found |= {name: margins.get(met.number, float("nan")) for name in OF_CONDITIONS if name in measures}
-        record: dict[str, object] = {"key": trial.key, "user": met.user, **met.condition.levels}
-        record |= {"repetition": met.repetition, "position": met.position, "seed": trial.config.seed}
-        record |= {"state": row.state, "reason": row.reason, **found}
+            values |= {name: margins.get(meeting.number, float("nan")) for name in OF_CONDITIONS if name in measures}
+        record: dict[str, object] = {"key": trial.key, "user": meeting.user, **meeting.condition.levels}
+        record |= {"repetition": meeting.repetition, "position": meeting.position, "seed": trial.config.seed}
+        record |= {"state": row.state, "reason": row.reason, **values}
         records.append(record)
     return pd.DataFrame.from_records(records)
 
@@ -59,7 +59,7 @@ def write_table(frame: Any, folder: Path) -> None:
     try:
         frame.to_parquet(folder / TABLE_PARQUET, index=False)
     except ImportError:
-        raise StudyError(_MISSING) from None
+        raise StudyError(_INSTALL_HINT) from None
     frame.to_csv(folder / TABLE_CSV, index=False)
 
 

@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 from sim.compilation.sources import reached_code
 
-_TRIAL = "experiments.trials.trial.run_trial"
+_TRIAL_MODULE = "experiments.trials.trial.run_trial"
 _LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "llvmlite")
 
 
@@ -17,5 +17,5 @@ def code_hash() -> str:
 
     Analysis and plots of a study are not included; nor is the processor, which a row names separately.
     """
-    made_of = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(_TRIAL).items())]
-    return hashlib.sha256(repr(made_of).encode()).hexdigest()[:16]
+    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(_TRIAL_MODULE).items())]
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

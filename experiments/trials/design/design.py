@@ -9,7 +9,7 @@ from experiments.trials.design.errors import StudyError
 from experiments.trials.design.study_config import StudyConfig, Words, check_trials
 from experiments.trials.trial.measures import MEASURES
 
-_TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
+_COLUMNS = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
 
 
 class Condition(NamedTuple):
@@ -55,23 +55,23 @@ def conditions(study: StudyConfig) -> tuple[Condition, ...]:
     StudyError
         If the design contradicts itself.
     """
-    _check(study)
+    _check_design(study)
     names = list(study.factors)
-    made: list[Condition] = []
+    combinations: list[Condition] = []
     for chosen in itertools.product(*study.factors.values()):
         levels = dict(zip(names, chosen, strict=True))
         words: Words = {}
         for name, level in levels.items():
             words |= study.factors[name][level]
-        made.append(Condition(levels, words))
-    return tuple(made)
+        combinations.append(Condition(levels, words))
+    return tuple(combinations)
 
 
 def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
     """Every trial of a study, by user and then in the order of time.
 
     Users are assigned in turn to the groups of the between-subject factors. Within a group, the users take the rows of
-    a balanced Latin square in turn, or all the fixed order.
+    a balanced Latin square in turn, or all of them the fixed order.
 
     Raises
     ------
@@ -82,21 +82,21 @@ def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
     for number, condition in enumerate(conditions(study)):
         group = tuple(condition.levels[name] for name in study.between)
         groups.setdefault(group, []).append((number, condition))
-    dealt = list(groups.values())
-    if len(dealt) > study.users.number:
+    arms = list(groups.values())
+    if len(arms) > study.users.number:
         raise StudyError(
-            f"study {study.name!r}: {len(dealt)} groups between users and {study.users.number} users; expected a user "
+            f"study {study.name!r}: {len(arms)} groups between users and {study.users.number} users; expected a user "
             f"or more for each, or fewer factors in between"
         )
-    met: list[Meeting] = []
+    trials: list[Meeting] = []
     for user in range(study.users.number):
-        own = dealt[user % len(dealt)]
-        rows = balanced_rows(len(own)) if study.order == "latin-square" else (tuple(range(len(own))),)
-        row = rows[user // len(dealt) % len(rows)]
+        members = arms[user % len(arms)]
+        rows = balanced_rows(len(members)) if study.order == "latin-square" else (tuple(range(len(members))),)
+        row = rows[user // len(arms) % len(rows)]
         for repetition, (place, k) in itertools.product(range(study.repetitions), enumerate(row)):
-            number, condition = own[k]
-            met.append(Meeting(user, repetition, repetition * len(row) + place, number, condition))
-    return tuple(met)
+            number, condition = members[k]
+            trials.append(Meeting(user, repetition, repetition * len(row) + place, number, condition))
+    return tuple(trials)
 
 
 def balanced_rows(n: int) -> tuple[tuple[int, ...], ...]:
@@ -111,33 +111,33 @@ def balanced_rows(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple(rows if n % 2 == 0 else rows + [row[::-1] for row in rows])
 
 
-def _check(study: StudyConfig) -> None:
+def _check_design(study: StudyConfig) -> None:
     where = f"study {study.name!r}"
     if not study.factors:
         raise StudyError(f"{where} has no factors; expected one or more, such as stiffness = [100, 300]")
     for name, levels in study.factors.items():
-        if name in _TAKEN:
+        if name in _COLUMNS:
             raise StudyError(
                 f"{where}: factor {name!r} has the name of another column of the table; expected another one, with "
                 "levels that say what they set"
             )
         if len(levels) < 2:
-            had = f"one level, {next(iter(levels))!r}" if levels else "no levels"
-            raise StudyError(f"{where}: factor {name!r} has {had}; expected two or more, or its words under [run]")
+            present = f"one level, {next(iter(levels))!r}" if levels else "no levels"
+            raise StudyError(f"{where}: factor {name!r} has {present}; expected two or more, or its words under [run]")
     _check_between(study, where)
     groups = math.prod(len(study.factors[name]) for name in study.between)
     count = math.prod(map(len, study.factors.values()))
     trials = max(count, study.users.number * study.repetitions * count // groups)
-    made_of = f"{study.users.number} users, {count} conditions, {study.repetitions} repetitions"
-    check_trials(where, trials, made_of)
-    for (one, its), (other, others) in itertools.combinations(study.factors.items(), 2):
-        shared = _words(its.values()) & _words(others.values())
+    sizes = f"{study.users.number} users, {count} conditions, {study.repetitions} repetitions"
+    check_trials(where, trials, sizes)
+    for (first, first_levels), (second, second_levels) in itertools.combinations(study.factors.items(), 2):
+        shared = _all_words(first_levels.values()) & _all_words(second_levels.values())
         if shared:
             raise StudyError(
-                f"{where}: factors {one!r} and {other!r} both set {sorted(shared)[0]!r}; expected one factor for it"
+                f"{where}: factors {first!r} and {second!r} both set {sorted(shared)[0]!r}; expected one factor for it"
             )
     for word, owner in (("person", "users"), ("seconds", "seconds"), ("seed", "seed")):
-        if word in study.run or any(word in _words(levels.values()) for levels in study.factors.values()):
+        if word in study.run or any(word in _all_words(levels.values()) for levels in study.factors.values()):
             raise StudyError(f"{where} sets {word!r} as a word of its runs; expected {owner!r} of the study itself")
 
 
@@ -149,8 +149,8 @@ def _check_between(study: StudyConfig, where: str) -> None:
         raise StudyError(f"{where}: a factor stands twice in between; expected {sorted(set(study.between))}")
 
 
-def _words(levels: Iterable[Words]) -> set[str]:
-    found: set[str] = set()
+def _all_words(levels: Iterable[Words]) -> set[str]:
+    words: set[str] = set()
     for level in levels:
-        found |= set(level)
-    return found
+        words |= set(level)
+    return words

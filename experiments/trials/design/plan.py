@@ -52,8 +52,8 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
         If the design contradicts itself, a level sets a parameter that a run does not have, or a clip does not exist.
     """
     people = population(study.users.number, study.users.seed)
-    bases = {number: _base(study, people[0], condition) for number, condition in enumerate(conditions(study))}
-    _check_apart(study, bases)
+    bases = {number: _base_config(study, people[0], condition) for number, condition in enumerate(conditions(study))}
+    _check_distinct(study, bases)
     trials: list[Trial] = []
     for meeting in meetings(study):
         base = bases[meeting.number]
@@ -77,9 +77,9 @@ def key_of(config: RunConfig) -> str:
     StudyError
         If a file that it names does not exist.
     """
-    told = to_json(resolved(config))
+    text = to_json(resolved(config))
     files = [f"{name} {file_digest(name)}" for name in files_of(config)]
-    return hashlib.sha256("\n".join([code_hash(), told, *files]).encode()).hexdigest()[:32]
+    return hashlib.sha256("\n".join([code_hash(), text, *files]).encode()).hexdigest()[:32]
 
 
 def files_of(config: RunConfig) -> tuple[str, ...]:
@@ -107,30 +107,30 @@ def file_digest(name: str) -> str:
         ) from None
 
 
-def _base(study: StudyConfig, person: Person, condition: Condition) -> RunConfig:
+def _base_config(study: StudyConfig, person: Person, condition: Condition) -> RunConfig:
     words: Words = {"person": person, "seconds": study.seconds} | study.run | condition.words
     if words.get("mode") != "lead":  # in LEADING the hand does nothing but lead
         words.setdefault("user", study.users.does)
     try:
         return run_config(**words)
     except ParameterError as error:
-        said = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
-        raise StudyError(f"study {study.name!r}, condition {said}: {keywords(str(error))}") from None
+        level_text = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
+        raise StudyError(f"study {study.name!r}, condition {level_text}: {keywords(str(error))}") from None
     except TypeError as error:
         raise StudyError(
             f"study {study.name!r}: {error}; expected words of a run, as `hvf run --help` has them"
         ) from None
 
 
-def _check_apart(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:
+def _check_distinct(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:
     """Refuse two conditions that are the same."""
     seen: dict[str, int] = {}
-    every = conditions(study)
+    all_conditions = conditions(study)
     for number, config in bases.items():
-        told = to_json(config)
-        if told in seen:
-            one, other = (" and ".join(every[k].levels.values()) for k in (seen[told], number))
+        text = to_json(config)
+        if text in seen:
+            first, second = (" and ".join(all_conditions[k].levels.values()) for k in (seen[text], number))
             raise StudyError(
-                f"study {study.name!r}: conditions {one!r} and {other!r} are the same; expected them to differ"
+                f"study {study.name!r}: conditions {first!r} and {second!r} are the same; expected them to differ"
             )
-        seen[told] = number
+        seen[text] = number

@@ -12,9 +12,9 @@ from experiments.config.part import above, from_dict, part, whole
 from experiments.trials.design.errors import StudyError
 
 MOST_TRIALS = 1_000_000
-"""Most trials of a study or a tuning: as many as the largest population has people."""
+"""Maximum number of trials of a study or a tuning: the number of people in the largest population."""
 LONGEST = 86_400.0
-"""Longest trial, a day [s]."""
+"""Maximum duration of a trial: a day [s]."""
 Words = dict[str, Any]
 """Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
 
@@ -107,11 +107,11 @@ def study_from(values: Mapping[str, object], where: str) -> StudyConfig:
     factors = given.get("factors", {})
     if isinstance(factors, Mapping):
         factors = cast(Mapping[str, object], factors)
-        given["factors"] = {name: _levels(name, levels) for name, levels in factors.items()}
+        given["factors"] = {name: _parse_levels(name, levels) for name, levels in factors.items()}
     return from_dict(StudyConfig, given, where)
 
 
-def _levels(name: str, levels: object) -> object:
+def _parse_levels(name: str, levels: object) -> object:
     if isinstance(levels, Mapping):
         return cast(object, levels)
     if not isinstance(levels, list):
@@ -119,13 +119,13 @@ def _levels(name: str, levels: object) -> object:
     values = cast(list[object], levels)
     names = [" ".join(map(str, v)) if isinstance(v, list) else str(v) for v in values]  # pyright: ignore
     if len(set(names)) < len(names):
-        twice = next(one for one in names if names.count(one) > 1)
-        raise StudyError(f"factor {name!r} has level {twice} twice; expected each value once")
+        duplicate = next(one for one in names if names.count(one) > 1)
+        raise StudyError(f"factor {name!r} has level {duplicate} twice; expected each value once")
     return {level: {name: value} for level, value in zip(names, values, strict=True)}
 
 
 def check_trials(where: str, trials: int, made_of: str) -> None:
-    """Refuse more trials than `MOST_TRIALS`, with what they are made of.
+    """Refuse more than `MOST_TRIALS` trials; `made_of` lists the factors of their number for the message.
 
     Raises
     ------

@@ -13,10 +13,10 @@ from experiments.trials.design.plan import key_of
 from experiments.trials.trial.run_trial import Row, Task, perform
 
 AHEAD = 3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
-DEATHS = 50  # workers that die while they run the same trial before the trial is taken to be the cause
+DEATHS = 50  # number of workers that die while running the same trial before the trial is taken to be the cause
 STARTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
-_BUSY = "120s"  # timeout of local connections: on a busy machine processes may have to wait
-_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker
+_LOCAL_TIMEOUT = "120s"  # timeout of local connections; processes on a busy machine may have to wait
+_MAX_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker
 
 
 class Cluster:
@@ -33,7 +33,7 @@ class Cluster:
     """
 
     def __init__(self, client: Any, where: str):
-        self._client, self._where = client, where
+        self._client, self._scheduler = client, where
 
     def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
         """Yield rows of tasks as they are completed; tasks are drawn from the iterable as they are needed.
@@ -45,12 +45,12 @@ class Cluster:
         """
         from distributed import as_completed
 
-        left, running = iter(tasks), as_completed()
-        for task in _first(left, AHEAD * max(1, self._threads())):
+        pending, running = iter(tasks), as_completed()
+        for task in _take(pending, AHEAD * max(1, self._thread_count())):
             running.add(self._submit(task))
         for future in running:
             yield self._row(future)
-            for task in _first(left, 1 + max(0, AHEAD * self._threads() - running.count() - 1)):
+            for task in _take(pending, 1 + max(0, AHEAD * self._thread_count() - running.count() - 1)):
                 running.add(self._submit(task))
 
     def _submit(self, task: Task) -> Any:
@@ -68,65 +68,65 @@ class Cluster:
             key = str(future.key).removeprefix("trial-")
             return Row(key, "failed", f"every one of {DEATHS} workers that ran it died", {}, 0.0, "", "")
         except (OSError, TimeoutError, RuntimeError) as error:
-            raise self._lost(error) from None
-        except Exception as error:  # Dask raises here whatever a worker could not import or unpickle
+            raise self._scheduler_error(error) from None
+        except Exception as error:  # whatever a worker could not import or unpickle
             if future.status in ("cancelled", "lost"):
-                raise self._lost(error) from None
+                raise self._scheduler_error(error) from None
             raise StudyError(
-                f"a worker of {self._where}: {type(error).__name__}: {error}; expected this version of hvf there"
+                f"a worker of {self._scheduler}: {type(error).__name__}: {error}; expected this version of hvf there"
             ) from None
         finally:
             future.release()
         return Row(*row)
 
-    def _lost(self, error: BaseException) -> StudyError:
-        said = (str(error).splitlines() or [type(error).__name__])[0].rpartition("reason: ")[2].rstrip(".")
+    def _scheduler_error(self, error: BaseException) -> StudyError:
+        reason = (str(error).splitlines() or [type(error).__name__])[0].rpartition("reason: ")[2].rstrip(".")
         return StudyError(
-            f"{self._where}: the scheduler is lost ({said}); every trial so far is kept; start it again to go on"
+            f"{self._scheduler}: the scheduler is lost ({reason}); every trial so far is kept; start it again to go on"
         )
 
-    def _threads(self) -> int:
+    def _thread_count(self) -> int:
         try:
             return sum(self._client.nthreads().values())
         except (OSError, TimeoutError, RuntimeError, ValueError) as error:
-            raise self._lost(error) from None
+            raise self._scheduler_error(error) from None
 
 
 @contextmanager
 def local_cluster(workers: int) -> Generator[Cluster]:
-    """A cluster of `workers` local processes, each of which runs one trial at a time; it ends with the block.
+    """A cluster of `workers` local processes, each of which runs one trial at a time; closed after the block.
 
     Raises
     ------
     StudyError
         If it cannot be started.
     """
-    distributed = _distributed()
+    distributed = _import_distributed()
     import dask
 
     settings = {
         "distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.memory.terminate": False,
-        "distributed.comm.timeouts.connect": _BUSY, "distributed.comm.timeouts.tcp": _BUSY,
+        "distributed.comm.timeouts.connect": _LOCAL_TIMEOUT, "distributed.comm.timeouts.tcp": _LOCAL_TIMEOUT,
     }  # fmt: skip
     with (
         dask.config.set(settings),  # pyright: ignore[reportPrivateImportUsage]
-        _processes(distributed, workers) as cluster,
+        _start_processes(distributed, workers) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield Cluster(client, f"{workers} local workers")
 
 
-def _processes(distributed: Any, workers: int) -> Any:
-    """Dask's local cluster; Dask gives up if a worker dies while it starts, so that several attempts are made."""
-    said = ""
+def _start_processes(distributed: Any, workers: int) -> Any:
+    """Start Dask's local cluster, in several attempts, since Dask gives up if a worker dies while it starts."""
+    reason = ""
     for _ in range(STARTS):
         try:
             return distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_QUIET
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_LOG_LEVEL
             )
         except RuntimeError as error:
-            said = str(error.__cause__ or error).splitlines()[0]
-    raise StudyError(f"{workers} local workers do not start ({said}); expected fewer --workers, or --threads instead")
+            reason = str(error.__cause__ or error).splitlines()[0]
+    raise StudyError(f"{workers} local workers do not start ({reason}); expected fewer --workers, or --threads instead")
 
 
 @contextmanager
@@ -138,30 +138,30 @@ def cluster_at(address: str) -> Generator[Cluster]:
     StudyError
         If no scheduler answers, or it has no workers.
     """
-    distributed = _distributed()
+    distributed = _import_distributed()
     try:
-        client = distributed.Client(address, timeout=_WAIT)
+        client = distributed.Client(address, timeout=_MAX_WAIT)
     except (OSError, TimeoutError, ValueError) as error:
-        said = str(error).splitlines()[0]
+        reason = str(error).splitlines()[0]
         raise StudyError(
-            f"{address}: no Dask scheduler answers ({said}); expected one such as tcp://host:8786"
+            f"{address}: no Dask scheduler answers ({reason}); expected one such as tcp://host:8786"
         ) from None
     try:
         try:
-            client.wait_for_workers(1, timeout=_WAIT)
+            client.wait_for_workers(1, timeout=_MAX_WAIT)
         except TimeoutError:
             raise StudyError(
-                f"{address}: the scheduler has no workers after {_WAIT}; start some with `dask worker {address}`"
+                f"{address}: the scheduler has no workers after {_MAX_WAIT}; start some with `dask worker {address}`"
             ) from None
         yield Cluster(client, address)
     finally:
         client.close(timeout="2s")
 
 
-_QUIET = logging.CRITICAL
+_LOG_LEVEL = logging.CRITICAL
 
 
-def _distributed() -> Any:
+def _import_distributed() -> Any:
     try:
         import distributed
     except ImportError:
@@ -169,7 +169,7 @@ def _distributed() -> Any:
             "clusters need Dask; expected pip install 'haptic-vector-fields[study]', or --threads instead"
         ) from None
     for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "distributed.batched"):
-        logging.getLogger(name).setLevel(_QUIET)
+        logging.getLogger(name).setLevel(_LOG_LEVEL)
     return distributed
 
 
@@ -194,6 +194,6 @@ def perform_on_worker(task: Task) -> Row:
     return perform(task)
 
 
-def _first(tasks: Iterator[Task], number: int) -> Iterator[Task]:
+def _take(tasks: Iterator[Task], number: int) -> Iterator[Task]:
     for _, task in zip(range(number), tasks, strict=False):
         yield task

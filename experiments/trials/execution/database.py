@@ -15,7 +15,7 @@ from experiments.trials.design.errors import StudyError
 from experiments.trials.trial.run_trial import Row
 
 SCHEMA = 1
-_MARK = 0x48564654  # "HVFT": application id, by which SQLite and `file` identify the file
+_APPLICATION_ID = 0x48564654  # "HVFT": application id, by which SQLite and `file` identify the file
 _TABLES = """
 CREATE TABLE study (identity TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL);
 CREATE TABLE trials (
@@ -28,7 +28,7 @@ CREATE TABLE trials (
 class Database:
     """Rows of a study's trials by key; one driver at a time may write, any process may read.
 
-    Use as a context manager. Every row is a transaction in SQLite's write-ahead log: a kill loses no row already added.
+    Use as a context manager. Every row is a transaction in SQLite's write-ahead log: no added row is lost by a kill.
 
     Parameters
     ----------
@@ -42,31 +42,31 @@ class Database:
     Raises
     ------
     StudyError
-        If the file is no such database, belongs to another study or version, or is being written by another driver.
+        If the file is not such a database, belongs to another study or version, or is being written by another driver.
     """
 
     def __init__(self, path: Path, identity: str, name: str, text: str):
         self._path = path
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._lock = _locked(path.with_suffix(".lock"), path)
+        self._lock = _acquire_lock(path.with_suffix(".lock"), path)
         try:
-            with self._errors_named():
+            with self._translated_errors():
                 self._db = sqlite3.connect(path, isolation_level=None)
-                self._begin(identity, name, text)
+                self._open_study(identity, name, text)
         except BaseException:
             os.close(self._lock)
             raise
 
-    def _begin(self, identity: str, name: str, text: str) -> None:
+    def _open_study(self, identity: str, name: str, text: str) -> None:
         if not self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             self._db.execute("PRAGMA journal_mode = WAL")  # a persistent setting of the file
             self._db.executescript(
-                f"BEGIN; {_TABLES} PRAGMA application_id = {_MARK}; PRAGMA user_version = {SCHEMA}; COMMIT;"
+                f"BEGIN; {_TABLES} PRAGMA application_id = {_APPLICATION_ID}; PRAGMA user_version = {SCHEMA}; COMMIT;"
             )
-        mark, version = (
+        application_id, version = (
             self._db.execute(f"PRAGMA {what}").fetchone()[0] for what in ("application_id", "user_version")
         )
-        if mark != _MARK:
+        if application_id != _APPLICATION_ID:
             raise StudyError(
                 f"{self._path}: a database of something else; expected one of `hvf trials`, or another --out"
             )
@@ -76,12 +76,12 @@ class Database:
                 "program that began it, or give another --out"
             )
         self._db.execute("PRAGMA synchronous = NORMAL")
-        held = self._db.execute("SELECT identity, name FROM study").fetchone()
-        if held is None:
+        stored = self._db.execute("SELECT identity, name FROM study").fetchone()
+        if stored is None:
             self._db.execute("INSERT INTO study VALUES (?, ?, ?)", (identity, name, text))
-        elif held[0] != identity:
+        elif stored[0] != identity:
             raise StudyError(
-                f"{self._path}: holds another study, {held[1]!r}, or this one before it was changed; give another "
+                f"{self._path}: holds another study, {stored[1]!r}, or this one before it was changed; give another "
                 "--out, or the study as it is in the database (table study, column text)"
             )
 
@@ -99,27 +99,27 @@ class Database:
             row.key, row.state, row.reason, json.dumps(finite), json.dumps(what), row.seconds, row.worker,
             row.processor, now,
         )  # fmt: skip
-        with self._errors_named():
+        with self._translated_errors():
             self._db.execute("INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
 
     def rows(self) -> Iterator[Row]:
         """All rows, in the order of their keys."""
         columns = "key, state, reason, measures, seconds, worker, processor"
-        with self._errors_named():
+        with self._translated_errors():
             for key, state, reason, measures, *rest in self._db.execute(f"SELECT {columns} FROM trials ORDER BY key"):
                 read = {name: math.nan if value is None else value for name, value in json.loads(measures).items()}
                 yield Row(key, state, reason, read, *rest)
 
     def keys(self) -> set[str]:
         """Keys of all rows."""
-        with self._errors_named():
+        with self._translated_errors():
             return {key for (key,) in self._db.execute("SELECT key FROM trials")}
 
     def most(self, name: str) -> int:
         """Largest value of a number in the descriptions of the trials; −1 if no trial has it."""
-        with self._errors_named():
-            found = self._db.execute("SELECT max(json_extract(what, '$.' || ?)) FROM trials", (name,)).fetchone()[0]
-            return -1 if found is None else int(found)
+        with self._translated_errors():
+            largest = self._db.execute("SELECT max(json_extract(what, '$.' || ?)) FROM trials", (name,)).fetchone()[0]
+            return -1 if largest is None else int(largest)
 
     def close(self) -> None:
         """Close the file and release its lock for other drivers."""
@@ -127,18 +127,18 @@ class Database:
         os.close(self._lock)
 
     @contextmanager
-    def _errors_named(self) -> Generator[None]:
-        """Turn SQLite's errors into a `StudyError` of one line."""
+    def _translated_errors(self) -> Generator[None]:
+        """Raise SQLite's errors as a `StudyError` of one line."""
         try:
             yield
         except sqlite3.Error as error:
-            said = str(error)
-            todo = "expected a database of `hvf trials`; give another --out"
-            if "full" in said:
-                said, todo = "the disk is full", "every trial so far is kept; make room, and start it again to go on"
-            elif "locked" in said:
-                todo = "another program is writing it; close that, and start it again to go on"
-            raise StudyError(f"{self._path}: {said}; {todo}") from None
+            cause = str(error)
+            advice = "expected a database of `hvf trials`; give another --out"
+            if "full" in cause:
+                cause, advice = "the disk is full", "every trial so far is kept; make room, and start it again to go on"
+            elif "locked" in cause:
+                advice = "another program is writing it; close that, and start it again to go on"
+            raise StudyError(f"{self._path}: {cause}; {advice}") from None
 
     def __enter__(self) -> Self:
         return self
@@ -147,8 +147,8 @@ class Database:
         self.close()
 
 
-def _locked(path: Path, database: Path) -> int:
-    """Acquire a lock file, which the system releases when the process ends in any way; returns its descriptor."""
+def _acquire_lock(path: Path, database: Path) -> int:
+    """Lock a file, and return its descriptor; the system releases the lock when the process ends in any way."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -24,8 +24,8 @@ class Executor(Protocol):
         ...
 
 
-class _Rate(ProgressColumn):
-    """Column of the progress bar with the trials per minute."""
+class _RateColumn(ProgressColumn):
+    """Column of the progress bar with the number of trials per minute."""
 
     def render(self, task: BarTask) -> Text:
         return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
@@ -33,14 +33,14 @@ class _Rate(ProgressColumn):
 
 def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
     """Compile the units that trials need, once for each kind of run, and make their maps."""
-    for config in {_shape(config): config for config in configs}.values():
+    for config in {_compilation_key(config): config for config in configs}.values():
         shelf.session(config, lambda units: compile_once(console, units))
 
 
-def _shape(config: RunConfig) -> object:
+def _compilation_key(config: RunConfig) -> object:
     """Key of the settings that determine which compiled units and which map a run needs."""
-    added = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
-    return config.mode.kind, added, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+    options = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
+    return config.mode.kind, options, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
 
 
 def run_missing(
@@ -69,21 +69,21 @@ def run_missing(
     StudyError, OSError
         If the study cannot go on; completed trials are kept.
     """
-    kept = database.keys()
-    missing = [trial for trial in trials if trial.key not in kept]
+    stored = database.keys()
+    missing = [trial for trial in trials if trial.key not in stored]
     if not missing:
         return 0
     columns = (
-        TextColumn("trials"), BarColumn(), TextColumn("{task.completed} of {task.total}"), _Rate(),
+        TextColumn("trials"), BarColumn(), TextColumn("{task.completed} of {task.total}"), _RateColumn(),
         TimeRemainingColumn(), TextColumn("{task.fields[failed]}"),
     )  # fmt: skip
     failed = 0
     rows = executor.rows(Task(trial.key, to_json(trial.config), recordings) for trial in missing)
-    before = len(trials) - len(missing)
-    if recordings and before:
-        console.print(f"{before} trials ran before; only those that run now are recorded for certain")
+    stored_count = len(trials) - len(missing)
+    if recordings and stored_count:
+        console.print(f"{stored_count} trials ran before; only those that run now are recorded for certain")
     with Progress(*columns, console=console, speed_estimate_period=60.0) as progress:
-        bar = progress.add_task("", total=len(trials), completed=before, failed="none failed")
+        bar = progress.add_task("", total=len(trials), completed=stored_count, failed="none failed")
         progress.advance(bar, 0)  # first sample of time, from which the rate is estimated
         for row in rows:
             database.add(row, what[row.key])

@@ -2,7 +2,7 @@
 
 from experiments.trials.design.errors import StudyError
 
-_TRIED = ".hvf"
+_PROBE_FILE = ".hvf"
 
 
 def check_place(url: str) -> None:
@@ -18,8 +18,8 @@ def check_place(url: str) -> None:
 
         system, path = fsspec.core.url_to_fs(url)
         system.makedirs(path, exist_ok=True)
-        system.pipe_file(f"{path}/{_TRIED}", b"")
-        system.rm_file(f"{path}/{_TRIED}")
+        system.pipe_file(f"{path}/{_PROBE_FILE}", b"")
+        system.rm_file(f"{path}/{_PROBE_FILE}")
     except Exception as error:  # every storage backend has its own exceptions
         reason = " ".join(str(error).split()) or type(error).__name__
         raise StudyError(

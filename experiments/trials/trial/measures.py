@@ -1,7 +1,7 @@
 """Measures of a trial: accuracy, smoothness and effort of the hand, and their effect on the figure.
 
 Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that;
-that of the figure begins with the trial.
+measures of the physical figure begin with the trial.
 """
 
 import math
@@ -96,22 +96,24 @@ def measures_of(figure: str) -> tuple[str, ...]:
 def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
     """All measures of a completed trial, by name; NaN where there is nothing to measure."""
     ticks, frames = log.ticks, log.frames
-    since = min(SETTLING, 0.5 * float(ticks["t"][-1]))
-    meant = meant_to_leave(config, ticks["t"])
-    ticks, meant = {name: channel[ticks["t"] >= since] for name, channel in ticks.items()}, meant[ticks["t"] >= since]
-    found = dict.fromkeys(measures_of(config.figure.kind), _NAN)
-    found |= _of_hand(ticks, meant, session) | {"faults": float(np.sum(np.diff(ticks["fault"], prepend=0.0) > 0.0))}
-    del found["margin_used"]
+    start = min(SETTLING, 0.5 * float(ticks["t"][-1]))
+    intent = meant_to_leave(config, ticks["t"])
+    ticks, intent = {name: channel[ticks["t"] >= start] for name, channel in ticks.items()}, intent[ticks["t"] >= start]
+    measures = dict.fromkeys(measures_of(config.figure.kind), _NAN)
+    measures |= _hand_measures(ticks, intent, session) | {
+        "faults": float(np.sum(np.diff(ticks["fault"], prepend=0.0) > 0.0))
+    }
+    del measures["margin_used"]
     if frames:
         stride = max(1, round(1.0 / (SEEN_RATE * session.servo.plant.period * session.servo.figure_ticks)))
-        found |= _of_animation(session, log, stride, since, config)
+        measures |= _animation_measures(session, log, stride, start, config)
     if "joint_error" in frames:
-        found |= _of_figure(frames, session.weight)
-    return found
+        measures |= _figure_measures(frames, session.weight)
+    return measures
 
 
 def meant_to_leave(config: RunConfig, t: Array) -> Mask:
-    """Whether the hand intends to leave the curve at times t [s]: throughout for a person's intent, else about pushes.
+    """Whether the hand intends to leave the curve at times t [s]: always in a task of `PERSONAL`, else only in pushes.
 
     A push counts from its start until `SETTLING` after its end.
     """
@@ -121,16 +123,16 @@ def meant_to_leave(config: RunConfig, t: Array) -> Mask:
     return np.any([(at <= t) & (t <= end) for at, end in spans], axis=0) if spans else np.zeros(len(t), dtype=bool)
 
 
-def _of_hand(ticks: Mapping[str, Array], meant: Mask, session: Session) -> dict[str, float]:
+def _hand_measures(ticks: Mapping[str, Array], intent: Mask, session: Session) -> dict[str, float]:
     period, curve = session.servo.plant.period, session.curve
     user, force, v = ticks["user"], ticks["force"], ticks["v"]
     steps = np.diff(ticks["phase"])
     if curve.periodic:
         steps -= curve.duration * np.round(steps / curve.duration)
     elapsed = float(ticks["t"][-1] - ticks["t"][0])
-    sparc, jerk = _per_lap(v, 1.0 / period, curve.duration)
+    sparc, jerk = _smoothness_per_lap(v, 1.0 / period, curve.duration)
     return {
-        "tracking_error": 1e3 * _rms(ticks["distance"][~meant]),
+        "tracking_error": 1e3 * _rms(ticks["distance"][~intent]),
         "completion": float(np.clip(np.sum(steps) / elapsed, 0.0, 1.0)) if elapsed > 0.0 else _NAN,
         "effort": float(np.sum(user**2)) * period,
         "hand_work": 1e3 * float(np.sum(np.abs(np.sum(user * v, axis=1)))) * period,
@@ -140,8 +142,8 @@ def _of_hand(ticks: Mapping[str, Array], meant: Mask, session: Session) -> dict[
     }
 
 
-def _per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
-    """Mean SPARC and log dimensionless jerk over windows of a lap's duration, or of all if it is shorter than a lap."""
+def _smoothness_per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
+    """Mean SPARC and log dimensionless jerk over windows of a lap, or over the whole if it is shorter than a lap."""
     speed = speed_profile(velocity, rate)
     size = round(lap * RATE)
     laps = [speed[k : k + size] for k in range(0, len(speed) - size + 1, size)] or [speed]
@@ -153,12 +155,14 @@ def _per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
     )
 
 
-def _of_animation(session: Session, log: TrialLog, stride: int, since: float, config: RunConfig) -> dict[str, float]:
+def _animation_measures(
+    session: Session, log: TrialLog, stride: int, start: float, config: RunConfig
+) -> dict[str, float]:
     ticks, frames = log.ticks, log.frames
     rows = slice(None, None, stride * session.servo.figure_ticks)
     default = default_poses(session, stride)(*(ticks[name][rows] for name in ("nearest", "phase", "river")))
     t, edited = frames["t"][::stride], frames["reference"][::stride]
-    chosen = (t >= since) & meant_to_leave(config, t)
+    chosen = (t >= start) & meant_to_leave(config, t)
     if not np.any(chosen):
         return {}
     return {
@@ -167,15 +171,15 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
     }
 
 
-def _of_figure(frames: Mapping[str, Array], weight: float) -> dict[str, float]:
+def _figure_measures(frames: Mapping[str, Array], weight: float) -> dict[str, float]:
     """Measures of the physical figure, until its first fall."""
     fallen = frames["down"] != UP
-    until = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
-    flight = frames["flight"][:until] > 0.0
-    standing = frames["ground"][:until, 2][~flight] > SUPPORTS
+    end = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
+    flight = frames["flight"][:end] > 0.0
+    standing = frames["ground"][:end, 2][~flight] > SUPPORTS
     return {
         "fell": float(np.any(fallen)),
-        "ballistic_error": _rms(np.linalg.norm(frames["residual"][:until, :3][flight], axis=1)) / weight,
+        "ballistic_error": _rms(np.linalg.norm(frames["residual"][:end, :3][flight], axis=1)) / weight,
         "contact_error": 1.0 - float(np.mean(standing)) if len(standing) else _NAN,
     }
 

@@ -83,29 +83,29 @@ class Shelf:
     """
 
     def __init__(self) -> None:
-        self._made: dict[object, MapParts[Any]] = {}
+        self._maps: dict[object, MapParts[Any]] = {}
         self._locks: dict[object, threading.Lock] = {}
         self._lock = threading.Lock()
 
     def session(self, config: RunConfig, ready: Ready = lambda units: None) -> Session:
-        """Put a run together on a map from the cache, which is made first if it is missing."""
-        key = _shared(config)
+        """Assemble a run with the map from the cache, which is made first if it is missing."""
+        key = _map_key(config)
         with self._lock:
             lock = self._locks.setdefault(key, threading.Lock())
-        if key not in self._made:
+        if key not in self._maps:
             with lock:
-                if key not in self._made:
+                if key not in self._maps:
                     session = wire(config, ready=ready)
                     # The map was already refined when this session was assembled.
-                    self._made[key] = replace(session.parts.maps, refined=None)
-        return wire(config, ready=ready, maps_of=self._maps_of(key))
+                    self._maps[key] = replace(session.parts.maps, refined=None)
+        return wire(config, ready=ready, maps_of=self._map_maker(key))
 
-    def _maps_of(self, key: object) -> Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]:
-        return lambda config, figure, clips: self._made[key]
+    def _map_maker(self, key: object) -> Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]:
+        return lambda config, figure, clips: self._maps[key]
 
 
-def _shared(config: RunConfig) -> object:
-    """Key of the settings on which a map depends: for a map about a circle not the mode, else all but seed and hand."""
+def _map_key(config: RunConfig) -> object:
+    """Key of the settings that a map depends on: map and figure if it is about a circle, else all but seed and user."""
     figure = (config.figure.kind == "none", config.figure.stature, config.figure.mass)
     if isinstance(config.map, Cylindrical | Composite):
         return config.map, figure
@@ -126,30 +126,30 @@ def perform(task: Task, shelf: Shelf = SHELF) -> Row:
     OSError, MemoryError
         If the machine lacks something.
     """
-    worker, began = f"{platform.node()}:{os.getpid()}", time.thread_time()
+    worker, start = f"{platform.node()}:{os.getpid()}", time.thread_time()
     try:
         config = from_json(RunConfig, task.config, "a trial's configuration")
-        measures = _run(config, task, shelf)
+        measures = _run_trial(config, task, shelf)
     except (OSError, MemoryError):
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return Row(task.key, "failed", reason, {}, time.thread_time() - began, worker, get_host_cpu_name())
-    return Row(task.key, "done", "", measures, time.thread_time() - began, worker, get_host_cpu_name())
+        return Row(task.key, "failed", reason, {}, time.thread_time() - start, worker, get_host_cpu_name())
+    return Row(task.key, "done", "", measures, time.thread_time() - start, worker, get_host_cpu_name())
 
 
-def _run(config: RunConfig, task: Task, shelf: Shelf) -> dict[str, float]:
+def _run_trial(config: RunConfig, task: Task, shelf: Shelf) -> dict[str, float]:
     session = shelf.session(config)
     log = TrialLog(session.servo, session.world)
     if not task.recordings:
-        return _simulated(config, session, log)
+        return _simulate(config, session, log)
     with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
         measures = recorded(config, session, log, Path(folder))
-        _keep(Path(folder) / RECORDING, f"{task.recordings.rstrip('/')}/{task.key}.h5")
+        _copy_to_url(Path(folder) / RECORDING, f"{task.recordings.rstrip('/')}/{task.key}.h5")
     return measures
 
 
-def _simulated(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
+def _simulate(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
     laws = session.parts.program.python_laws
     Loop(session.servo, session.world, log, python_laws=laws).run(config.seconds)
     return measured_trial(config, session, log)
@@ -172,7 +172,7 @@ def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -
     return measures
 
 
-def _keep(file: Path, url: str) -> None:
+def _copy_to_url(file: Path, url: str) -> None:
     import fsspec  # an optional dependency, needed for recordings only
 
     with fsspec.open(url, "wb") as target:

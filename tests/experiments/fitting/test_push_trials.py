@@ -28,7 +28,7 @@ def lifted() -> Lifted:
 def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
     shown = push_trials.toured(lifted, curve, True).poses
-    monkeypatch.setattr(push_trials, "_PUSHED", 0.0)
+    monkeypatch.setattr(push_trials, "_PUSH_OFFSET", 0.0)
     alone = push_trials.toured(lifted, curve, True).poses
     apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
     times = np.arange(len(shown)) / 120.0
@@ -40,7 +40,7 @@ def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, mo
 def test_a_hand_whose_field_does_not_keep_its_pace_is_late_outside_and_early_inside(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    late = np.arange(360) / 120.0 - push_trials._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    late = np.arange(360) / 120.0 - push_trials._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
     assert np.abs(late[:61]).max() < 1e-12
     # On radii of 40 to 60 mm.
     assert 8.0 / 68.0 < late[180] < 8.0 / 48.0

@@ -63,7 +63,7 @@ def test_nobody_at_the_address_is_a_line(monkeypatch: pytest.MonkeyPatch) -> Non
     from experiments.trials.design.errors import StudyError
     from experiments.trials.execution import cluster
 
-    monkeypatch.setattr(cluster, "_WAIT", "1s")
+    monkeypatch.setattr(cluster, "_MAX_WAIT", "1s")
     with pytest.raises(StudyError, match="no Dask scheduler answers"), cluster.cluster_at("tcp://127.0.0.1:9"):
         pass
 

@@ -99,7 +99,7 @@ def test_what_is_wrong_with_the_machine_is_no_row(monkeypatch: pytest.MonkeyPatc
     def full(*_: object) -> Row:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(run_trial, "_simulated", full)
+    monkeypatch.setattr(run_trial, "_simulate", full)
     with pytest.raises(OSError, match="No space left"):
         perform(Task(trial.key, to_json(trial.config)))
 

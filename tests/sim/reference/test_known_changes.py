@@ -44,7 +44,7 @@ def known(plain: RiverClips) -> RiverClips:
     """With a change from the first clip to the second, as it is where the search begins."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(river_changes, "feasible", lambda clip, *rest, **more: SimpleNamespace(clip=clip, costs=(0.0,)))
-        gate, *rows = river_changes._found(plain.on_one_river(), 0.4, FIGURE, 0, 1, LAP / 8 * np.arange(8))
+        gate, *rows = river_changes._change(plain.on_one_river(), 0.4, FIGURE, 0, 1, LAP / 8 * np.arange(8))
     return plain.with_changes([ClipChange(0, 1, gate[:1], np.array(rows))])
 
 
@@ -105,7 +105,7 @@ def test_where_no_change_is_found_the_map_is_as_it_was(
     monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
     # Other processes would find the changes that this one is told not to find.
     monkeypatch.setattr(river_changes, "side_by_side", lambda calls: [call(*given) for call, given in calls])
-    monkeypatch.setattr(river_changes, "_passage", lambda *rest: None)
+    monkeypatch.setattr(river_changes, "_make_passage", lambda *rest: None)
     for _ in range(2):  # found, and as it is kept
         made = river_changes.with_changes(plain, 0.4, FIGURE)
         assert made.changes == ()
@@ -122,7 +122,7 @@ def test_a_change_found_in_a_round_of_two_laps_is_that_of_a_lap_twice_as_long(
     moments = LAP * np.array([0.75, 0.85])
     for first, second in ((0, 1), (2, 0)):
         once, again = (
-            river_changes._found(made.on_one_river(), 0.4, FIGURE, first, second, moments) for made in (plain, twice)
+            river_changes._change(made.on_one_river(), 0.4, FIGURE, first, second, moments) for made in (plain, twice)
         )
         assert once[0, 0] > 0.5 * LAP
         assert once.shape == again.shape
@@ -134,13 +134,13 @@ def test_strides_of_two_clips_are_told(plain: RiverClips) -> None:
     walk, run = (load_clips((name,))[0][0] for name in ("walk", "run"))
     clips = RiverClips(CURVES[:2], [(clip.poses, clip.fps) for clip in (walk, run)], 0.015, figure_legs(FIGURE), 4.4)
     alike = clips.on_one_river()
-    strides = river_changes._strides(alike, 0, 1)
+    strides = river_changes._stride_count(alike, 0, 1)
     lap = np.arange(840) * LAP / 840
     for river in (0, 1):
-        joints = river_changes._alone(alike, river, lap)[:, 7:]
+        joints = river_changes._clip_poses(alike, river, lap)[:, 7:]
         assert np.abs(joints - np.roll(joints, 840 // strides, axis=0)).max() < 0.02
     assert strides > 1
-    assert river_changes._strides(plain.on_one_river(), 0, 2) == 1
+    assert river_changes._stride_count(plain.on_one_river(), 0, 2) == 1
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_the_figure_follows_over_all_changes_of_three_clips_that_it_loses_by_off
     assert {(change.first, change.second) for change in found.changes} == {
         (a, b) for a in range(3) for b in range(3) if a != b
     }
-    seconds = river_tour._SECONDS
+    seconds = river_tour._DURATION
     by_offsets, by_changes = (followed(river_tour.toured(made, Figure(), FIGURE), seconds) for made in (plain, found))
     # 4 and 16 % when this was written; half of what is lacking is the margin.
     assert by_changes.fell is None
