@@ -6,10 +6,10 @@ import numpy as np
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights
 from experiments.results.measures.soles import Soles
-from models.humanoid.skeleton import N_JOINTS, joint_range, rest_pose
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from models.world.scene import SceneConfig
 
 
@@ -41,15 +41,12 @@ class MotionMeasure(NamedTuple):
 
 def measure_motion(clip: Clip) -> MotionMeasure:
     """Measure a clip on the default figure."""
-    turns = pose_difference(np.broadcast_to(rest_pose(), clip.poses.shape), clip.poses)[:, 6:]
-    turns = turns.reshape(-1, N_JOINTS, 3)
-    low, high = joint_range()[..., 0], joint_range()[..., 1]
     floor, feet = contacts(clip), Soles(SceneConfig())
     feet.add(clip.poses)
     com = momentum(clip).com
     spans = find_flights(floor.supported, clip.fps)
     return MotionMeasure(
-        limits=float(np.maximum(low - turns, turns - high).clip(min=0.0).max()),
+        limits=max(0.0, float(beyond_ranges(clip.poses).max())),
         slide=feet.slide,
         penetration=float(max(0.0, -floor.clearance.min())),
         ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),

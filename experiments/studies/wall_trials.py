@@ -8,13 +8,14 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.rotations import exponential, logarithm, multiply
+from controllers.rotations import exponential, multiply
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.setups.wiring import wire
-from models.humanoid.skeleton import JOINTS, N_POSE, joint_range
+from models.humanoid.skeleton import JOINTS, N_POSE
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.users.hand.actions import Push
@@ -39,13 +40,6 @@ def impossible(clip: Clip) -> Clip:
     return Clip(poses, clip.fps, f"{clip.name} with a broken elbow")
 
 
-def excess(poses: Array) -> Array:
-    """Excess of the worst joint of each pose (n, 75) beyond its limit [rad], shape (n,); negative within all limits."""
-    limits = joint_range()
-    turns = np.array([[logarithm(*q) for q in pose[-4 * len(JOINTS) :].reshape(-1, 4)] for pose in poses])
-    return np.maximum(turns - limits[..., 1], limits[..., 0] - turns).max(axis=(1, 2))
-
-
 class Meeting(NamedTuple):
     """A hand that pushes towards an impossible clip: time [s], radius of the stylus [m], excess [rad]."""
 
@@ -65,7 +59,8 @@ def meet(walls: bool) -> Meeting:
         every = session.servo.figure_ticks
         m = -(-n // every)
         place = ticks.hand[: m * every : every, 1:3]
-        frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess(block.reference[:m])))
+        excess = beyond_ranges(block.reference[:m]).max(axis=1)
+        frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess))
 
     Loop(session.servo, session.world, observe).run(_RUN_DURATION)
     return Meeting(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))

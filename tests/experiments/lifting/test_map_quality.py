@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, in_between, lap_times, measure_map
 from experiments.lifting.motion_measure import measure_motion
@@ -162,6 +163,11 @@ def test_what_is_wrong_with_a_motion_is_measured_as_far_as_it_is():
     assert moved(z=-0.01).penetration == pytest.approx(still.penetration + 0.01, abs=1e-9)
     most = joint_range()[JOINTS.index("left_knee"), 1, 1]
     assert moved(knee=most + 0.2 * s, z=0.5).limits == pytest.approx(0.2, abs=1e-9)
+    poses = np.tile(STANDING.poses[0], (10, 1))
+    elbow = 7 + 4 * JOINTS.index("left_elbow")
+    # Bent by 155° and twisted by 100° it is within its range, though the shorter rotation vector is not.
+    poses[:, elbow : elbow + 4] = Rotation.from_rotvec(np.deg2rad([0.0, 100.0, -155.0])).as_quat(scalar_first=True)
+    assert measure_motion(Clip(poses, 60.0, "bent")).limits == 0.0
     t = s * 59.0 / 60.0
     assert moved(z=5.0 + 3.0 * t - 0.5 * 9.81 * t**2).ballistic < 1e-3
     assert moved(z=5.0 + 3.0 * t - 0.5 * 9.81 * t**2 + 0.2 * np.sin(3.0 * TURN * s)).ballistic > 0.1
