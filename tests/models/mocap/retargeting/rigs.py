@@ -20,12 +20,8 @@ TWISTS = ("{}Twist", "{}Roll", "{}_twist_01", "{}.001", "{}Part1")
 ROOTS = ("hips", "above", "at rest", "on the floor", "carries")
 PROPORTIONS = {"arm": (0.6, 1.6), "leg": (0.6, 1.6), "hips": (0.6, 1.6), "trunk": (0.8, 1.3), "shoulders": (0.85, 1.15),
                "foot": (0.7, 1.4)}  # fmt: skip
-_ROOT_FOLLOWS = {
-    "above": "heading",
-    "at rest": "moved",
-    "on the floor": "shadow",
-    "carries": "",
-}  # what the root joint turns with
+# What the root joint turns with.
+_ROOT_FOLLOWS = {"above": "heading", "at rest": "moved", "on the floor": "shadow", "carries": ""}
 
 
 @dataclass(frozen=True)
@@ -50,9 +46,7 @@ class Rig:
     below: int = 0  # additional spine joints below the abdomen,
     between: int = 0  # between abdomen and chest,
     over: int = 0  # and above the chest
-    shared: str = (
-        "split"  # additional spine joints split a bone, or lie at the next joint with an "interpolated" rotation
-    )
+    shared: str = "split"  # additional spine joints split a bone, or are "interpolated" at the place of the next one
     necks: int = 1
     hips: float | None = None  # additional joints between pelvis and thighs, at this share of the distance
     positions: bool = False  # position channels on every joint
@@ -121,9 +115,8 @@ class Joint(NamedTuple):
     tip: np.ndarray | None = None
 
 
-_BODY_OFFSETS = {
-    body: np.array(figure_model().body(body).pos) for body in BODIES
-}  # positions of the figure's joints in their parents
+# Positions of the figure's joints in their parents [m].
+_BODY_OFFSETS = {body: np.array(figure_model().body(body).pos) for body in BODIES}
 
 
 def leg_scale(rig: Rig) -> float:
