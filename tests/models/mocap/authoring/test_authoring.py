@@ -201,7 +201,7 @@ def test_accelerations_are_continuous(motion):
     assert changes[1] < 0.65 * changes[0]
 
 
-def test_an_open_motion_starts_and_ends_at_rest():
+def test_open_motion_starts_and_ends_at_rest():
     motion = replace(standing(lap=None), keys=[*standing().keys, Key(1.0, height=0.8, trunk=(20, 0, 0))])
     poses = poses_at(motion, np.array([-1.0, 0.0, 0.01, 0.99, 1.0, 5.0]))
     np.testing.assert_array_equal(poses[0], poses[1])

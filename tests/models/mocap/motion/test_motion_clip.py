@@ -117,7 +117,7 @@ def test_duration_counts_intervals_and_displacement_moves_poses_in_the_plane():
     np.testing.assert_allclose(moved[:, 3:7], np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (31, 1)))
 
 
-def test_a_clip_does_not_share_memory_with_its_source():
+def test_clip_does_not_share_memory_with_its_source():
     poses = np.tile(rest_pose(), (3, 1))
     clip = Clip(poses, 30.0, "copy")
     poses[:] = 0.0

@@ -74,9 +74,11 @@ def test_consecutive_turns_give_continuous_places():
 def test_spheres_beside_the_pivot_of_a_turning_foot_are_lifted():
     yaw, points = turning(np.pi / 2.0, TOE)
     standing, places = placed(yaw, points)
-    spheres = np.hstack((standing, np.ones((N, 4), bool)))
+    both_feet = np.hstack((standing, np.ones((N, 4), bool)))
     least = clearance(
-        Stances(spheres, spheres, np.hstack((places, places)), np.zeros_like(spheres), spheres * 1.0), FPS, False
+        Stances(both_feet, both_feet, np.hstack((places, places)), np.zeros_like(both_feet), both_feet * 1.0),
+        FPS,
+        False,
     )
     middle, others = REST_FRAMES + TURN_FRAMES // 2, np.arange(4) != TOE
     # Below 8 mm the tracking controller takes a sphere for a standing one.

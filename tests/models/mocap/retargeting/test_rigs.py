@@ -29,7 +29,7 @@ MAX_ANGLE = 2.0  # deg
 MAX_ROOT_DEVIATION = 0.01  # largest distance of the root from its path in the source [m per m of leg]
 MAX_SOLE_DEVIATION = 0.01  # largest change of height on the floor [m]
 LEG_LENGTH = 0.86  # leg length of the figure [m]
-SWAPPED_CLIPS = ("walk", "ginga", "cheer", "squat_dance")
+SWAP_TEST_CLIPS = ("walk", "ginga", "cheer", "squat_dance")
 MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
 LIMBS = {"upper_arm": (0.0, 1.0, 0.0), "forearm": (0.0, 1.0, 0.0), "thigh": (0.0, 0.0, -1.0), "shank": (0.0, 0.0, -1.0)}
 
@@ -261,8 +261,8 @@ def rotated_about_the_origin(clip, axis, degrees, place=(0.0, 0.0, 0.0)):
     turn = Rotation.from_euler(axis, degrees, degrees=True)
     poses = clip.poses.copy()
     poses[:, :3] = turn.apply(poses[:, :3]) + place
-    refused_whole_motions = turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True)
-    poses[:, 3:7] = refused_whole_motions.as_quat(scalar_first=True)
+    orientation = turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True)
+    poses[:, 3:7] = orientation.as_quat(scalar_first=True)
     return Clip(poses, clip.fps, f"{clip.name} turned about {axis} by {degrees}")
 
 
@@ -461,7 +461,7 @@ def test_mirrored_body_is_refused(motions, tmp_path):
     ("limbs", "words"),
     [("arms", ("Shoulder", "Arm", "ForeArm", "Hand")), ("legs", ("UpLeg", "Leg", "Foot", "ToeBase"))],
 )
-@pytest.mark.parametrize("name", SWAPPED_CLIPS)
+@pytest.mark.parametrize("name", SWAP_TEST_CLIPS)
 def test_arms_or_legs_with_swapped_sides_are_refused(limbs, words, name, motions, tmp_path):
     write_rig(Rig(), motions.clip(name), tmp_path / "r.bvh")
     swap_sides(tmp_path / "r.bvh", *words)
