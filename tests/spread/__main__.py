@@ -21,8 +21,8 @@ RUNS: dict[str, dict[str, str]] = {
     "haswell": {"OPENBLAS_CORETYPE": "Haswell", START_OFFSET: "1e-9", SEED_OFFSET: "100"},
     "zen": {"OPENBLAS_CORETYPE": "Zen", START_OFFSET: "-1e-9", SEED_OFFSET: "200"},
 }
-TEST_FOLDERS = ("audit", "experiments", "golden", "integration", "models/mocap", "sim", "controllers/certificates")
-"""Folders of tests that simulate a figure or evaluate a run, fast and slow ones."""
+LOOKED_AT = ("audit", "experiments", "golden", "integration", "models/mocap", "sim", "controllers/certificates")
+"""Folders of tests in which a figure is simulated or a run looked at, fast ones and slow."""
 OF_THE_CLOCK = (
     "test_c_function", "test_habits", "test_hardware_command", "test_run_to_folder", "test_shared", "test_processes",
     "test_trial_cost",
@@ -33,7 +33,7 @@ _ROOT = Path(__file__).parents[2]
 _TABLE_ROWS = 15
 
 
-def run_tests(folder: Path, environment: Mapping[str, str], folders: tuple[str, ...] = TEST_FOLDERS) -> None:
+def run_tests(folder: Path, environment: Mapping[str, str], folders: tuple[str, ...] = LOOKED_AT) -> None:
     """Run the tests with an environment and record their comparisons in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.jsonl"):
