@@ -1,4 +1,4 @@
-"""The floor: contacts obey the round cone of Coulomb's law and do not creep within it."""
+"""Floor contacts: a circular Coulomb friction cone, with little creep inside it."""
 
 import mujoco
 import numpy as np
@@ -9,8 +9,8 @@ from models.floor import FRICTION, add_floor
 MASS, RADIUS = 10.0, 0.02
 
 
-def slid(share: float, way: float, seconds: float = 1.0) -> float:
-    """How far a sliding block is pushed over the floor by a share of μ m g in a direction [m]."""
+def sliding_distance(force_share: float, direction: float, duration: float = 1.0) -> float:
+    """Distance that a force of a share of μ m g in a direction pushes a block over the floor [m]."""
     spec = mujoco.MjSpec()
     add_floor(spec)
     body = spec.worldbody.add_body(name="block", pos=[0.0, 0.0, RADIUS])
@@ -21,14 +21,14 @@ def slid(share: float, way: float, seconds: float = 1.0) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 500)
     start = data.qpos[:2].copy()
-    force = share * FRICTION * MASS * float(np.linalg.norm(model.opt.gravity))
-    data.qfrc_applied[:2] = force * np.cos(way), force * np.sin(way)
-    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+    force = force_share * FRICTION * MASS * float(np.linalg.norm(model.opt.gravity))
+    data.qfrc_applied[:2] = force * np.cos(direction), force * np.sin(direction)
+    mujoco.mj_step(model, data, round(duration / model.opt.timestep))
     return float(np.linalg.norm(data.qpos[:2] - start))
 
 
-@pytest.mark.parametrize("way", [0.0, 0.3, 0.25 * np.pi])
-def test_a_point_pushed_by_less_than_friction_holds_creeps_by_millimetres_and_by_more_it_goes(way: float) -> None:
-    assert slid(0.9, way) < 0.004
+@pytest.mark.parametrize("direction", [0.0, 0.3, 0.25 * np.pi])
+def test_block_creeps_millimetres_below_the_friction_limit_and_slides_above_it(direction: float) -> None:
+    assert sliding_distance(0.9, direction) < 0.004
     # From rest: (1.1 − 1) μ g t²/2.
-    assert slid(1.1, way) == pytest.approx(0.5 * 0.1 * FRICTION * 9.81, rel=0.1)
+    assert sliding_distance(1.1, direction) == pytest.approx(0.5 * 0.1 * FRICTION * 9.81, rel=0.1)

@@ -1,4 +1,4 @@
-"""A decorated function has one BLAS thread, its caller the number it had before."""
+"""A decorated function runs on one BLAS thread; the caller keeps its number of threads."""
 
 import subprocess
 import sys
@@ -15,14 +15,14 @@ from experiments.setups.wiring import wire
 from models.errors import ModelError
 from models.mocap.preparation.prepare import prepared
 
-DOORS: list[tuple[str, str, Callable[[], object]]] = [
+ENTRY_POINTS: list[tuple[str, str, Callable[[], object]]] = [
     ("models.mocap.preparation.prepare", "load", lambda: prepared(Path("walk.bvh"))),
     ("experiments.lifting.lift", "load_clips", lambda: lift_clips(["walk"], Room())),
     ("experiments.setups.wiring", "check_rates", lambda: wire(run_config())),
 ]
 
 
-ALONE = """
+SUBPROCESS_CODE = """
 import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 from models.one_blas_thread import on_one_blas_thread
@@ -46,27 +46,27 @@ except ValueError:
 """
 
 
-def _threads() -> set[int]:
+def _blas_threads() -> set[int]:
     return {int(pool["num_threads"]) for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
-def test_callers_keep_their_threads_also_after_an_error() -> None:
-    """In a process of its own: a library of another package may be built for one thread, whatever is asked of it."""
-    told = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True).stdout
-    assert told == "{2} {1} {2}\n{2}\n"
+def test_thread_count_of_the_caller_is_restored_after_return_and_after_an_error() -> None:
+    """Run in a subprocess, where no other package has loaded a BLAS library built for a single thread."""
+    output = subprocess.run([sys.executable, "-c", SUBPROCESS_CODE], capture_output=True, text=True, check=True).stdout
+    assert output == "{2} {1} {2}\n{2}\n"
 
 
-@pytest.mark.parametrize(("module", "inner", "outer"), DOORS)
-def test_what_is_slow_beside_other_programs_has_one(
-    monkeypatch: pytest.MonkeyPatch, module: str, inner: str, outer: Callable[[], object]
+@pytest.mark.parametrize(("module", "first_call", "entry_point"), ENTRY_POINTS)
+def test_preparation_lifting_and_wiring_run_on_one_blas_thread(
+    monkeypatch: pytest.MonkeyPatch, module: str, first_call: str, entry_point: Callable[[], object]
 ) -> None:
     seen: list[set[int]] = []
 
     def stop(*_: object, **__: object) -> None:
-        seen.append(_threads())
+        seen.append(_blas_threads())
         raise ModelError("seen")
 
-    monkeypatch.setattr(f"{module}.{inner}", stop)
+    monkeypatch.setattr(f"{module}.{first_call}", stop)
     with threadpool_limits(limits=2, user_api="blas"), pytest.raises(ModelError, match="seen"):
-        outer()
+        entry_point()
     assert seen == [{1}]

@@ -1,4 +1,4 @@
-"""How far numbers stay from the bounds that tests set them, over several runs of the tests."""
+"""Margins between compared numbers and their bounds over several runs of the tests."""
 
 import json
 from collections import defaultdict
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-_STILL = 1e-12  # of the larger side: what differs by less has been rounded, no more
+_ROUNDING = 1e-12  # share of the larger side: smaller differences are rounding
 
 
 class Margin(NamedTuple):
@@ -15,15 +15,15 @@ class Margin(NamedTuple):
     Attributes
     ----------
     test, assertion : str
-        Where it stands.
+        The test and the source of the assertion.
     least, most : float
-        Of what is compared: the side that moves.
+        Smallest and largest value of the side that varies.
     relation, bound : str, float
-        What it was compared with, in the run where it came nearest.
+        Relation and bound in the run with the smallest slack.
     slack : float
-        How far from failing it stayed in the worst of the runs.
+        Distance from failure in the worst run.
     spread : float
-        How far its slack moved from run to run.
+        Range of the slack over the runs.
     """
 
     test: str
@@ -37,11 +37,11 @@ class Margin(NamedTuple):
 
     @property
     def spreads(self) -> float:
-        """Slack in the worst run, in spreads."""
+        """Slack in the worst run in units of the spread."""
         return self.slack / self.spread
 
 
-class _Compared(NamedTuple):
+class _Comparison(NamedTuple):
     slack: float
     value: float
     relation: str
@@ -52,61 +52,64 @@ _MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
 def margins(runs: Iterable[Path]) -> list[Margin]:
-    """Comparisons whose numbers moved between runs of the tests, the nearest to their bounds first.
+    """Comparisons whose numbers varied between runs of the tests, those with the smallest margin first.
 
     Parameters
     ----------
     runs : iterable of Path
-        Folders with the lines that `tests.spread.plugin` wrote.
+        Folders with the JSON lines that `tests.spread.plugin` wrote.
     """
     by_run = [_nearest(_lines(folder)) for folder in runs]
-    found = []
+    result = []
     for key in sorted(set.intersection(*(set(run) for run in by_run))):
-        seen = [run[key] for run in by_run]
-        slacks = [one.slack for one in seen]
+        group = [run[key] for run in by_run]
+        slacks = [comparison.slack for comparison in group]
         spread = max(slacks) - min(slacks)
-        if spread <= _STILL * max(abs(seen[0].value), abs(seen[0].bound)):
+        if spread <= _ROUNDING * max(abs(group[0].value), abs(group[0].bound)):
             continue
-        nearest = min(seen)
-        if _range([one.value for one in seen]) < _range(
-            [one.bound for one in seen]
+        nearest = min(group)
+        if _range([comparison.value for comparison in group]) < _range(
+            [comparison.bound for comparison in group]
         ):  # a bound on the left, as in 0 < x
-            seen = [_Compared(one.slack, one.bound, _MIRRORED[one.relation], one.value) for one in seen]
-            nearest = min(seen)
-        values = [one.value for one in seen]
+            group = [
+                _Comparison(comparison.slack, comparison.bound, _MIRRORED[comparison.relation], comparison.value)
+                for comparison in group
+            ]
+            nearest = min(group)
+        values = [comparison.value for comparison in group]
         test, assertion, _, _ = key
-        found.append(
+        result.append(
             Margin(test, assertion, min(values), max(values), nearest.relation, nearest.bound, min(slacks), spread)
         )
-    return sorted(found, key=lambda margin: margin.spreads)
+    return sorted(result, key=lambda margin: margin.spreads)
 
 
 def failures(runs: Mapping[str, Path]) -> dict[str, set[str]]:
-    """Tests that failed, and in which runs."""
-    found: dict[str, set[str]] = defaultdict(set)
+    """Tests that failed, each with the names of the runs in which it failed."""
+    result: dict[str, set[str]] = defaultdict(set)
     for name, folder in runs.items():
         for line in _lines(folder):
             if line.get("outcome") == "failed":
-                found[str(line["test"])].add(name)
-    return dict(found)
+                result[str(line["test"])].add(name)
+    return dict(result)
 
 
 def _lines(folder: Path) -> list[dict[str, object]]:
     return [json.loads(line) for path in sorted(folder.glob("*.jsonl")) for line in path.read_text().splitlines()]
 
 
-def _nearest(lines: list[dict[str, object]]) -> dict[tuple[str, str, int, int], _Compared]:
-    """Of each comparison of a run that was made more than once, as in a loop, the one that was nearest to failing."""
-    found: dict[tuple[str, str, int, int], _Compared] = {}
+def _nearest(lines: list[dict[str, object]]) -> dict[tuple[str, str, int, int], _Comparison]:
+    """The evaluation with the smallest slack of each comparison of a run, which a loop may evaluate many times."""
+    result: dict[tuple[str, str, int, int], _Comparison] = {}
     for line in lines:
         if "assertion" not in line:
             continue
         value, bound, relation = float(str(line["value"])), float(str(line["bound"])), str(line["relation"])
         key = (str(line["test"]), str(line["assertion"]), int(str(line["line"])), int(str(line["which"])))
-        # Also of one that is part of a larger expression, and may be false: how near it was to being otherwise.
-        compared = _Compared(abs(bound - value), value, relation, bound)
-        found[key] = min(found.get(key, compared), compared)
-    return found
+        # A comparison within a larger expression may be false: its slack is the distance from changing its value.
+        comparison = _Comparison(abs(bound - value), value, relation, bound)
+        result[key] = min(result.get(key, comparison), comparison)
+    return result
 
 
 def _range(values: list[float]) -> float:

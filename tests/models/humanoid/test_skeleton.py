@@ -22,12 +22,12 @@ DE_LEVA = {"head": 6.94, "upper_arm": 2.71, "forearm": 1.62, "hand": 0.61, "thig
 DE_LEVA_TRUNK = 43.46
 
 
-def _floor(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+def _with_floor(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], contype=1, conaffinity=0)
     return spec
 
 
-def test_a_pose_has_75_numbers_and_a_tangent_57():
+def test_model_has_75_positions_57_velocities_51_motors_and_17_ball_joints():
     model = figure_model()
     assert (model.nq, model.nv, model.nu) == (N_POSE, N_TANGENT, 51) == (75, 57, 51)
     assert len(JOINTS) == 17
@@ -37,7 +37,7 @@ def test_a_pose_has_75_numbers_and_a_tangent_57():
     assert [int(model.body_parentid[k + 1]) - 1 for k in range(18)] == [segment.parent for segment in SEGMENTS]
 
 
-def test_the_rest_pose_stands_on_its_soles_and_is_parallel_to_the_world():
+def test_rest_pose_stands_on_its_soles_with_bodies_aligned_to_the_world():
     model = figure_model()
     data = mujoco.MjData(model)
     data.qpos[:] = rest_pose()
@@ -50,7 +50,7 @@ def test_the_rest_pose_stands_on_its_soles_and_is_parallel_to_the_world():
 
 
 @pytest.mark.parametrize("mass", [75.0, 60.0])
-def test_masses_are_de_levas(mass):
+def test_segment_masses_match_de_leva(mass):
     model = figure_model(mass=mass)
     assert model.body_mass.sum() == pytest.approx(mass)
     for part, share in DE_LEVA.items():
@@ -66,7 +66,7 @@ def test_masses_are_de_levas(mass):
     # Lengths [mm] of the mean male subject of 1741 mm, radii of gyration [%]: sagittal, transverse, longitudinal.
     [("left_thigh", 422.2, (32.9, 32.9, 14.9)), ("right_shank", 434.0, (25.5, 24.9, 10.3))],
 )
-def test_inertias_are_de_levas(body, length, radii):
+def test_segment_inertias_match_de_leva(body, length, radii):
     model = figure_model()
     mass = model.body(body).mass[0]
     # In a leg's frame the sagittal axis is x, the transverse axis y and the long axis z.
@@ -77,14 +77,14 @@ def test_inertias_are_de_levas(body, length, radii):
     np.testing.assert_allclose(rotation @ np.diag(model.body(body).inertia) @ rotation.T, np.diag(moments), atol=1e-12)
 
 
-def test_inertias_belong_to_bodies_that_can_exist():
+def test_inertias_satisfy_the_triangle_inequality():
     model = figure_model()
     a, b, c = np.sort(model.body_inertia[1:], axis=1).T
     assert np.all(a > 0)
     assert np.all(a + b >= c)
 
 
-def test_the_figure_is_symmetric():
+def test_figure_is_left_right_symmetric():
     limits, model = joint_range(), figure_model()
     torques = torque_limit().reshape(17, 3)
     for name in JOINTS:
@@ -103,7 +103,7 @@ def test_the_figure_is_symmetric():
             np.testing.assert_allclose(left.inertia, right.inertia)
 
 
-def test_every_joint_axis_has_a_motor_with_its_limit():
+def test_every_joint_axis_has_a_motor_with_its_torque_limit():
     model, limits = figure_model(1.6, 55.0), torque_limit(1.6, 55.0)
     for joint, name in enumerate(JOINTS):
         for axis, letter in enumerate("xyz"):
@@ -128,13 +128,13 @@ def test_stature_scales_lengths():
 
 
 @pytest.mark.parametrize(("stature", "mass"), [(0.4, 75.0), (3.0, 75.0), (1.75, 2.0), (1.75, 300.0), (np.nan, 75.0)])
-def test_a_body_that_no_human_has_is_refused(stature, mass):
+def test_stature_or_mass_outside_the_human_range_is_refused(stature, mass):
     with pytest.raises(ModelError, match="must lie between"):
         figure_spec(stature, mass)
 
 
-def test_a_second_of_noise_gives_no_warning():
-    spec = _floor(figure_spec())
+def test_one_second_of_random_torques_gives_no_mujoco_warning():
+    spec = _with_floor(figure_spec())
     spec.option.timestep = 5e-4
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = spec.compile()
@@ -148,11 +148,11 @@ def test_a_second_of_noise_gives_no_warning():
     assert np.all(np.isfinite(data.qpos))
 
 
-def test_the_whole_body_meets_the_floor_and_nothing_else_and_who_stands_touches_it_with_the_feet_alone():
-    model = _floor(figure_spec()).compile()
+def test_bodies_collide_with_the_floor_only_and_standing_touches_it_with_the_feet():
+    model = _with_floor(figure_spec()).compile()
     assert set(np.flatnonzero(model.geom_contype)) == {0}  # the floor
-    meeting = {model.body(model.geom_bodyid[geom]).name for geom in np.flatnonzero(model.geom_conaffinity)}
-    assert meeting == set(BODIES)
+    colliding = {model.body(model.geom_bodyid[geom]).name for geom in np.flatnonzero(model.geom_conaffinity)}
+    assert colliding == set(BODIES)
     data = mujoco.MjData(model)
     data.qpos[:] = rest_pose()
     data.qpos[2] -= 1e-3
@@ -160,8 +160,8 @@ def test_the_whole_body_meets_the_floor_and_nothing_else_and_who_stands_touches_
     assert {int(max(contact.geom)) for contact in data.contact} == {model.geom(name).id for name in FOOT_CONTACTS}
 
 
-def test_a_model_is_ones_own_and_as_it_is_compiled() -> None:
-    mine, compiled = figure_model(1.6, 60.0), figure_spec(1.6, 60.0).compile()
-    mine.opt.gravity[2] = 0.0
+def test_figure_model_returns_an_independent_copy_of_the_compiled_spec() -> None:
+    own, compiled = figure_model(1.6, 60.0), figure_spec(1.6, 60.0).compile()
+    own.opt.gravity[2] = 0.0
     np.testing.assert_array_equal(figure_model(1.6, 60.0).opt.gravity, compiled.opt.gravity)
     np.testing.assert_array_equal(figure_model(1.6, 60.0).body_mass, compiled.body_mass)

@@ -13,14 +13,14 @@ def _acceleration(theta, theta_dot):
     return np.linalg.solve(dynamics.mass_matrix(theta), -coriolis - dynamics.gravity_torques(theta))
 
 
-def _swing(theta, theta_dot, duration, **options):
+def _free_swing(theta, theta_dot, duration, **options):
     return solve_ivp(
         lambda _, state: np.r_[state[3:], _acceleration(state[:3], state[3:])],
         (0.0, duration), np.r_[theta, theta_dot], method="DOP853", rtol=1e-12, atol=1e-13, **options,
     )  # fmt: skip
 
 
-def test_mass_matrix_at_zero_is_the_published_one():
+def test_mass_matrix_at_zero_matches_published_values():
     assert np.diag(dynamics.mass_matrix(np.zeros(3))) == pytest.approx([3.573e-3, 2.426e-3, 0.932e-3], abs=5e-7)
 
 
@@ -34,7 +34,7 @@ def test_inertia_and_gravity_agree_with_the_compiled_linkage(linkage, configurat
         assert np.abs(linkage.closure.T @ data.qfrc_bias - gravity).max() < 1e-9 * np.abs(gravity).max()
 
 
-def test_velocity_torques_agree_with_the_compiled_linkage(linkage, configurations):
+def test_bias_torques_agree_with_the_compiled_linkage(linkage, configurations):
     rng = np.random.default_rng(1)
     for theta in configurations:
         theta_dot = rng.normal(scale=3.0, size=3)
@@ -48,7 +48,7 @@ def test_mass_matrix_is_positive_definite(configurations):
         assert np.linalg.eigvalsh(dynamics.mass_matrix(theta)).min() > 5e-4
 
 
-def test_rate_of_mass_minus_twice_coriolis_is_skew(configurations):
+def test_mass_rate_minus_twice_coriolis_is_skew_symmetric(configurations):
     rng = np.random.default_rng(2)
     step = 1e-5
     for theta in configurations[:200]:
@@ -59,9 +59,9 @@ def test_rate_of_mass_minus_twice_coriolis_is_skew(configurations):
         assert np.abs(skew + skew.T).max() < 1e-11
 
 
-def test_a_free_swing_keeps_the_energy_that_mujoco_measures(linkage):
+def test_free_swing_conserves_the_energy_computed_by_mujoco(linkage):
     linkage.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    solution = _swing([0.2, 0.3, 0.4], [2.0, -1.5, 1.0], 1.0, t_eval=np.linspace(0.0, 1.0, 101))
+    solution = _free_swing([0.2, 0.3, 0.4], [2.0, -1.5, 1.0], 1.0, t_eval=np.linspace(0.0, 1.0, 101))
     energy = []
     for state in solution.y.T:
         data = linkage.place(state[:3], state[3:])
@@ -75,7 +75,7 @@ def test_free_swing_of_the_linkage_converges_linearly_to_the_closed_form(linkage
     start, rate, duration = np.array([0.2, 0.3, 0.4]), np.array([2.0, -1.5, 1.0]), 0.5
     linkage.model.dof_damping[:] = 0.0
     linkage.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS | mujoco.mjtDisableBit.mjDSBL_LIMIT
-    expected = _swing(start, rate, duration).y[:3, -1]
+    expected = _free_swing(start, rate, duration).y[:3, -1]
     errors = []
     for step in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
         linkage.model.opt.timestep = step
@@ -90,13 +90,13 @@ def test_free_swing_of_the_linkage_converges_linearly_to_the_closed_form(linkage
     assert errors[-1] < 2e-3
 
 
-def test_apparent_mass_at_the_tip_is_what_the_data_sheet_says():
+def test_apparent_mass_at_the_tip_matches_the_data_sheet():
     across, up, _ = np.diag(dynamics.mass_matrix(np.zeros(3))) / PREMIUM_1_5.l1**2
     assert 0.04 < up < across < 0.08  # "inertia at tip < 75 g"
 
 
 @pytest.mark.parametrize("name", ["mass_matrix", "coriolis_matrix", "gravity_torques"])
-def test_kernels_evaluate_symbolically_to_the_same_dynamics(name, configurations):
+def test_symbolic_dynamics_match_the_compiled_kernels(name, configurations):
     casadi.GlobalOptions.setNumpyMode(1)
     theta, theta_dot = casadi.SX.sym("theta", 3), casadi.SX.sym("theta_dot", 3)
     kernel = getattr(dynamics, name)

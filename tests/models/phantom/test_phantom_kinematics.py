@@ -22,7 +22,7 @@ def test_position_and_jacobian_agree_with_the_compiled_linkage(linkage, configur
         assert np.abs(jacobian @ linkage.closure - closed).max() < 1e-9 * np.abs(closed).max()
 
 
-def test_jacobian_is_the_finite_difference_of_the_position(configurations):
+def test_jacobian_matches_finite_differences_of_the_position(configurations):
     step = 1e-6
     for theta in configurations[:200]:
         columns = [
@@ -35,51 +35,51 @@ def test_jacobian_is_the_finite_difference_of_the_position(configurations):
         assert np.allclose(np.transpose(columns), kinematics.jacobian(theta), atol=1e-9)
 
 
-def test_inverse_kinematics_undoes_forward_kinematics_everywhere_within_the_limits(configurations):
-    behind = 0
+def test_inverse_kinematics_inverts_forward_kinematics_within_the_joint_limits(configurations):
+    n_overhead = 0
     for theta in configurations:
         p_P = kinematics.forward_kinematics(theta)
         *found, reachable = kinematics.inverse_kinematics(np.array(p_P))
-        behind += p_P[2] < -PREMIUM_1_5.l1
+        n_overhead += p_P[2] < -PREMIUM_1_5.l1
         assert reachable
         assert np.abs(found - theta).max() < 1e-9
-    assert behind > 10, "the overhead branch was never sampled"
+    assert n_overhead > 10, "the overhead branch was never sampled"
 
 
 @pytest.mark.parametrize("p_P", [(1.0, 2.0, 3.0), (0.0, 0.17, -0.215), (0.0, 0.17, -0.2), (0.0, -5.0, 0.0)])
-def test_points_out_of_reach_are_marked_and_give_finite_angles(p_P):
+def test_unreachable_points_are_flagged_and_give_finite_angles(p_P):
     *theta, reachable = kinematics.inverse_kinematics(np.array(p_P))
     assert not reachable
     assert np.isfinite(theta).all()
     assert not kinematics.inside_workspace(np.array(p_P))
 
 
-def test_a_point_that_is_not_a_number_is_outside():
+def test_nan_point_is_outside_the_workspace():
     assert not kinematics.inside_workspace(np.array([np.nan, 0.0, 0.0]))
 
 
-def test_workspace_is_the_image_of_the_limits(configurations):
+def test_workspace_is_the_image_of_the_joint_limits(configurations):
     low, high = np.array(PREMIUM_1_5.limit).T
     for theta in configurations[:300]:
         assert kinematics.inside_workspace(np.array(kinematics.forward_kinematics(theta)))
-    beyond = 0
+    n_beyond = 0
     # θ3 − θ2 stays within a right angle, where the inverse is unique: a θ beyond a stop is no other θ's image.
     for theta in np.random.default_rng(2).uniform(low - 0.3, high + 0.3, (3000, 3)):
         p_P = np.array(kinematics.forward_kinematics(theta))
         *found, _ = kinematics.inverse_kinematics(p_P)
         if np.abs(found - theta).max() < 1e-9 and not kinematics.within_limits(theta):
-            beyond += 1
+            n_beyond += 1
             assert not kinematics.inside_workspace(p_P)
-    assert beyond > 100
+    assert n_beyond > 100
 
 
-def test_every_stop_bounds_the_workspace():
+def test_angles_beyond_any_joint_stop_are_outside_the_limits():
     for stop in ((1.6, 0, 0), (0, -1.2, 0.1), (0, 1.2, 0), (0, -0.52, -0.52)):
         assert not kinematics.within_limits(np.array(stop, dtype=float))
     assert kinematics.within_limits(np.array([1.5, -0.4, -0.5]))
 
 
-def test_joint_torques_do_the_work_of_the_tip_force(configurations):
+def test_joint_torques_have_the_power_of_the_tip_force(configurations):
     rng = np.random.default_rng(3)
     for theta in configurations[:100]:
         force, rate = rng.normal(size=3), rng.normal(size=3)
@@ -98,7 +98,7 @@ def test_stylus_orientation_agrees_with_the_compiled_gimbal(linkage, configurati
         assert np.allclose(R_HS, R_HP @ data.site("tip").xmat.reshape(3, 3), atol=1e-12)
 
 
-def test_gimbal_angles_undo_the_stylus_orientation(configurations):
+def test_gimbal_angles_invert_the_stylus_orientation(configurations):
     rng = np.random.default_rng(5)
     for theta in configurations[:200]:
         gimbal = rng.uniform([-2.5, -1.5, -2.9], [2.5, 1.5, 2.9])
@@ -106,7 +106,7 @@ def test_gimbal_angles_undo_the_stylus_orientation(configurations):
         assert np.allclose(kinematics.gimbal_angles(theta, q_HS), gimbal, atol=1e-9)
 
 
-def test_each_joint_turns_the_stylus_about_its_axis(configurations):
+def test_stylus_axes_match_finite_differences_of_the_orientation(configurations):
     rng, step = np.random.default_rng(7), 1e-6
     for theta in configurations[:100]:
         joints = np.concatenate([theta, rng.uniform(*np.array(PREMIUM_1_5.gimbal_limit).T)])
@@ -129,7 +129,7 @@ def test_hand_frame_is_upright_with_x_away_from_the_user():
     assert np.allclose(kinematics.vector_to_hand_frame(np.array([0.0, 0.0, 1.0])), [-1, 0, 0])
 
 
-def test_encoders_round_to_counts_of_three_hundredths_of_a_millimetre_at_the_tip():
+def test_encoder_readings_are_rounded_to_counts_of_0_03_mm_at_the_tip():
     step = np.array(PREMIUM_1_5.encoder_step)
     theta = np.random.default_rng(6).uniform(-1.0, 1.0, (200, 3))
     for angles in theta:
@@ -148,7 +148,7 @@ def theta_sx():
 
 
 @pytest.mark.parametrize("name", ["forward_kinematics", "jacobian", "inverse_kinematics", "encoder_reading"])
-def test_kernels_evaluate_symbolically_to_the_same_numbers(name, theta_sx, configurations):
+def test_symbolic_kinematics_match_the_compiled_kernels(name, theta_sx, configurations):
     kernel = getattr(kinematics, name)
     function = casadi.Function(name, [theta_sx], [casadi.vertcat(*_flat(kernel.py_func(theta_sx)))])
     for theta in configurations[:50]:
@@ -156,7 +156,7 @@ def test_kernels_evaluate_symbolically_to_the_same_numbers(name, theta_sx, confi
         assert np.allclose(np.array(function(values)).ravel(), np.ravel(kernel(values)), atol=1e-12)
 
 
-def test_jacobian_is_the_symbolic_derivative_of_the_same_source(theta_sx, configurations):
+def test_jacobian_matches_the_symbolic_derivative_of_the_position(theta_sx, configurations):
     position = casadi.vertcat(*_flat(kinematics.forward_kinematics.py_func(theta_sx)))
     derivative = casadi.Function("J", [theta_sx], [casadi.jacobian(position, theta_sx)])
     for theta in configurations[:50]:

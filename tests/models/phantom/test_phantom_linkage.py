@@ -10,11 +10,11 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, MOTORS, phantom_spec
 
 
-def _gap(data):
+def _loop_gap(data):
     return np.linalg.norm(data.site("a_at_c").xpos - data.site("c_at_a").xpos)
 
 
-def test_motors_give_their_continuous_and_peak_force_at_the_tip(linkage):
+def test_motor_torques_give_the_specified_continuous_and_peak_tip_force(linkage):
     assert np.array(PREMIUM_1_5.continuous_torque)[1] / PREMIUM_1_5.l1 == pytest.approx(1.5, abs=0.02)
     assert np.array(PREMIUM_1_5.peak_torque)[2] / PREMIUM_1_5.l2 == pytest.approx(8.5, abs=0.02)
     for motor, joint, peak in zip(MOTORS, MOTOR_JOINTS, PREMIUM_1_5.peak_torque, strict=True):
@@ -23,7 +23,7 @@ def test_motors_give_their_continuous_and_peak_force_at_the_tip(linkage):
         assert actuator.ctrlrange == pytest.approx([-peak, peak])
 
 
-def test_every_bar_is_a_possible_rigid_body(linkage):
+def test_bar_inertias_satisfy_the_triangle_inequality(linkage):
     for name in ("turret", "be", "df", "a", "c"):
         xx, yy, zz = linkage.model.body(name).inertia
         assert xx <= yy + zz
@@ -31,23 +31,23 @@ def test_every_bar_is_a_possible_rigid_body(linkage):
         assert zz <= xx + yy
 
 
-def test_nothing_of_the_device_collides(linkage):
+def test_device_geoms_have_no_collisions(linkage):
     assert not linkage.model.geom_contype.any()
     assert not linkage.model.geom_conaffinity.any()
 
 
 def test_parallelogram_closes_in_every_configuration(linkage, configurations):
     for theta in configurations[:200]:
-        assert _gap(linkage.place(theta)) < 1e-12
+        assert _loop_gap(linkage.place(theta)) < 1e-12
 
 
 @pytest.mark.parametrize("step", [1e-3, *(pytest.param(step, marks=pytest.mark.slow) for step in (5e-4, 2.5e-4))])
-def test_loop_stays_closed_within_a_micrometre_over_a_minute_of_driven_motion_with_8_newton(linkage, step):
+def test_loop_gap_stays_below_1_um_in_a_minute_of_driven_motion_under_8_n(linkage, step):
     model, data = linkage.model, linkage.data
     model.opt.timestep = step
     stylus = model.body("stylus").id
     target = np.empty(3)
-    widest, path = 0.0, []
+    largest_gap, path = 0.0, []
     for tick in range(round(60.0 / step)):
         t = tick * step
         target[:] = 0.6 * np.sin(4.4 * t), 0.4 + 0.5 * np.sin(5.7 * t + 1), 0.5 + 0.5 * np.sin(6.9 * t)
@@ -56,15 +56,15 @@ def test_loop_stays_closed_within_a_micrometre_over_a_minute_of_driven_motion_wi
         sine = np.sin(angle)
         data.xfrc_applied[stylus, :3] = 8.0 * sine * np.cos(azimuth), 8.0 * np.cos(angle), 8.0 * sine * np.sin(azimuth)
         mujoco.mj_step(model, data)
-        widest = max(widest, _gap(data))
+        largest_gap = max(largest_gap, _loop_gap(data))
         if tick % 100 == 0:
             path.append(data.site("tip").xpos.copy())
     assert (np.ptp(path, axis=0) > 0.15).all(), "it is driven"
-    assert widest < 1e-6
+    assert largest_gap < 1e-6
     assert not data.warning.number.any()
 
 
-def test_tip_follows_the_closed_form_under_load(linkage):
+def test_tip_position_matches_closed_form_kinematics_under_load(linkage):
     linkage.model.opt.timestep = 5e-4
     linkage.data.ctrl[:] = 0.05, 0.08, -0.03
     for _ in range(400):
@@ -75,7 +75,7 @@ def test_tip_follows_the_closed_form_under_load(linkage):
 
 
 @pytest.mark.parametrize("direction", np.eye(3))
-def test_backdrive_friction_holds_three_hundredths_of_a_newton_and_yields_to_six(linkage, direction):
+def test_backdrive_friction_holds_0_03_n_and_yields_to_0_06_n(linkage, direction):
     moved = []
     for force in (0.03, 0.06):
         mujoco.mj_resetData(linkage.model, linkage.data)
@@ -90,7 +90,7 @@ def test_backdrive_friction_holds_three_hundredths_of_a_newton_and_yields_to_six
 
 @pytest.mark.parametrize("motor", range(3))
 @pytest.mark.parametrize("side", [-1, 1])
-def test_stops_hold_the_continuous_torque(linkage, motor, side):
+def test_joint_stops_hold_the_continuous_torque(linkage, motor, side):
     linkage.model.opt.timestep = 5e-4
     linkage.data.ctrl[motor] = side * PREMIUM_1_5.continuous_torque[motor]
     for _ in range(2000):
@@ -104,7 +104,7 @@ def test_stops_hold_the_continuous_torque(linkage, motor, side):
     assert elbow_low - slack < theta[2] - theta[1] < elbow_high + slack
 
 
-def test_attached_upright_in_a_world_gravity_is_the_closed_form_s():
+def test_gravity_torques_match_the_closed_form_when_attached_upright_in_a_world():
     world = mujoco.MjSpec()
     q_WP = np.empty(4)
     mujoco.mju_mat2Quat(q_WP, np.array(R_HP).ravel())
@@ -119,14 +119,14 @@ def test_attached_upright_in_a_world_gravity_is_the_closed_form_s():
         0.3,
     )
     mujoco.mj_forward(model, data)
-    held = [data.joint(f"phantom/{name}").qfrc_bias[0] for name in ("theta1", "theta2", "elbow", "theta3", "twin")]
-    gravity = (held[0], held[1] - held[2] + held[4], held[3] + held[2] - held[4])
+    bias = [data.joint(f"phantom/{name}").qfrc_bias[0] for name in ("theta1", "theta2", "elbow", "theta3", "twin")]
+    gravity = (bias[0], bias[1] - bias[2] + bias[4], bias[3] + bias[2] - bias[4])
     assert gravity == pytest.approx(gravity_torques(np.array([0.0, 0.3, 0.0])), abs=1e-12)
     assert model.joint("phantom/theta1").range == pytest.approx(PREMIUM_1_5.limit[0])
     assert data.site("phantom/tip").xmat.reshape(3, 3) == pytest.approx(np.eye(3))
 
 
-def test_a_second_of_noise_on_every_joint_raises_no_warning(linkage):
+def test_one_second_of_noise_on_every_joint_gives_no_mujoco_warning(linkage):
     rng = np.random.default_rng(1)
     linkage.model.opt.timestep = 1e-3
     dofs = [linkage.model.joint(name).dofadr[0] for name in GIMBAL_JOINTS]

@@ -1,4 +1,4 @@
-"""The one world: what is in it, and that it holds still under anything."""
+"""The world model: its parts, frames, collisions and rates."""
 
 import mujoco
 import numpy as np
@@ -27,22 +27,22 @@ def test_phantom_and_figure_are_in_one_model(model: mujoco.MjModel) -> None:
         assert model.joint(PHANTOM + name).type[0] == mujoco.mjtJoint.mjJNT_HINGE
 
 
-def test_the_hand_frame_is_at_the_tip_of_the_zero_configuration(model: mujoco.MjModel) -> None:
+def test_hand_frame_origin_is_the_tip_in_the_zero_configuration(model: mujoco.MjModel) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.site(PHANTOM + "tip").xpos, P_WH, atol=1e-9)
     np.testing.assert_allclose(data.body(PHANTOM + "base").xmat.reshape(3, 3), R_WP, atol=1e-12)
 
 
-def test_the_hand_frame_has_the_world_s_axes() -> None:
-    """Scene and kinematics say the same of the device frame, and both are rotations."""
+def test_scene_and_kinematics_agree_on_the_rotation_of_the_device_frame() -> None:
+    """R_WP of the scene equals R_HP of the kinematics, since the hand frame has the axes of the world."""
     np.testing.assert_array_equal(R_WP, np.array(R_HP))
     np.testing.assert_allclose(R_WP @ R_WP.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(R_WP) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_second_under_bounded_noise_gives_no_warning(model: mujoco.MjModel, seed: int) -> None:
+def test_one_second_of_bounded_noise_gives_no_mujoco_warning(model: mujoco.MjModel, seed: int) -> None:
     data = mujoco.MjData(model)
     root = int(model.joint(FIGURE + "root").qposadr[0])
     data.qpos[root : root + N_POSE] = rest_pose()
@@ -56,8 +56,8 @@ def test_a_second_under_bounded_noise_gives_no_warning(model: mujoco.MjModel, se
     assert np.isfinite(data.qpos).all()
 
 
-def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
-    """Only the figure meets the floor: device and table are for looking at."""
+def test_every_enabled_collision_pair_involves_the_floor(model: mujoco.MjModel) -> None:
+    """Only the figure collides, with the floor; device and table are visual."""
     floor = model.geom("floor").id
     pairs = [
         (a, b)
@@ -70,7 +70,7 @@ def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
 
 
 @pytest.mark.parametrize(
-    ("period", "step", "told"),
+    ("period", "step", "message"),
     [
         (1e-3, 3e-4, "does not divide"),
         (1e-3, 2e-3, "expected 0 < physics_step"),
@@ -81,10 +81,10 @@ def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
         (float("nan"), 1e-3, "expected 0 < physics_step"),
     ],
 )
-def test_rates_that_do_not_fit_are_refused(period: float, step: float, told: str) -> None:
-    with pytest.raises(ModelError, match=told):
+def test_incompatible_servo_period_and_physics_step_are_refused(period: float, step: float, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
         SceneConfig(servo_period=period, physics_step=step).substeps()
 
 
-def test_a_rate_that_divides_but_for_rounding_is_taken() -> None:
+def test_physics_step_that_divides_up_to_rounding_is_accepted() -> None:
     assert SceneConfig(servo_period=1e-3, physics_step=1e-3 / 3).substeps() == 3

@@ -1,4 +1,4 @@
-"""What a clip does, measured from its frames through MuJoCo alone: feet, centre of mass, momentum, floor forces."""
+"""Measures of a clip by MuJoCo kinematics alone: feet, centre of mass, momentum, floor forces, joint limits."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -12,13 +12,13 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
 
 G = 9.81
-TOUCH = 0.003  # a sphere this near the floor [m] may push
+TOUCH = 0.003  # largest height of a contact sphere that may push [m]
 FRICTION = 0.9
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Frame by frame: lowest points of the spheres (n, 8, 3), c, L about it, places of bodies, who touches (n, 8)."""
+    """Per frame: lowest sphere points (n, 8, 3), centre of mass, momentum about it, body positions, contacts (n, 8)."""
 
     fps: float
     mass: float
@@ -52,43 +52,43 @@ def measured(name: str) -> Measures:
 
 
 def acceleration(m: Measures) -> np.ndarray:
-    """Of the centre of mass at frames 1 … n−2, shape (n − 2, 3)."""
+    """Acceleration of the centre of mass at frames 1 … n−2, shape (n − 2, 3)."""
     return (m.com[2:] - 2 * m.com[1:-1] + m.com[:-2]) * m.fps**2
 
 
-def slide(m: Measures) -> float:
-    """Largest way over the floor of a sphere while it touches, from where it came down [m]."""
+def largest_slide(m: Measures) -> float:
+    """Largest horizontal distance of a touching sphere from where it landed [m]."""
     worst = 0.0
     for sphere in range(8):
-        place = None
+        landing = None
         for k, touches in enumerate(m.touching[:, sphere]):
             if not touches:
-                place = None
-            elif place is None:
-                place = m.soles[k, sphere, :2]
+                landing = None
+            elif landing is None:
+                landing = m.soles[k, sphere, :2]
             else:
-                worst = max(worst, float(np.linalg.norm(m.soles[k, sphere, :2] - place)))
+                worst = max(worst, float(np.linalg.norm(m.soles[k, sphere, :2] - landing)))
     return worst
 
 
 def residuals(m: Measures) -> tuple[np.ndarray, np.ndarray]:
-    """What touching spheres cannot give at frames 2 … n−3: force per weight, moment per weight × metre."""
+    """Residual that touching spheres cannot provide at frames 2 … n−3: force per weight, moment per weight × metre."""
     force = m.mass * (acceleration(m) + np.array([0, 0, G]))[1:-1]
     moment = (m.momentum[3:-1] - m.momentum[1:-3]) * m.fps / 2
     directions = np.array([(FRICTION * np.cos(t), FRICTION * np.sin(t), 1) for t in np.arange(8) * np.pi / 4])
-    left = np.empty((len(force), 2))
+    remainders = np.empty((len(force), 2))
     for k in range(len(force)):
         arms = m.soles[k + 2, m.touching[k + 2]] - m.com[k + 2]
         wrench = np.concatenate([force[k], 2 * moment[k]])
         columns = [np.concatenate([d, 2 * np.cross(arm, d)]) for arm in arms for d in directions]
-        rest = wrench
+        remainder = wrench
         if columns:
             a = np.array(columns).T
             stacked = np.concatenate([a, 0.01 * np.eye(a.shape[1])])
-            rest = wrench - a @ nnls(stacked, np.concatenate([wrench, np.zeros(a.shape[1])]))[0]
-        left[k] = np.linalg.norm(rest[:3]), np.linalg.norm(rest[3:]) / 2
-    left /= m.mass * G
-    return left[:, 0], left[:, 1]
+            remainder = wrench - a @ nnls(stacked, np.concatenate([wrench, np.zeros(a.shape[1])]))[0]
+        remainders[k] = np.linalg.norm(remainder[:3]), np.linalg.norm(remainder[3:]) / 2
+    remainders /= m.mass * G
+    return remainders[:, 0], remainders[:, 1]
 
 
 def rms(x: np.ndarray) -> float:
@@ -106,30 +106,34 @@ def limit_excess(clip: Clip) -> float:
     return float(np.maximum(vectors - limits[..., 1], limits[..., 0] - vectors).max())
 
 
-def steps(clip: Clip, order: int) -> np.ndarray:
-    """Differences of the given order of every tangent component, per second to that order."""
+def tangent_derivative(clip: Clip, order: int) -> np.ndarray:
+    """Finite-difference time derivative of the given order of the pose, shape (n − order, 57)."""
     velocity = pose_difference(clip.poses[:-1], clip.poses[1:]) * clip.fps
     return np.diff(velocity, n=order - 1, axis=0) * clip.fps ** (order - 1)
 
 
-def overlap(clip: Clip) -> float:
-    """Deepest that arms, legs and trunk run into one another, at every fourth frame [m]."""
+def limb_penetration(clip: Clip) -> float:
+    """Deepest penetration between arms, legs and trunk, at every fourth frame [m]."""
     model = figure_model()
     data = mujoco.MjData(model)
-    drawn: dict[str, list[int]] = {}
+    visible_geoms: dict[str, list[int]] = {}
     for geom in np.flatnonzero(model.geom_group != 3):
-        drawn.setdefault(model.body(model.geom_bodyid[geom]).name, []).append(int(geom))
-    ends = [f"{side}_{part}" for side in ("left", "right") for part in ("forearm", "hand", "shank", "foot")]
+        visible_geoms.setdefault(model.body(model.geom_bodyid[geom]).name, []).append(int(geom))
+    limbs = [f"{side}_{part}" for side in ("left", "right") for part in ("forearm", "hand", "shank", "foot")]
     core = ["pelvis", "abdomen", "chest", "head", "left_thigh", "right_thigh"]
-    joined = [("left_shank", "left_thigh"), ("right_shank", "right_thigh")]
-    pairs = [(a, b) for a in ends for b in core if (a, b) not in joined]
-    pairs += [(a, b) for a in ends[:4] for b in ends[4:]] + [("left_thigh", "right_thigh")]
+    adjacent = [("left_shank", "left_thigh"), ("right_shank", "right_thigh")]
+    pairs = [(a, b) for a in limbs for b in core if (a, b) not in adjacent]
+    pairs += [(a, b) for a in limbs[:4] for b in limbs[4:]] + [("left_thigh", "right_thigh")]
     deepest = 0.0
     for pose in clip.poses[::4]:
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         for a, b in pairs:
             if np.linalg.norm(data.body(a).xpos - data.body(b).xpos) < 0.5:
-                near = (mujoco.mj_geomDistance(model, data, i, j, 0.05, None) for i in drawn[a] for j in drawn[b])
-                deepest = max(deepest, -min(near))
+                distances = (
+                    mujoco.mj_geomDistance(model, data, i, j, 0.05, None)
+                    for i in visible_geoms[a]
+                    for j in visible_geoms[b]
+                )
+                deepest = max(deepest, -min(distances))
     return deepest

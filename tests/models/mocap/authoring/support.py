@@ -1,4 +1,4 @@
-"""Where the zero-moment point of a motion lies."""
+"""Position of the zero-moment point of a motion relative to its support."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from models.mocap.authoring.balance import Dynamics
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 
 
-def outside_support(motion: Dynamics) -> Array:
-    """How far the zero-moment point lies outside the support [m], shape (n,)."""
+def distance_outside_support(motion: Dynamics) -> Array:
+    """Distance of the zero-moment point from the support polygon [m], 0 inside, shape (n,)."""
     nearest = nearest_supported(motion.zmp, motion.contacts[..., :2], motion.touching, 1.0)
     return np.linalg.norm(motion.zmp - nearest, axis=1)

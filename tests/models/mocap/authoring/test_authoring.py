@@ -1,4 +1,4 @@
-"""The authoring engine: anatomical words mean what they say, planted feet stay, motion is C² and laps close."""
+"""The authoring engine: anatomical angles, leg inverse kinematics, planted feet, C² motion and closed laps."""
 
 from dataclasses import replace
 
@@ -26,27 +26,27 @@ def standing(**changes):
     return replace(still, **changes)
 
 
-def keyed(**channels):
-    """Standing still but for some channels."""
+def standing_with_keys(**channels):
+    """A standing choreography whose first key has some channels changed."""
     still = standing()
     return replace(still, keys=[replace(still.keys[0], **channels)])
 
 
-def figure(pose):
+def placed_figure(pose):
     data = mujoco.MjData(MODEL)
     data.qpos = pose
     mujoco.mj_kinematics(MODEL, data)
     return data
 
 
-def along(data, start, end):
+def direction_between(data, start, end):
     """Direction from one body's origin to another's."""
     line = data.body(end).xpos - data.body(start).xpos
     return line / np.linalg.norm(line)
 
 
-def arm_figure(arm, side):
-    return figure(poses_at(keyed(**{f"{side}_arm": arm}), np.zeros(1))[0])
+def figure_with_arm(arm, side):
+    return placed_figure(poses_at(standing_with_keys(**{f"{side}_arm": arm}), np.zeros(1))[0])
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -61,48 +61,54 @@ def arm_figure(arm, side):
         (Arm(raised=45, plane=180, elbow=0), (-np.sqrt(0.5), 0, -np.sqrt(0.5))),
     ],
 )
-def test_the_upper_arm_points_where_it_is_raised_to(side, arm, direction):
+def test_upper_arm_points_along_the_given_elevation_and_plane(side, arm, direction):
     outwards = 1 if side == "left" else -1
-    upper = along(arm_figure(arm, side), f"{side}_upper_arm", f"{side}_forearm")
+    upper = direction_between(figure_with_arm(arm, side), f"{side}_upper_arm", f"{side}_forearm")
     np.testing.assert_allclose(upper, direction * np.array([1, outwards, 1]), atol=1e-9)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_bending_the_elbow_of_a_hanging_arm_brings_the_hand_forwards_and_pronation_turns_the_palm_down(side):
-    data = arm_figure(replace(HANGING, elbow=90), side)
-    np.testing.assert_allclose(along(data, f"{side}_forearm", f"{side}_hand"), FORWARD, atol=1e-9)
+def test_elbow_flexion_moves_the_hand_forwards_and_pronation_turns_the_palm_down(side):
+    data = figure_with_arm(replace(HANGING, elbow=90), side)
+    np.testing.assert_allclose(direction_between(data, f"{side}_forearm", f"{side}_hand"), FORWARD, atol=1e-9)
     inwards = -LEFT if side == "left" else LEFT
     palm = -UP  # palms face down in the T-pose
     np.testing.assert_allclose(data.body(f"{side}_hand").xmat.reshape(3, 3) @ palm, inwards, atol=1e-9)
-    data = arm_figure(replace(HANGING, elbow=90, pronation=90), side)
+    data = figure_with_arm(replace(HANGING, elbow=90, pronation=90), side)
     np.testing.assert_allclose(data.body(f"{side}_hand").xmat.reshape(3, 3) @ palm, -UP, atol=1e-9)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_turning_the_arm_inwards_brings_the_bent_forearm_across_the_body_and_the_wrist_bends_to_the_palm(side):
+def test_inward_arm_turn_crosses_the_forearm_and_wrist_flexion_bends_to_the_palm(side):
     inwards = -LEFT if side == "left" else LEFT
-    data = arm_figure(replace(HANGING, elbow=90, turn=90), side)
-    np.testing.assert_allclose(along(data, f"{side}_forearm", f"{side}_hand"), inwards, atol=1e-9)
-    hand = figure_hand(arm_figure(replace(HANGING, wrist=90), side), side)
+    data = figure_with_arm(replace(HANGING, elbow=90, turn=90), side)
+    np.testing.assert_allclose(direction_between(data, f"{side}_forearm", f"{side}_hand"), inwards, atol=1e-9)
+    hand = finger_direction(figure_with_arm(replace(HANGING, wrist=90), side), side)
     np.testing.assert_allclose(hand, inwards, atol=1e-9)
 
 
-def figure_hand(data, side):
+def finger_direction(data, side):
     """Direction of the fingers."""
     return data.body(f"{side}_hand").xmat.reshape(3, 3) @ (LEFT if side == "left" else -LEFT)
 
 
-def test_trunk_pelvis_and_head_turn_the_way_their_words_say():
-    data = figure(poses_at(keyed(trunk=(30, 0, 0)), np.zeros(1))[0])
+def test_trunk_pelvis_and_head_keys_rotate_about_their_named_axes():
+    data = placed_figure(poses_at(standing_with_keys(trunk=(30, 0, 0)), np.zeros(1))[0])
     chest = data.body("chest").xmat.reshape(3, 3)
     np.testing.assert_allclose(chest @ UP, [0.5, 0, np.sqrt(0.75)], atol=1e-9)
     # The head is keyed against the pelvis: the gaze stays level when the trunk bends.
     np.testing.assert_allclose(data.body("head").xmat.reshape(3, 3), np.eye(3), atol=1e-9)
-    chest = figure(poses_at(keyed(trunk=(0, 30, 0)), np.zeros(1))[0]).body("chest").xmat.reshape(3, 3)
+    chest = (
+        placed_figure(poses_at(standing_with_keys(trunk=(0, 30, 0)), np.zeros(1))[0]).body("chest").xmat.reshape(3, 3)
+    )
     np.testing.assert_allclose(chest @ UP, [0, 0.5, np.sqrt(0.75)], atol=1e-9)
-    head = figure(poses_at(keyed(head=(0, 0, 30)), np.zeros(1))[0]).body("head").xmat.reshape(3, 3)
+    head = placed_figure(poses_at(standing_with_keys(head=(0, 0, 30)), np.zeros(1))[0]).body("head").xmat.reshape(3, 3)
     np.testing.assert_allclose(head @ FORWARD, [np.sqrt(0.75), 0.5, 0], atol=1e-9)
-    pelvis = figure(poses_at(keyed(yaw=90, lean=10, tilt=0), np.zeros(1))[0]).body("pelvis").xmat.reshape(3, 3)
+    pelvis = (
+        placed_figure(poses_at(standing_with_keys(yaw=90, lean=10, tilt=0), np.zeros(1))[0])
+        .body("pelvis")
+        .xmat.reshape(3, 3)
+    )
     np.testing.assert_allclose(pelvis @ UP, [0, np.sin(np.deg2rad(10)), np.cos(np.deg2rad(10))], atol=1e-9)
 
 
@@ -115,9 +121,7 @@ def test_trunk_pelvis_and_head_turn_the_way_their_words_say():
     turns=st.tuples(*[st.floats(-0.6, 0.6)] * 6),
     knee=st.floats(-0.4, 0.6),
 )
-def test_a_solved_leg_puts_the_foot_exactly_where_it_is_asked_with_a_knee_that_only_bends(
-    side, reach, forwards, outwards, turns, knee
-):
+def test_leg_ik_reaches_the_foot_pose_with_pure_knee_flexion(side, reach, forwards, outwards, turns, knee):
     pelvis, foot = Rotation.from_euler("ZYX", [turns[:3]]), Rotation.from_euler("ZYX", [turns[3:]])
     root = np.array([[0.3, -0.2, 0.9]])
     sign = 1 if side == "left" else -1
@@ -130,7 +134,7 @@ def test_a_solved_leg_puts_the_foot_exactly_where_it_is_asked_with_a_knee_that_o
     for joint, rotation in zip(("hip", "knee", "ankle"), leg, strict=True):
         k = 7 + 4 * JOINTS.index(f"{side}_{joint}")
         pose[k : k + 4] = rotation.as_quat(scalar_first=True)[0]
-    body = figure(pose).body(f"{side}_foot")
+    body = placed_figure(pose).body(f"{side}_foot")
     np.testing.assert_allclose(body.xpos, ankle[0], atol=1e-9)
     np.testing.assert_allclose(body.xmat.reshape(3, 3), foot.as_matrix()[0], atol=1e-9)
     bend = leg[1].as_rotvec()[0]
@@ -138,7 +142,7 @@ def test_a_solved_leg_puts_the_foot_exactly_where_it_is_asked_with_a_knee_that_o
     assert abs(bend[0]) + abs(bend[2]) < 1e-12
 
 
-def test_a_leg_asked_beyond_its_reach_straightens_smoothly_and_never_overextends():
+def test_leg_ik_beyond_reach_straightens_smoothly_without_overextension():
     changes = []
     for n in (1001, 2001):
         root, still = np.zeros((n, 3)), Rotation.identity(n)
@@ -159,11 +163,11 @@ def stepping():
     return replace(still, keys=keys, left_foot=left, right_foot=right)
 
 
-def test_a_planted_foot_does_not_move_and_its_heel_rises_about_the_toes():
+def test_planted_toes_do_not_move_while_the_heel_rises_about_them():
     t = np.linspace(0.0, 0.6, 61)
     toes, heels = [], []
     for pose in poses_at(stepping(), t):
-        data = figure(pose)
+        data = placed_figure(pose)
         toes.append([data.geom(name).xpos.copy() for name in ("left_toe_in", "left_toe_out")])
         heels.append(data.geom("left_heel_in").xpos[2])
     assert np.ptp(np.array(toes), axis=0).max() < 1e-9
@@ -172,13 +176,15 @@ def test_a_planted_foot_does_not_move_and_its_heel_rises_about_the_toes():
     assert heels[-1] > 0.1
 
 
-def test_a_swing_that_says_nothing_else_clears_the_floor_and_lands_as_asked():
-    heights = [figure(pose).geom("right_toe_in").xpos[2] for pose in poses_at(stepping(), np.linspace(0.0, 0.3, 31))]
+def test_default_swing_clears_the_floor_without_penetrating_it():
+    heights = [
+        placed_figure(pose).geom("right_toe_in").xpos[2] for pose in poses_at(stepping(), np.linspace(0.0, 0.3, 31))
+    ]
     assert max(heights) > CONTACT_RADIUS + 0.05
     assert min(heights) >= CONTACT_RADIUS - 1e-9
 
 
-def test_a_lap_closes_on_itself_moved_on_with_its_velocity_and_acceleration():
+def test_lap_closes_with_its_displacement():
     clip = Clip(poses_at(stepping(), np.arange(73) / 60), 60.0, "stepping")
     assert clip.closes(1e-9)
     np.testing.assert_allclose([clip.displacement.x, clip.displacement.y], [0.4, 0.0], atol=1e-12)
@@ -195,7 +201,7 @@ def test_accelerations_are_continuous(motion):
     assert changes[1] < 0.65 * changes[0]
 
 
-def test_an_open_motion_starts_and_ends_at_rest():
+def test_open_motion_starts_and_ends_at_rest():
     motion = replace(standing(lap=None), keys=[*standing().keys, Key(1.0, height=0.8, trunk=(20, 0, 0))])
     poses = poses_at(motion, np.array([-1.0, 0.0, 0.01, 0.99, 1.0, 5.0]))
     np.testing.assert_array_equal(poses[0], poses[1])
@@ -208,15 +214,15 @@ def test_an_open_motion_starts_and_ends_at_rest():
 def test_sway_moves_the_pelvis_but_not_the_feet():
     poses = poses_at(standing(), np.zeros(1)), poses_at(standing(), np.zeros(1), np.array([[0.03, -0.05]]))
     np.testing.assert_allclose(poses[1][0, :2] - poses[0][0, :2], [0.03, -0.05])
-    before, after = (figure(p[0]).body("left_foot").xpos.copy() for p in poses)
+    before, after = (placed_figure(p[0]).body("left_foot").xpos.copy() for p in poses)
     np.testing.assert_allclose(before, after, atol=1e-9)
 
 
-def test_a_foot_in_the_air_has_its_ankle_where_it_is_aimed():
+def test_airborne_step_places_the_ankle_at_its_target():
     step = Step.in_air(1.0, (0.5, 0.1, 0.6), yaw=20, pitch=-50)
     motion = standing(left_foot=[Step(0.0, 0.0, 0.1), step])
     np.testing.assert_allclose(
-        figure(poses_at(motion, np.ones(1))[0]).body("left_foot").xpos, [0.5, 0.1, 0.6], atol=1e-9
+        placed_figure(poses_at(motion, np.ones(1))[0]).body("left_foot").xpos, [0.5, 0.1, 0.6], atol=1e-9
     )
 
 
@@ -230,6 +236,6 @@ def test_a_foot_in_the_air_has_its_ankle_where_it_is_aimed():
         (standing(right_foot=[Step(0.0, 0.0, -0.1, rest=False)]), "no step of the right foot rests"),
     ],
 )
-def test_a_choreography_that_cannot_be_played_says_why(broken, message):
+def test_invalid_choreography_is_refused_with_the_reason(broken, message):
     with pytest.raises(ModelError, match=message):
         poses_at(broken, np.zeros(1))

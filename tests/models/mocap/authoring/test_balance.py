@@ -1,4 +1,4 @@
-"""Balance: the zero-moment point against inverse dynamics, the sway that finds it."""
+"""Balance: the zero-moment point against inverse dynamics, and the sway that moves it into the support."""
 
 from dataclasses import replace
 
@@ -10,19 +10,19 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at
 from models.mocap.authoring.balance import balanced_clip, dynamics
 from models.mocap.motion.clip import Clip
-from tests.models.mocap.authoring.support import outside_support
+from tests.models.mocap.authoring.support import distance_outside_support
 
 
 def lunge():
-    """The trunk and one arm thrown forwards faster than a body on two feet can follow."""
+    """A lunge of trunk and arm too fast to stay balanced on two feet."""
     start = Key(0.0, x=0.0, y=0.0, height=0.88, yaw=0, lean=0, tilt=0, trunk=(0, 0, 0), head=(0, 0, 0), left_arm=Arm(),
                 right_arm=Arm())  # fmt: skip
     thrown = Key(0.5, x=0.1, y=0.05, lean=20, trunk=(35, 0, 15), right_arm=Arm(raised=95, plane=10))
     return Choreography("lunge", 1.6, [start, thrown], [Step(0.0, 0.0, 0.12)], [Step(0.0, 0.0, -0.12)], Lap())
 
 
-def test_the_force_and_the_zero_moment_point_are_those_of_inverse_dynamics():
-    """MuJoCo's root forces for the same motion, from an independent path: accelerations of the coordinates."""
+def test_floor_force_and_zero_moment_point_match_inverse_dynamics():
+    """MuJoCo computes the root forces independently, from accelerations of the coordinates."""
     fps = 960.0
     t = np.arange(0.0, 1.6 + 0.5 / fps, 1 / fps)
     clip = Clip(poses_at(lunge(), t), fps, "lunge")
@@ -41,19 +41,19 @@ def test_the_force_and_the_zero_moment_point_are_those_of_inverse_dynamics():
         np.testing.assert_allclose(motion.zmp[k], zmp, atol=1e-3)
 
 
-def test_a_figure_that_stands_still_pushes_its_weight_below_its_centre_of_mass():
+def test_standing_figure_exerts_its_weight_below_its_centre_of_mass():
     still = replace(lunge(), keys=lunge().keys[:1])
     motion = dynamics(Clip(poses_at(still, np.arange(97) / 60), 60.0, "still"))
     np.testing.assert_allclose(motion.force, np.tile([0.0, 0.0, 75.0 * 9.81], (96, 1)), atol=1e-6)
     np.testing.assert_allclose(motion.zmp, motion.com[:, :2], atol=1e-9)
 
 
-def test_swaying_brings_an_unbalanced_motion_over_its_feet_without_moving_them():
+def test_balancing_moves_the_zmp_into_the_support_without_moving_the_feet():
     motion = lunge()
     unbalanced = Clip(poses_at(motion, np.arange(97) / 60), 60.0, "lunge")
-    assert outside_support(dynamics(unbalanced)).max() > 0.1
+    assert distance_outside_support(dynamics(unbalanced)).max() > 0.1
     clip = balanced_clip(motion, 60.0)
-    assert outside_support(dynamics(clip)).max() < 1e-3
+    assert distance_outside_support(dynamics(clip)).max() < 1e-3
     assert clip.closes(1e-9)
     np.testing.assert_allclose(dynamics(clip).contacts, dynamics(unbalanced).contacts, atol=1e-3)
     assert np.abs(clip.poses[:, 2:7] - unbalanced.poses[:, 2:7]).max() == pytest.approx(0.0, abs=1e-12)

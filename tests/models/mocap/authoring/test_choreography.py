@@ -1,4 +1,4 @@
-"""The embedded dances and gestures: as committed they are human, balanced, smooth, and what they are called."""
+"""The embedded dances and gestures as committed: within human limits, balanced, smooth, and true to their names."""
 
 import mujoco
 import numpy as np
@@ -7,12 +7,12 @@ from scipy.signal import argrelmax
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, joint_range
-from models.mocap import __main__ as everything
+from models.mocap import __main__ as clip_generator
 from models.mocap.authoring.balance import dynamics
 from models.mocap.authoring.choreography import CLIPS
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import pose_difference
-from tests.models.mocap.authoring.support import outside_support
+from tests.models.mocap.authoring.support import distance_outside_support
 
 MODEL = figure_model()
 IN_PLACE = ("angry", "cheer", "spin", "squat_dance")
@@ -32,7 +32,7 @@ def motions(clips):
 
 
 def rotation_vectors(clip):
-    """Of the 17 joints, shape (n, 17, 3)."""
+    """Rotation vectors of the 17 joints, shape (n, 17, 3)."""
     quaternions = clip.poses[:, 7:].reshape(-1, 4)
     return Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, len(JOINTS), 3)
 
@@ -40,28 +40,28 @@ def rotation_vectors(clip):
 def positions(clip, *bodies):
     """Origins of bodies frame by frame, shape (n, bodies, 3)."""
     data, ids = mujoco.MjData(MODEL), [MODEL.body(body).id for body in bodies]
-    where = np.empty((len(clip.poses), len(bodies), 3))
+    origins = np.empty((len(clip.poses), len(bodies), 3))
     for k, pose in enumerate(clip.poses):
         data.qpos = pose
         mujoco.mj_kinematics(MODEL, data)
-        where[k] = data.xpos[ids]
-    return where
+        origins[k] = data.xpos[ids]
+    return origins
 
 
 def knee_flexion(clip):
-    """Of the left and the right knee [degrees], shape (n, 2)."""
+    """Flexion of the left and the right knee [degrees], shape (n, 2)."""
     return np.rad2deg(rotation_vectors(clip)[:, [JOINTS.index("left_knee"), JOINTS.index("right_knee")], 1])
 
 
 @each_clip
-def test_the_committed_clip_is_the_one_its_key_poses_make(name, clips):
-    made = CLIPS[name]()
-    assert made.fps == pytest.approx(clips[name].fps, rel=1e-9)
-    assert np.abs(pose_difference(made.poses, clips[name].poses)).max() < 1e-6
+def test_committed_clip_matches_its_generator(name, clips):
+    generated = CLIPS[name]()
+    assert generated.fps == pytest.approx(clips[name].fps, rel=1e-9)
+    assert np.abs(pose_difference(generated.poses, clips[name].poses)).max() < 1e-6
 
 
 @each_clip
-def test_it_is_a_lap_in_place_of_two_to_four_seconds(name, clips):
+def test_clip_is_a_closed_lap_in_place_of_2_to_4_s(name, clips):
     clip = clips[name]
     assert 2.0 <= clip.duration <= 4.0
     assert clip.closes(1e-6)
@@ -76,7 +76,7 @@ def test_every_joint_stays_within_its_range(name, clips):
 
 
 @each_clip
-def test_feet_stay_above_the_floor_and_one_is_always_on_it(name, motions):
+def test_feet_stay_above_the_floor_with_one_always_in_contact(name, motions):
     soles = motions[name].contacts[..., 2] - CONTACT_RADIUS
     assert soles.min() > -1e-3
     assert soles.min(axis=1).max() < 1e-3
@@ -84,7 +84,7 @@ def test_feet_stay_above_the_floor_and_one_is_always_on_it(name, motions):
 
 @each_clip
 def test_feet_on_the_floor_do_not_slide(name, motions):
-    """Whatever a contact sphere does from touch-down to lift-off, it does within 2 cm."""
+    """From touch-down to lift-off a contact sphere stays within 2 cm."""
     contacts = motions[name].contacts
     touching = contacts[..., 2] < CONTACT_RADIUS + 3e-3
     for sphere in range(contacts.shape[1]):
@@ -95,10 +95,10 @@ def test_feet_on_the_floor_do_not_slide(name, motions):
 
 
 @each_clip
-def test_the_floor_can_drive_it(name, motions):
-    """It never asks the floor to pull, to grip beyond friction, or to push more than a hair outside the feet."""
+def test_zmp_support_and_friction_of_the_floor_suffice(name, motions):
+    """The floor never has to pull, to exceed friction, or to push more than 1 cm outside the feet."""
     motion = motions[name]
-    outside = outside_support(motion)
+    outside = distance_outside_support(motion)
     assert np.mean(outside < 1e-3) > 0.97
     assert outside.max() < 0.01
     assert motion.force[:, 2].min() > 0.4 * 75 * 9.81
@@ -106,7 +106,7 @@ def test_the_floor_can_drive_it(name, motions):
 
 
 @each_clip
-def test_it_moves_without_jerks(name, clips):
+def test_joint_velocity_acceleration_and_jerk_are_bounded(name, clips):
     velocity = clips[name].velocities()[:, 6:]
     acceleration = np.diff(velocity, axis=0) * clips[name].fps
     jerk = np.diff(acceleration, axis=0) * clips[name].fps
@@ -116,7 +116,7 @@ def test_it_moves_without_jerks(name, clips):
 
 
 @each_clip
-def test_arms_do_not_pass_through_the_body(name, clips):
+def test_arms_do_not_penetrate_the_body(name, clips):
     data = mujoco.MjData(MODEL)
     limbs = [f"{side}_{part}" for side in ("left", "right") for part in ("forearm", "hand", "thigh")]
     body_of = {g: MODEL.body(MODEL.geom_bodyid[g]).name for g in range(MODEL.ngeom) if MODEL.geom_group[g] != 3}
@@ -127,21 +127,21 @@ def test_arms_do_not_pass_through_the_body(name, clips):
         for side, other in (("left", "right"), ("right", "left")):
             for limb in (f"{side}_forearm", f"{side}_hand"):
                 for body in (*TRUNK, f"{other}_forearm", f"{other}_hand", "left_thigh", "right_thigh"):
-                    apart = min(
+                    distance = min(
                         mujoco.mj_geomDistance(MODEL, data, a, b, 0.1, None) for a in shown[limb] for b in shown[body]
                     )
-                    assert apart > -0.008, f"{limb} is {-apart:.3f} m inside {body}"
+                    assert distance > -0.008, f"{limb} is {-distance:.3f} m inside {body}"
 
 
 @pytest.mark.parametrize("name", IN_PLACE)
-def test_the_corners_of_the_demo_stand_near_the_origin_facing_forwards_at_the_start(name, clips):
+def test_in_place_clips_stay_near_the_origin_and_start_facing_forwards(name, clips):
     clip = clips[name]
     assert np.abs(clip.poses[:, :2]).max() < 0.2
     heading = Rotation.from_quat(clip.poses[0, 3:7], scalar_first=True).apply([1.0, 0.0, 0.0])
     assert heading[0] > np.cos(np.deg2rad(15))
 
 
-def test_anger_points_with_one_arm_raises_its_fist_and_stamps(clips):
+def test_angry_points_with_one_arm_raises_the_fist_and_stamps(clips):
     hands = positions(clips["angry"], "right_hand", "left_hand", "chest", "head", "left_foot")
     right, left, chest, head, foot = hands.transpose(1, 0, 2)
     assert np.max(right[:, 0] - chest[:, 0]) > 0.5
@@ -151,7 +151,7 @@ def test_anger_points_with_one_arm_raises_its_fist_and_stamps(clips):
     assert np.ptp(foot[:, 2]) > 0.08
 
 
-def test_cheering_throws_both_hands_above_the_head_three_times_and_bends_the_knees(clips):
+def test_cheer_raises_both_hands_overhead_three_times_and_bends_the_knees(clips):
     left, right, head = positions(clips["cheer"], "left_hand", "right_hand", "head").transpose(1, 0, 2)
     height = np.minimum(left[:, 2], right[:, 2]) - head[:, 2]
     assert np.sum(height[argrelmax(height, order=5)] > 0.35) == 3
@@ -159,7 +159,7 @@ def test_cheering_throws_both_hands_above_the_head_three_times_and_bends_the_kne
     assert np.ptp(knee_flexion(clips["cheer"])) > 35
 
 
-def test_the_spin_goes_round_once_to_the_left_with_arms_out_on_eight_steps(clips, motions):
+def test_spin_turns_once_to_the_left_with_arms_out_in_eight_steps(clips, motions):
     clip = clips["spin"]
     turn = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 5]
     assert turn.min() > 0
@@ -170,7 +170,7 @@ def test_the_spin_goes_round_once_to_the_left_with_arms_out_on_eight_steps(clips
     assert np.sum(np.diff(swings.astype(int), axis=0) == 1) == 8
 
 
-def test_the_squat_dance_stays_deep_and_kicks_each_leg_twice_with_folded_arms(clips):
+def test_squat_dance_stays_low_and_kicks_each_leg_twice_with_folded_arms(clips):
     clip = clips["squat_dance"]
     assert knee_flexion(clip).max(axis=1).min() > 85
     assert np.all(knee_flexion(clip).max(axis=0) > 100)
@@ -187,7 +187,7 @@ def test_the_squat_dance_stays_deep_and_kicks_each_leg_twice_with_folded_arms(cl
     assert np.max(np.linalg.norm(hands[1] - hands[2], axis=1)) < 0.45
 
 
-def test_ginga_steps_back_with_either_foot_stays_low_and_kicks_as_high_as_the_hip(clips):
+def test_ginga_steps_back_with_each_foot_stays_low_and_kicks_to_hip_height(clips):
     clip = clips["ginga"]
     left, right, pelvis = positions(clip, "left_foot", "right_foot", "pelvis").transpose(1, 0, 2)
     assert left[:, 0].min() < -0.3
@@ -198,9 +198,9 @@ def test_ginga_steps_back_with_either_foot_stays_low_and_kicks_as_high_as_the_hi
     assert np.median(pelvis[:, 2]) < 0.8
 
 
-def test_every_embedded_clip_can_be_made_again_and_a_wrong_name_lists_the_right_ones(capsys):
-    assert set(embedded_names()) <= set(everything.CLIPS)
-    assert everything.main(["angry", "happy"]) == 2
+def test_every_embedded_clip_has_a_generator_and_unknown_names_are_refused(capsys):
+    assert set(embedded_names()) <= set(clip_generator.CLIPS)
+    assert clip_generator.main(["angry", "happy"]) == 2
     message = capsys.readouterr().err
     assert "no clip happy" in message
     assert all(name in message for name in CLIPS)

@@ -1,8 +1,8 @@
-"""Walk and run: what a gait laboratory would ask of them, measured on the committed clips."""
+"""Walk and run: the measures of a gait laboratory, on the committed clips."""
 
 import numpy as np
 import pytest
-from clip_measures import G, acceleration, measured, rms, steps
+from clip_measures import G, acceleration, measured, rms, tangent_derivative
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
 from models.mocap.authoring import gait
@@ -30,10 +30,10 @@ def joint_angle(clip, joint, axis):
 
 
 def test_goes_straight_ahead_at_its_speed_and_closes(name):
-    clip, wanted = embedded(name), GAITS[name]
+    clip, planned = embedded(name), GAITS[name]
     assert clip.closes(1e-6)
     assert clip.fps == gait.FPS
-    assert clip.displacement.x / clip.duration == pytest.approx(wanted.speed, rel=1e-4)
+    assert clip.displacement.x / clip.duration == pytest.approx(planned.speed, rel=1e-4)
     assert abs(clip.displacement.y) < 1e-6
     assert abs(clip.displacement.yaw) < 1e-6
 
@@ -47,9 +47,9 @@ def test_second_step_mirrors_the_first(name):
 
 def test_accelerations_change_little_from_frame_to_frame(name):
     clip = embedded(name)
-    lap = np.abs(steps(clip, 2))
-    change = np.abs(np.diff(steps(clip, 2), axis=0))
-    assert change.max() < 0.35 * lap.max()
+    magnitude = np.abs(tangent_derivative(clip, 2))
+    change = np.abs(np.diff(tangent_derivative(clip, 2), axis=0))
+    assert change.max() < 0.35 * magnitude.max()
 
 
 def test_walk_has_double_support_and_never_flies():
@@ -72,7 +72,7 @@ def test_walk_strikes_with_the_heel_and_leaves_with_the_toe():
     assert not heel[up].any()
 
 
-def test_walk_has_the_two_humps_of_a_normal_floor_force():
+def test_walk_vertical_floor_force_peaks_and_dips_in_the_normal_range():
     force = acceleration(measured("walk"))[:, 2] / G + 1
     half = round(gait.WALK.period * gait.FPS / 2)
     step = force[:half]
@@ -81,7 +81,7 @@ def test_walk_has_the_two_humps_of_a_normal_floor_force():
     assert step.mean() == pytest.approx(1.0, abs=0.02)
 
 
-def test_walk_bobs_and_sways_as_people_do():
+def test_walk_centre_of_mass_moves_vertically_and_sideways_as_in_people():
     com = measured("walk").com
     assert 0.015 < np.ptp(com[:, 2]) < 0.06
     assert 0.015 < np.ptp(com[:, 1]) < 0.07
@@ -100,11 +100,11 @@ def test_run_flies_between_steps_and_falls_with_g():
 
 @pytest.mark.parametrize(("joint", "sign"), [("hip", -1), ("knee", 1), ("ankle", -1)])
 def test_joint_angles_follow_the_published_curves(name, joint, sign):
-    clip, wanted = embedded(name), GAITS[name]
+    clip, planned = embedded(name), GAITS[name]
     phase = np.arange(20) / 20
-    frames = np.round(phase * wanted.period * gait.FPS).astype(int)
+    frames = np.round(phase * planned.period * gait.FPS).astype(int)
     angle = sign * joint_angle(clip, f"left_{joint}", "y")[frames]
-    curve = np.array(getattr(wanted, joint))
+    curve = np.array(getattr(planned, joint))
     assert rms(angle - curve) < 8.0
     assert np.corrcoef(angle, curve)[0, 1] > 0.9
 
@@ -121,7 +121,7 @@ def test_arms_swing_against_the_legs_and_elbows_bend_forwards_only(name):
     assert joint_angle(clip, "right_elbow", "z").min() > 5
 
 
-def test_sketch_of_the_walk_mirrors_itself():
+def test_walk_spline_repeats_mirrored_after_half_a_period():
     task = gait.task(gait.WALK)
     motion = Motion(task)
     motion.unknowns += 0.01 * np.random.default_rng(1).standard_normal(len(motion.unknowns))
@@ -133,8 +133,8 @@ def test_sketch_of_the_walk_mirrors_itself():
 
 
 @pytest.mark.slow
-def test_committed_clip_is_what_the_generator_makes(name):
-    made, committed = gait.CLIPS[name](), embedded(name)
-    assert made.poses.shape == committed.poses.shape
-    # Other BLAS kernels round differently; they were seen to change the run by 2e-7.
-    np.testing.assert_allclose(made.poses, committed.poses, atol=1e-5)
+def test_committed_clip_matches_its_generator(name):
+    generated, committed = gait.CLIPS[name](), embedded(name)
+    assert generated.poses.shape == committed.poses.shape
+    # Other BLAS kernels round differently; they changed the run by 2e-7.
+    np.testing.assert_allclose(generated.poses, committed.poses, atol=1e-5)

@@ -1,4 +1,4 @@
-"""Centre of mass, momentum, contacts and moved legs of clips, each by a second means."""
+"""Centre of mass, momentum, contacts and moved legs of clips, each against an independent computation."""
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 
 
-def placed(poses, geoms=FOOT_CONTACTS, bodies=("left_foot", "right_foot")):
+def mujoco_points_and_rotations(poses, geoms=FOOT_CONTACTS, bodies=("left_foot", "right_foot")):
     """Positions of geoms and orientations of bodies, by MuJoCo."""
     model = figure_model()
     data = mujoco.MjData(model)
@@ -26,9 +26,9 @@ def placed(poses, geoms=FOOT_CONTACTS, bodies=("left_foot", "right_foot")):
     return np.array(points), np.array(turns)
 
 
-def test_inertia_and_centre_of_mass_are_those_of_the_mass_matrix():
+def test_inertia_and_centre_of_mass_match_the_mujoco_mass_matrix():
     pose = embedded("backflip").poses[150]
-    found = momentum(Clip(pose[None], 60.0, "still"))
+    result = momentum(Clip(pose[None], 60.0, "still"))
     model = figure_model()
     data = mujoco.MjData(model)
     data.qpos = pose
@@ -37,13 +37,13 @@ def test_inertia_and_centre_of_mass_are_those_of_the_mass_matrix():
     mujoco.mj_fullM(model, data, M)
     R = Rotation.from_quat(pose[3:7], scalar_first=True).as_matrix()
     about_root = R @ M[3:6, 3:6] @ R.T
-    arm = found.com[0] - pose[:3]
+    arm = result.com[0] - pose[:3]
     steiner = DEFAULT_MASS * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    assert found.inertia[0] == pytest.approx(about_root - steiner, abs=1e-9)
-    assert found.angular[0] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert result.inertia[0] == pytest.approx(about_root - steiner, abs=1e-9)
+    assert result.angular[0] == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_a_rigid_body_that_turns_has_the_momentum_of_its_inertia():
+def test_angular_momentum_of_a_rigid_rotation_is_inertia_times_angular_velocity():
     pose, fps, spin = embedded("jump").poses[120], 240.0, np.array([0.7, -3.0, 0.4])
     com = momentum(Clip(pose[None], fps, "still")).com[0]
     poses = np.tile(pose, (9, 1))
@@ -51,12 +51,12 @@ def test_a_rigid_body_that_turns_has_the_momentum_of_its_inertia():
         turn = Rotation.from_rotvec(spin * (k - 4) / fps)
         poses[k, :3] = com + turn.apply(pose[:3] - com)
         poses[k, 3:7] = (turn * Rotation.from_quat(pose[3:7], scalar_first=True)).as_quat(scalar_first=True)
-    found = momentum(Clip(poses, fps, "turning"))
-    assert found.com == pytest.approx(np.tile(com, (9, 1)), abs=1e-12)
-    assert found.angular[4] == pytest.approx(found.inertia[4] @ spin, rel=1e-3)
+    result = momentum(Clip(poses, fps, "turning"))
+    assert result.com == pytest.approx(np.tile(com, (9, 1)), abs=1e-12)
+    assert result.angular[4] == pytest.approx(result.inertia[4] @ spin, rel=1e-3)
 
 
-def standing(height, speed=0.0, frames=13, fps=120.0):
+def standing_contacts(height, speed=0.0, frames=13, fps=120.0):
     poses = np.tile(rest_pose(), (frames, 1))
     poses[:, 2] += height
     poses[:, 0] += speed * np.arange(frames) / fps
@@ -67,40 +67,43 @@ def standing(height, speed=0.0, frames=13, fps=120.0):
     ("height", "speed", "expected"),
     [(0.0, 0.0, True), (0.04, 0.0, True), (-0.04, 0.0, True), (0.04, 0.3, True), (0.04, 2.0, False), (0.1, 0.0, False)],
 )
-def test_soles_bear_load_near_the_floor_and_at_rest(height, speed, expected):
-    found = standing(height, speed)
-    assert np.all(found.supported == expected)
-    assert np.all(found.loaded == expected)
-    assert found.clearance == pytest.approx(np.full(13, height), abs=1e-3)
+def test_soles_are_loaded_only_when_slow_and_near_the_floor(height, speed, expected):
+    result = standing_contacts(height, speed)
+    assert np.all(result.supported == expected)
+    assert np.all(result.loaded == expected)
+    assert result.clearance == pytest.approx(np.full(13, height), abs=1e-3)
 
 
-def test_hands_and_other_parts_bear_load_too():
+def test_body_lying_on_its_back_is_supported_with_unloaded_feet():
     pose = rest_pose()
     pose[3:7] = Rotation.from_rotvec([0.0, -np.pi / 2, 0.0]).as_quat(scalar_first=True)
     pose[2] = 0.14  # on the back
-    found = contacts(Clip(np.tile(pose, (5, 1)), 60.0, "lying"))
-    assert np.all(found.supported)
-    assert not np.any(found.loaded)
+    result = contacts(Clip(np.tile(pose, (5, 1)), 60.0, "lying"))
+    assert np.all(result.supported)
+    assert not np.any(result.loaded)
 
 
 @pytest.mark.parametrize("name", ["jump", "walk", "squat_dance"])
-def test_feet_that_stand_stay_where_they_are_when_the_body_moves(name):
+def test_planted_foot_keeps_its_pose_when_the_body_is_moved(name):
     poses = embedded(name).poses[::7]
     shift = 0.02 * np.column_stack([np.sin(np.arange(len(poses))), np.cos(np.arange(len(poses))), -np.ones(len(poses))])
     planted = np.tile([1.0, 0.0], (len(poses), 1))
-    (before, turned), (after, turned_after) = placed(poses), placed(with_moved_body(poses, shift, planted))
+    (before, turned), (after, turned_after) = (
+        mujoco_points_and_rotations(poses),
+        mujoco_points_and_rotations(with_moved_body(poses, shift, planted)),
+    )
     assert after[:, :4] == pytest.approx(before[:, :4], abs=1e-9)
     assert after[:, 4:] == pytest.approx(before[:, 4:] + shift[:, None], abs=1e-9)
     assert turned_after == pytest.approx(turned, abs=1e-9)
 
 
-def test_a_body_that_does_not_move_keeps_its_pose():
+def test_zero_displacement_of_the_body_keeps_the_pose():
     poses = embedded("backflip").poses[::9]
     same = with_moved_body(poses, np.zeros((len(poses), 3)), np.ones((len(poses), 2)))
     assert same == pytest.approx(poses, abs=1e-12)
 
 
-def test_a_foot_out_of_reach_is_drawn_in_with_a_straight_leg():
+def test_leg_straightens_towards_an_unreachable_planted_foot():
     poses = np.tile(rest_pose(), (2, 1))
     moved = with_moved_body(poses, np.array([[0.0, 0.0, 0.3]] * 2), np.ones((2, 2)))
     lines, length = leg_lines(moved)

@@ -16,15 +16,17 @@ def states() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return q, rng.normal(size=(len(q), 57)), 10.0 * rng.normal(size=(len(q), 57))
 
 
-def test_states_of_one_pose_in_a_row_are_as_each_alone(states: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+def test_batched_demand_of_repeated_poses_equals_that_of_single_states(
+    states: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
     floor = Floor(spheres=WITH_HANDS)
-    together = floor.demand(*states)
-    alone = [floor.demand(*(part[k : k + 1] for part in states)) for k in range(len(states[0]))]
+    batched = floor.demand(*states)
+    single = [floor.demand(*(part[k : k + 1] for part in states)) for k in range(len(states[0]))]
     for name in Demand._fields:
-        np.testing.assert_array_equal(getattr(together, name), np.concatenate([getattr(d, name) for d in alone]))
+        np.testing.assert_array_equal(getattr(batched, name), np.concatenate([getattr(d, name) for d in single]))
 
 
-def test_joint_torques_under_contact_forces_are_those_of_mujocos_jacobians(
+def test_joint_torques_under_contact_forces_match_mujoco_jacobians(
     states: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
     model = figure_model()

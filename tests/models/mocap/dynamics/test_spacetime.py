@@ -1,4 +1,4 @@
-"""Coordinates, floor forces and the spacetime optimisation, against MuJoCo and differences."""
+"""Coordinates, floor forces and the spacetime optimisation, against MuJoCo and finite differences."""
 
 import mujoco
 import numpy as np
@@ -25,7 +25,7 @@ def random_state(rng, scale=0.6):
     return u, 2 * rng.standard_normal((4, N_TANGENT)), 10 * rng.standard_normal((4, N_TANGENT))
 
 
-def test_states_agree_with_mujocos_differences(figure):
+def test_states_match_mujoco_finite_differences(figure):
     model, _ = figure
     u, du, ddu = random_state(np.random.default_rng(0))
     q, v, a = states(u, du, ddu)
@@ -58,13 +58,13 @@ def test_reflected_coordinates_are_the_mirror_image(figure):
         np.testing.assert_allclose(bodies[1][twin], place * (1, -1, 1), atol=1e-12)
 
 
-def test_an_unknown_coordinate_is_named():
+def test_unknown_coordinate_is_refused_by_name():
     assert coordinate("left_knee", "y") == 3 * (2 + 12) + 1
     with pytest.raises(ModelError, match="tail"):
         coordinate("tail", "x")
 
 
-def test_floor_carries_a_figure_that_stands():
+def test_floor_forces_support_a_standing_figure():
     floor = Floor()
     zero = np.zeros((1, N_TANGENT))
     demand = floor.demand(rest_pose()[None], zero, zero)
@@ -74,7 +74,7 @@ def test_floor_carries_a_figure_that_stands():
     assert grip.sum() == pytest.approx(floor.body_weight, rel=1e-3)
 
 
-def test_floor_gives_nothing_to_a_figure_in_the_air_and_cannot_pull():
+def test_floor_force_is_zero_in_the_air_and_never_pulls():
     floor = Floor()
     zero = np.zeros((1, N_TANGENT))
     demand = floor.demand(rest_pose()[None], zero, zero)
@@ -82,20 +82,20 @@ def test_floor_gives_nothing_to_a_figure_in_the_air_and_cannot_pull():
     falling = zero.copy()
     falling[0, 2] = -3 * 9.81
     demand = floor.demand(rest_pose()[None], zero, falling)
-    left = residual(demand, floor.grip(demand, STANDING))
-    assert left[0, 2] == pytest.approx(-2 * floor.body_weight, rel=1e-6)
+    missing = residual(demand, floor.grip(demand, STANDING))
+    assert missing[0, 2] == pytest.approx(-2 * floor.body_weight, rel=1e-6)
 
 
-def test_friction_is_bounded():
+def test_friction_force_is_bounded():
     floor = Floor()
     zero, sideways = np.zeros((1, N_TANGENT)), np.zeros((1, N_TANGENT))
     sideways[0, 1] = 3 * 9.81
     demand = floor.demand(rest_pose()[None], zero, sideways)
-    left = residual(demand, floor.grip(demand, STANDING))
-    assert np.linalg.norm(left[0, :3]) > 0.5 * floor.body_weight
+    missing = residual(demand, floor.grip(demand, STANDING))
+    assert np.linalg.norm(missing[0, :3]) > 0.5 * floor.body_weight
 
 
-def test_torques_agree_with_mujocos_contact_jacobian(figure):
+def test_torques_match_mujoco_contact_jacobians(figure):
     model, data = figure
     rng = np.random.default_rng(2)
     q, v, a = states(*random_state(rng, 0.3))
@@ -107,20 +107,20 @@ def test_torques_agree_with_mujocos_contact_jacobian(figure):
     for k in range(len(q)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
         mujoco.mj_inverse(model, data)
-        wanted = data.qfrc_inverse.copy()
+        expected = data.qfrc_inverse.copy()
         for sphere, name in enumerate(FOOT_CONTACTS):
             geom = model.geom(name)
             jacobian = np.empty((3, N_TANGENT))
             point = data.geom_xpos[geom.id] - (0, 0, CONTACT_RADIUS)
             mujoco.mj_jac(model, data, jacobian, None, point, geom.bodyid[0])
-            wanted -= jacobian.T @ (grip[k, 4 * sphere : 4 * sphere + 4] @ edges)
-        np.testing.assert_allclose(torque[k], wanted[6:], atol=1e-8)
+            expected -= jacobian.T @ (grip[k, 4 * sphere : 4 * sphere + 4] @ edges)
+        np.testing.assert_allclose(torque[k], expected[6:], atol=1e-8)
         at_com = residual(demand, grip)[k]
-        np.testing.assert_allclose(at_com[:3], wanted[:3], atol=1e-8)
+        np.testing.assert_allclose(at_com[:3], expected[:3], atol=1e-8)
 
 
 @pytest.mark.slow
-def test_gauss_newton_gradient_agrees_with_differences():
+def test_gauss_newton_gradient_matches_finite_differences():
     motion = Motion(gait.task(gait.WALK))
     motion.solve(6)
     errors = motion.errors(motion.unknowns)
@@ -132,7 +132,7 @@ def test_gauss_newton_gradient_agrees_with_differences():
     assert gradient @ direction == pytest.approx((costs[0] - costs[1]) / (2 * h), rel=0.03)
 
 
-def test_solving_lowers_the_cost_at_every_iteration_and_keeps_the_ends_at_rest():
+def test_solve_lowers_the_cost_at_every_iteration_and_keeps_the_end_coordinates():
     motion = Motion(flights.task(flights.JUMP, flights.JUMP.weights))
     start, end = motion.coordinates(np.array([0.0, flights.JUMP.keys[-1].time - 1e-9]))
     costs = motion.solve(2)
@@ -142,7 +142,7 @@ def test_solving_lowers_the_cost_at_every_iteration_and_keeps_the_ends_at_rest()
     np.testing.assert_allclose(after, [start, end], atol=1e-9)
 
 
-def test_arrays_that_do_not_fit_are_refused():
+def test_array_of_wrong_shape_is_refused():
     task = gait.task(gait.WALK)
     with pytest.raises(ModelError, match="clearance"):
         Motion(Task(**{**vars(task), "clearance": np.zeros((3, 8))}))

@@ -17,7 +17,7 @@ def model():
 
 
 def smooth_poses(model, n, seed, speed=0.02):
-    """Poses that drift by small random tangents: what MuJoCo itself integrates."""
+    """Poses that drift by small random tangents, integrated by MuJoCo."""
     rng = np.random.default_rng(seed)
     pose, poses = rest_pose(), []
     tangent = rng.normal(size=57)
@@ -28,7 +28,7 @@ def smooth_poses(model, n, seed, speed=0.02):
     return np.array(poses)
 
 
-def test_pose_difference_is_mujocos(model):
+def test_pose_difference_matches_mujoco(model):
     poses = smooth_poses(model, 40, seed=1, speed=0.4)
     expected = np.empty((39, 57))
     for row, (start, end) in zip(expected, pairwise(poses), strict=True):
@@ -48,19 +48,19 @@ def test_velocities_are_central_differences_on_the_manifold(model):
     np.testing.assert_allclose(velocities[0], forward, atol=1e-9)
 
 
-def test_velocities_of_a_lap_that_turns_go_on_into_the_next_lap(model):
+def test_velocities_of_a_turning_lap_continue_into_the_next_lap(model):
     lap = circling_lap(24)
     twice = np.vstack((lap.poses[:-1], lap.displacement.moved(lap.poses)))
     long = Clip(twice, lap.fps, "two laps").velocities()
     np.testing.assert_allclose(lap.velocities()[-1], long[lap.n_frames - 1], atol=1e-9)
     first, last = lap.velocities()[[0, -1]]
-    # The same motion, seen from a heading a lap's turn later.
+    # The same motion, with the heading turned by that of one lap.
     np.testing.assert_allclose(first[3:], last[3:], atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(first[:3]), np.linalg.norm(last[:3]), atol=1e-9)
 
 
 def circling_lap(n):
-    """Walks a quarter of a circle of radius 1 m; every joint comes back to where it began."""
+    """A walk along a quarter circle of radius 1 m; every joint returns to its first angle."""
     s = np.linspace(0.0, 1.0, n)
     poses = np.tile(rest_pose(), (n, 1))
     angle = s * np.pi / 2
@@ -71,14 +71,14 @@ def circling_lap(n):
     return Clip(poses, 30.0, "quarter circle")
 
 
-def test_lap_displacement_carries_the_first_frame_onto_the_last():
+def test_lap_displacement_maps_the_first_frame_onto_the_last():
     lap = circling_lap(24)
     move = lap.displacement
     np.testing.assert_allclose((move.x, move.y, move.yaw), (1.0, 1.0, np.pi / 2), atol=1e-12)
     assert lap.closes(1e-9)
 
 
-def test_a_clip_whose_joint_or_height_does_not_return_does_not_close():
+def test_clip_with_different_end_joint_or_height_does_not_close():
     lap = circling_lap(24)
     bent = lap.poses.copy()
     bent[-1, 7:11] = np.cos(0.005), np.sin(0.005), 0.0, 0.0
@@ -90,7 +90,7 @@ def test_a_clip_whose_joint_or_height_does_not_return_does_not_close():
     assert not Clip(lap.poses[:1], 30.0, "one frame").closes()
 
 
-def test_a_full_turn_closes_although_its_quaternion_changes_sign():
+def test_full_turn_closes_although_its_quaternion_changes_sign():
     angle = np.linspace(0.0, 2 * np.pi, 33)
     poses = np.tile(rest_pose(), (33, 1))
     poses[:, 3], poses[:, 6] = np.cos(angle / 2), np.sin(angle / 2)
@@ -100,7 +100,7 @@ def test_a_full_turn_closes_although_its_quaternion_changes_sign():
     np.testing.assert_allclose(spin.velocities()[:, 5], 2 * np.pi * 60 / 32, rtol=1e-9)
 
 
-def test_quaternions_become_unit_and_continuous_in_sign():
+def test_quaternions_are_normalised_and_made_continuous_in_sign():
     rng = np.random.default_rng(3)
     poses = np.tile(rest_pose(), (50, 1))
     poses[:, 3:] *= (rng.choice([-1.0, 1.0], size=(50, 18)) * rng.uniform(0.5, 2.0, size=(50, 18))).repeat(4, axis=1)
@@ -109,7 +109,7 @@ def test_quaternions_become_unit_and_continuous_in_sign():
     assert (np.sum(quaternions[1:] * quaternions[:-1], axis=2) > 0).all()
 
 
-def test_duration_counts_intervals_and_a_displacement_moves_over_the_floor():
+def test_duration_counts_intervals_and_displacement_moves_poses_in_the_plane():
     clip = Clip(np.tile(rest_pose(), (31, 1)), 30.0, "still")
     assert clip.duration == pytest.approx(1.0)
     moved = PlanarDisplacement(1.0, 2.0, np.pi / 2).moved(clip.poses)
@@ -117,7 +117,7 @@ def test_duration_counts_intervals_and_a_displacement_moves_over_the_floor():
     np.testing.assert_allclose(moved[:, 3:7], np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (31, 1)))
 
 
-def test_a_clip_does_not_share_memory_with_its_source():
+def test_clip_does_not_share_memory_with_its_source():
     poses = np.tile(rest_pose(), (3, 1))
     clip = Clip(poses, 30.0, "copy")
     poses[:] = 0.0
@@ -125,7 +125,7 @@ def test_a_clip_does_not_share_memory_with_its_source():
 
 
 @pytest.mark.parametrize(
-    ("poses", "fps", "says"),
+    ("poses", "fps", "message"),
     [
         (np.zeros((3, 74)), 30.0, r"shape \(3, 74\)"),
         (np.zeros((0, 75)), 30.0, r"shape \(0, 75\)"),
@@ -135,12 +135,12 @@ def test_a_clip_does_not_share_memory_with_its_source():
         (np.tile(rest_pose(), (2, 1)), np.inf, "frames per second"),
     ],
 )
-def test_what_is_no_clip_is_refused(poses, fps, says):
-    with pytest.raises(ModelError, match=says):
+def test_invalid_poses_or_frame_rate_are_refused(poses, fps, message):
+    with pytest.raises(ModelError, match=message):
         Clip(poses, fps, "bad")
 
 
-def test_the_heading_of_a_rotation_is_the_direction_of_its_x_axis_on_the_floor():
+def test_heading_is_the_direction_of_the_x_axis_on_the_floor():
     rotations = Rotation.random(50, rng=np.random.default_rng(5))
     x, y, _ = rotations.apply([1.0, 0.0, 0.0]).T
     np.testing.assert_allclose(heading(rotations.as_quat(scalar_first=True)), np.arctan2(y, x), atol=1e-12)

@@ -8,7 +8,7 @@ from models.mocap.motion.ranges import beyond_ranges
 
 
 @pytest.mark.parametrize("angle", [120.0, 165.0, 179.0, 183.0, 190.0])
-def test_a_bent_and_twisted_elbow_is_beyond_its_range_by_what_it_is_bent_too_far(angle):
+def test_elbow_bent_beyond_its_range_exceeds_it_by_the_excess_angle(angle):
     """Its range ends at -155° about z; beyond 180° the shortest rotation vector is on the other side."""
     pose = embedded("walk").poses[:1].copy()
     joint = JOINTS.index("left_elbow")

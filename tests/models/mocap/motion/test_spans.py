@@ -1,4 +1,4 @@
-"""Spans of masks: found, and cleaned of what is too short."""
+"""Runs of true in masks, and removal of short gaps and short runs."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_spans_are_the_runs_of_true(marks, expected):
         ("##.....####", ".......####"), ("##..##", "######"), ("##", "##"), ("..", ".."), ("#.", ".."),
     ],
 )  # fmt: skip
-def test_short_gaps_within_are_filled_then_short_runs_dropped_but_not_a_whole_mask(marks, expected):
+def test_cleaned_fills_short_gaps_then_drops_short_runs_unless_all_is_true(marks, expected):
     given = mask(marks)
     np.testing.assert_array_equal(cleaned(given, 3, 4), mask(expected))
     np.testing.assert_array_equal(given, mask(marks))
@@ -38,6 +38,6 @@ def test_short_gaps_within_are_filled_then_short_runs_dropped_but_not_a_whole_ma
         ("#####.#####", "###########"), (".####.....", ".####....."), ("....####..", "....####.."),
     ],
 )  # fmt: skip
-def test_runs_and_gaps_go_on_over_the_seam_of_a_closed_mask(marks, expected):
+def test_cleaned_joins_runs_and_gaps_across_the_seam_of_a_closed_mask(marks, expected):
     given = mask(marks)
     np.testing.assert_array_equal(cleaned(given, 3, 4, closed=True), mask(expected))

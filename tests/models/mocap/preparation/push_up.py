@@ -1,4 +1,4 @@
-"""A body that rests on its toes and palms, as for a push-up."""
+"""Push-ups: a body supported by its toes and palms."""
 
 import numpy as np
 from scipy.optimize import brentq

@@ -1,4 +1,4 @@
-"""Flights tell the pace of a capture."""
+"""The pace of a capture, from the acceleration of its flights."""
 
 import pytest
 
@@ -18,26 +18,26 @@ def test_authored_flights_fall_with_gravity_and_keep_their_pace(name):
 
 
 @pytest.mark.parametrize("rate", [1.3, 2.0])
-def test_a_wrong_rate_is_found_and_undone(rate):
+def test_wrong_frame_rate_is_detected_and_corrected(rate):
     clip = embedded("jump")
-    found = paced(Clip(clip.poses, rate * clip.fps, "jump"))
-    assert found.pace == pytest.approx(1.0 / rate, rel=0.02)
-    assert found.clip.duration == pytest.approx(clip.duration, rel=0.02)
+    result = paced(Clip(clip.poses, rate * clip.fps, "jump"))
+    assert result.pace == pytest.approx(1.0 / rate, rel=0.02)
+    assert result.clip.duration == pytest.approx(clip.duration, rel=0.02)
 
 
-def test_what_falls_too_slowly_may_be_borne_and_keeps_its_pace():
+def test_slow_fall_may_be_supported_and_keeps_its_pace():
     clip = embedded("jump")
     slow = Clip(clip.poses, 0.7 * clip.fps, "slow")
     assert paced(slow).clip is slow
 
 
-def test_what_never_flies_keeps_its_pace():
+def test_clip_without_flight_keeps_its_pace():
     walk = embedded("walk")
-    quick = Clip(walk.poses, 2.0 * walk.fps, "walk")
-    assert paced(quick) == (quick, 1.0, None)
+    fast = Clip(walk.poses, 2.0 * walk.fps, "walk")
+    assert paced(fast) == (fast, 1.0, None)
 
 
-def test_somebody_on_the_hands_does_not_fly():
+def test_handstand_is_no_flight():
     clip = embedded("jump")
     poses = clip.poses.copy()
     # Upside down, hands on the floor.

@@ -28,7 +28,7 @@ from tests.models.mocap.preparation.push_up import PALMS, held, propped
 
 
 @pytest.fixture(scope="module", name="held")
-def half_a_second():
+def push_up_of_half_a_second():
     return held(61)
 
 
@@ -37,7 +37,7 @@ def _demand(pose, spheres=WITH_HANDS):
     return floor, floor.demand(pose[None], still, still)
 
 
-def test_toes_and_palms_share_the_weight_by_the_rule_of_levers(held):
+def test_toes_and_palms_share_the_weight_by_their_lever_arms(held):
     """Moments about the line of the toes: the palms bear W (x_com − x_toes) / (x_palms − x_toes)."""
     floor, demand = _demand(held.poses[0])
     standing = contact_points(held.poses[:1], WITH_HANDS)[:, :, 2] < CONTACT_RADIUS + 1e-3
@@ -53,14 +53,14 @@ def test_toes_and_palms_share_the_weight_by_the_rule_of_levers(held):
     assert loads.sum() == pytest.approx(floor.body_weight, rel=2e-3)
 
 
-def test_toes_alone_cannot(held):
+def test_toes_alone_cannot_support_a_push_up(held):
     floor, demand = _demand(held.poses[0], FOOT_CONTACTS)
     standing = contact_points(held.poses[:1], FOOT_CONTACTS)[:, :, 2] < CONTACT_RADIUS + 1e-3
     missing = residual(demand, floor.grip(demand, standing))[0] / floor.body_weight
     assert np.linalg.norm(missing * (1, 1, 1, 2, 2, 2)) > 0.5
 
 
-def test_levers_of_all_spheres_are_mujocos_jacobians():
+def test_levers_match_mujoco_jacobians():
     model, rng = figure_model(), np.random.default_rng(5)
     data, pose = mujoco.MjData(model), rest_pose()
     mujoco.mj_integratePos(model, pose, 0.5 * rng.normal(size=N_TANGENT), 1.0)
@@ -75,19 +75,19 @@ def test_levers_of_all_spheres_are_mujocos_jacobians():
         np.testing.assert_allclose(levers[:, k], (EDGES @ jacobian[:, 6:]).T, atol=1e-12)
 
 
-def test_a_body_on_toes_and_palms_has_both_in_its_schedule(held):
+def test_push_up_has_toes_and_palms_in_its_contact_schedule(held):
     schedule = stances(held, held)
     assert schedule.hands.all()
     np.testing.assert_allclose(schedule.places[:, PALMS, 2], CONTACT_RADIUS)
-    found = borne(held, schedule)
-    assert found.residual < 2e-3
-    assert found.loads.sum(axis=1) == pytest.approx(1.0, abs=5e-3)
+    support = borne(held, schedule)
+    assert support.residual < 2e-3
+    assert support.loads.sum(axis=1) == pytest.approx(1.0, abs=5e-3)
     assert well_formed(held, ()).residual < 2e-3
 
 
 @pytest.mark.parametrize("lift", [-0.05, 0.05])
-def test_palms_that_hover_or_sink_stand_on_the_floor(lift):
-    """By 5 cm, as where a capture's wrists are fixed; the body turns about its toes."""
+def test_palms_5_cm_above_or_below_the_floor_are_placed_on_it(lift):
+    """Captures with fixed wrists have such palms; the body is pitched about its toes."""
     u = propped(np.deg2rad(85.0))
     toes, palms = (contact_points(pose_of(u)[None], names)[0] for names in (FOOT_CONTACTS, HAND_CONTACTS))
     turn = -lift / (palms[0, 0] - toes[2, 0])
@@ -100,7 +100,7 @@ def test_palms_that_hover_or_sink_stand_on_the_floor(lift):
     np.testing.assert_allclose(schedule.places[:, PALMS, 2], CONTACT_RADIUS)
 
 
-def test_a_hand_that_rests_near_the_floor_beside_a_body_on_its_feet_bears_nothing():
+def test_hands_near_the_floor_bear_no_load_in_a_squat_on_the_feet():
     """A squat on flat feet, palms hanging 8 cm above the floor."""
     u, bends = np.zeros(N_TANGENT), {"abdomen": 15.0, "chest": 15.0}
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -117,13 +117,13 @@ def test_a_hand_that_rests_near_the_floor_beside_a_body_on_its_feet_bears_nothin
 
 
 @pytest.mark.parametrize("name", ["walk", "run", "backflip", "ginga"])
-def test_no_hand_is_in_the_schedule_of_motions_on_feet(name):
+def test_motions_on_feet_have_no_hands_in_their_contact_schedule(name):
     clip = embedded(name)
     assert stances(clip, clip).hands.shape == (clip.n_frames, 0)
 
 
-def test_a_hand_stands_longer_where_nothing_else_bears():
-    """It stands up to frame 10 and from 30; it leaves upwards after 17, and slides by 20 cm before 25."""
+def test_hand_stance_is_extended_where_nothing_else_bears_load():
+    """The left hand stands up to frame 10 and rises after 17; the right stands from 30 and slides by 20 cm up to 25."""
     palms, hands = np.full((40, 2, 3), CONTACT_RADIUS), np.zeros((40, 2), dtype=bool)
     hands[:10, 0] = hands[30:, 1] = True
     palms[17:, 0, 2] += 0.2
@@ -133,20 +133,20 @@ def test_a_hand_stands_longer_where_nothing_else_bears():
     np.testing.assert_array_equal(np.flatnonzero(hands[:, 1]), np.arange(25, 40))
 
 
-def test_the_jacobian_with_loaded_hands(monkeypatch):
-    """Against central differences along a random change, with torques of arms and trunk that count."""
+def test_error_jacobian_with_loaded_hands_matches_central_differences(monkeypatch):
+    """Differences along a random change, with a torque bound so low that arms and trunk contribute."""
     monkeypatch.setattr(feasible, "_STRAIN_THRESHOLD", 0.02)
     arms = np.deg2rad(85.0) - 0.15 * np.sin(np.linspace(0.0, np.pi, 40)) ** 2
     clip = Clip(np.array([pose_of(propped(angle)) for angle in arms]), 60.0, "push-up")
     schedule, change = stances(clip, clip), Change(clip, 0.1, 0.05, passage=True)
     assert schedule.hands.all()
     problem, rng = _Problem(change, schedule), np.random.default_rng(6)
-    x, along = 1e-3 * rng.normal(size=(2, change.n_points * N_TANGENT)) * ((1.0,), (1e3,))
+    x, direction = 1e-3 * rng.normal(size=(2, change.n_points * N_TANGENT)) * ((1.0,), (1e3,))
     errors = problem.errors(x, True)
     assert (errors.grip[:, 4 * PALMS.start :].sum(axis=1) > 0.1 * problem.floor.body_weight).all()
-    points = change.points(along.reshape(-1, N_TANGENT))[change.first[:, None] + np.arange(DEGREE + 1)]
+    points = change.points(direction.reshape(-1, N_TANGENT))[change.first[:, None] + np.arange(DEGREE + 1)]
     parts = np.stack([np.einsum("mk,mkn->mn", change.basis[order], points) for order in range(3)], axis=1)
-    told = np.einsum("mofn,mon->mf", errors.jacobian, parts)
-    ahead, behind = (problem.errors(x + sign * 1e-6 * along, False).weighted for sign in (1, -1))
-    found = (ahead - behind) / 2e-6
-    assert np.quantile(np.abs(told - found) / (np.abs(found).max(axis=0) + 1.0), 0.99) < 0.02
+    analytic = np.einsum("mofn,mon->mf", errors.jacobian, parts)
+    ahead, behind = (problem.errors(x + sign * 1e-6 * direction, False).weighted for sign in (1, -1))
+    numeric = (ahead - behind) / 2e-6
+    assert np.quantile(np.abs(analytic - numeric) / (np.abs(numeric).max(axis=0) + 1.0), 0.99) < 0.02

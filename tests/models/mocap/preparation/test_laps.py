@@ -1,4 +1,4 @@
-"""The lap of a capture: it begins and ends anywhere, and the part that repeats itself best is found."""
+"""The lap of a capture that begins and ends anywhere: the part that repeats best."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from models.mocap.preparation.laps import lap_of
 MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
 
 
-def test_a_clip_that_closes_is_its_own_lap() -> None:
+def test_closed_clip_is_its_own_lap() -> None:
     walk = embedded("walk")
     lap = lap_of(walk)
     assert lap.clip is walk
@@ -22,7 +22,7 @@ def test_a_clip_that_closes_is_its_own_lap() -> None:
 
 @pytest.mark.parametrize(("name", "cycle"), [("walk", 132), ("run", 88)])
 @pytest.mark.parametrize("first", [0, 17, 41])
-def test_a_cycle_is_found_in_a_part_cut_anywhere(name: str, cycle: int, first: int) -> None:
+def test_gait_cycle_is_found_in_an_excerpt_that_starts_anywhere(name: str, cycle: int, first: int) -> None:
     clip = embedded(name)
     poses = clip.poses[first : first + cycle + 47]
     lap = lap_of(Clip(poses, clip.fps, name))
@@ -32,7 +32,7 @@ def test_a_cycle_is_found_in_a_part_cut_anywhere(name: str, cycle: int, first: i
     np.testing.assert_array_equal(lap.clip.poses, poses[round(lap.start * clip.fps) :][: cycle + 1])
 
 
-def test_noise_and_a_stop_do_not_mislead_it() -> None:
+def test_gait_cycle_is_found_despite_noise_and_a_stop() -> None:
     clip, rng = embedded("walk"), np.random.default_rng(3)
     poses = np.concatenate([clip.poses[:200], np.repeat(clip.poses[200:201], 90, axis=0)])
     poses[:, 7:] += 0.004 * rng.standard_normal(poses[:, 7:].shape)
@@ -42,7 +42,7 @@ def test_noise_and_a_stop_do_not_mislead_it() -> None:
     assert np.radians(0.5) < lap.gap < np.radians(10.0)
 
 
-def test_what_nowhere_repeats_itself_is_left_as_it_is() -> None:
+def test_clip_without_repetition_is_returned_unchanged() -> None:
     still = np.repeat(rest_pose()[None], 80, axis=0)
     gliding = still.copy()
     gliding[:, 0] = np.linspace(0.0, 2.0, 80)
@@ -67,6 +67,6 @@ def test_captured_gaits_have_laps_of_one_cycle(file: str, seconds: float, degree
     lap = lap_of(clip)
     assert lap.end - lap.start == pytest.approx(seconds, abs=0.03)
     assert lap.gap < np.radians(degrees)
-    ends = pose_difference(lap.clip.displacement.moved(lap.clip.poses[0]), lap.clip.poses[-1])
-    whole = pose_difference(clip.displacement.moved(clip.poses[0]), clip.poses[-1])
-    assert np.linalg.norm(ends[6:]) <= np.linalg.norm(whole[6:])
+    gaps_of_lap = pose_difference(lap.clip.displacement.moved(lap.clip.poses[0]), lap.clip.poses[-1])
+    gaps_of_clip = pose_difference(clip.displacement.moved(clip.poses[0]), clip.poses[-1])
+    assert np.linalg.norm(gaps_of_lap[6:]) <= np.linalg.norm(gaps_of_clip[6:])

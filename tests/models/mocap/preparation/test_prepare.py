@@ -27,7 +27,7 @@ from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 @pytest.fixture(scope="module")
 def walks():
-    """Two and a half laps of the embedded walk, cut where it happens."""
+    """The embedded walk, and an excerpt of two and a half laps of it that starts anywhere."""
     walk = resampled(embedded("walk"), 120.0)
     rows = [walk.poses[:-1]]
     for _ in range(2):
@@ -35,21 +35,21 @@ def walks():
     return walk, Clip(np.concatenate(rows)[37 : 37 + round(2.5 * walk.n_frames)], walk.fps, "walks")
 
 
-def test_the_lap_of_a_walk_is_found_and_closed(walks):
-    walk, several = walks
-    found = looped(several)
+def test_lap_of_a_walk_is_found_and_closed(walks):
+    walk, excerpt = walks
+    found = looped(excerpt)
     assert found.kind == "cycle"
     assert found.clip.closes()
     # The embedded walk is two strides.
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
 
 
-def test_a_closed_clip_is_left_as_it_is(walks):
+def test_looped_returns_a_closed_clip_unchanged(walks):
     assert looped(walks[0]).clip is walks[0]
 
 
-def test_a_lap_that_was_written_with_few_digits_is_closed(walks):
-    """As files of libraries of motions are: taken for open, a walk in a circle lacked 8 % for 2."""
+def test_looped_closes_a_lap_written_with_few_digits(walks):
+    """As in files of motion libraries. Taken for open, a walk in a circle had a residual of 8 % instead of 2."""
     walk, _ = walks
     poses = walk.poses.copy()
     poses[-1, 7:] += 3e-5 * np.random.default_rng(3).standard_normal(68)
@@ -61,27 +61,27 @@ def test_a_lap_that_was_written_with_few_digits_is_closed(walks):
     assert np.abs(pose_difference(found.clip.poses, written.poses)).max() < 2e-4
 
 
-def test_a_lap_on_a_foot_that_stands_ends_where_it_began():
-    """A cheer whose capture turns by 4° and goes 2 cm aside in a lap, away from the origin."""
+def test_looped_removes_the_drift_of_a_lap_on_standing_feet():
+    """A cheer away from the origin whose capture turns by 4° and drifts by 2 cm per lap."""
     cheer = resampled(embedded("cheer"), 120.0)
     n = cheer.n_frames - 1
     frames, share = np.arange(int(2.4 * n)), np.arange(int(2.4 * n)) / n
     poses = np.array([PlanarDisplacement(3.0, -2.0, 0.0).moved(cheer.poses[k % n]) for k in frames])
     drift = [PlanarDisplacement(0.02 * s, 0.0, np.deg2rad(4.0) * s) for s in share]
-    for k, there in enumerate(drift):
+    for k, displacement in enumerate(drift):
         poses[k, :2] -= 3.0, -2.0
-        poses[k] = there.moved(poses[k])
+        poses[k] = displacement.moved(poses[k])
         poses[k, :2] += 3.0, -2.0
     found = looped(Clip(poses, 120.0, "drifting"))
     assert found.kind == "cycle"
     np.testing.assert_allclose(found.clip.poses[-1], found.clip.poses[0], atol=1e-12)
     feet = sole_points(found.clip.poses)[:, :, :2]
-    without = sole_points(cheer.poses)[:, :, :2]
-    assert np.ptp(feet, axis=0).max() < np.ptp(without, axis=0).max() + 2e-3
+    authored_feet = sole_points(cheer.poses)[:, :, :2]
+    assert np.ptp(feet, axis=0).max() < np.ptp(authored_feet, axis=0).max() + 2e-3
     np.testing.assert_allclose(np.linalg.norm(found.clip.poses[:, 3:7], axis=1), 1.0, atol=1e-9)
 
 
-def test_what_does_not_repeat_rests_at_both_ends(walks):
+def test_looped_brings_a_clip_without_repetition_to_rest_at_both_ends(walks):
     part = Clip(walks[1].poses[: walks[0].n_frames // 6], 120.0, "part")
     found = looped(part)
     assert found.kind == "open"
@@ -89,21 +89,21 @@ def test_what_does_not_repeat_rests_at_both_ends(walks):
     assert max(speeds[0].max(), speeds[-1].max()) < 0.2
 
 
-def test_noise_in_the_first_frame_does_not_throw_a_limb(walks):
-    """An elbow that is 8° off in the first frame moves at 17 rad/s there, by the difference of two frames: it turned
-    on by 176° before it came to rest, by the low-passed motion by 66°."""
+def test_noise_in_the_first_frame_hardly_changes_the_transition_from_rest(walks):
+    """An elbow 8° off in the first frame moves at 17 rad/s by the difference of two frames: from that velocity it would
+    turn by a further 176° before it rests, from that of the low-passed motion by 66°."""
     opened = Clip(walks[1].poses[: walks[0].n_frames // 4], walks[1].fps, "opened")
-    off = np.zeros((1, 57))
-    off[0, 6 + 3 * JOINTS.index("left_elbow") + 1] = np.deg2rad(8.0)
+    offset = np.zeros((1, 57))
+    offset[0, 6 + 3 * JOINTS.index("left_elbow") + 1] = np.deg2rad(8.0)
     poses = opened.poses.copy()
-    poses[0] = plus(poses[:1], off)[0]
+    poses[0] = plus(poses[:1], offset)[0]
     noisy, plain = (looped(clip, "open").clip for clip in (Clip(poses, opened.fps, "noisy"), opened))
     elbow = slice(6 + 3 * JOINTS.index("left_elbow"), 9 + 3 * JOINTS.index("left_elbow"))
     thrown = pose_difference(plain.poses[:1], noisy.poses[:1])[0, elbow]
     assert np.linalg.norm(thrown) < np.deg2rad(75.0)
 
 
-def test_a_knee_that_would_pass_its_range_stops_within_it_if_that_is_asked_for(walks):
+def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
     """The shank of the first half of a stride, thrown forward at 15 rad/s in its last frames."""
     opened = Clip(walks[1].poses[: walks[0].n_frames // 2], walks[1].fps, "opened")
     n, knee = opened.n_frames, 6 + 3 * JOINTS.index("left_knee")
@@ -112,16 +112,16 @@ def test_a_knee_that_would_pass_its_range_stops_within_it_if_that_is_asked_for(w
         thrown = np.zeros((1, 57))
         thrown[0, knee + 1] = -15.0 * (12 - k) / opened.fps
         poses[n - 1 - k] = plus(poses[n - 1 - k : n - k], -thrown)[0]
-    worst = [
+    excess = [
         beyond_ranges(looped(Clip(poses, opened.fps, "thrown"), "open", within=within).clip.poses[n:]).max()
         for within in (False, True)
     ]
-    captured = max(beyond_ranges(poses).max(), 0.0)
-    assert worst[0] > captured + np.deg2rad(20.0)
-    assert worst[1] < captured + np.deg2rad(1.01)
+    captured_excess = max(beyond_ranges(poses).max(), 0.0)
+    assert excess[0] > captured_excess + np.deg2rad(20.0)
+    assert excess[1] < captured_excess + np.deg2rad(1.01)
 
 
-def test_what_ends_in_the_air_comes_down_to_rest():
+def test_clip_that_ends_in_the_air_comes_to_rest_on_the_floor():
     jump = resampled(embedded("jump"), 120.0)
     flying = np.flatnonzero(sole_points(jump.poses)[:, :, 2].min(axis=1) > CONTACT_RADIUS + 0.05)
     found = looped(Clip(jump.poses[: int(np.median(flying))], 120.0, "up"), "open")
@@ -129,8 +129,8 @@ def test_what_ends_in_the_air_comes_down_to_rest():
 
 
 @pytest.mark.slow
-def test_an_upright_motion_that_ends_rests_on_both_feet(walks, tmp_path):
-    """A stride cut out of a walk, one foot in the air at both ends."""
+def test_prepared_open_upright_motion_rests_on_both_feet(walks, tmp_path):
+    """A stride of a walk with one foot in the air at both ends."""
     walk = walks[0]
     write_bvh(Clip(walk.poses[: walk.n_frames // 2], 120.0, "part"), tmp_path / "part.bvh")
     made = prepared(tmp_path / "part.bvh", "open")
@@ -141,31 +141,31 @@ def test_an_upright_motion_that_ends_rests_on_both_feet(walks, tmp_path):
     assert made.feasible.residual < 0.05
 
 
-def test_who_lies_at_the_end_is_not_stood_on_his_feet():
+def test_motion_that_ends_lying_gets_no_additional_foot_stances():
     dance = resampled(embedded("cheer"), 120.0)
-    low = Clip(dance.poses[:60] - np.eye(dance.poses.shape[1])[2] * 0.6, 120.0, "low")
-    np.testing.assert_array_equal(rested(stances(low, low), low).standing, stances(low, low).standing)
+    lying = Clip(dance.poses[:60] - np.eye(dance.poses.shape[1])[2] * 0.6, 120.0, "low")
+    np.testing.assert_array_equal(rested(stances(lying, lying), lying).standing, stances(lying, lying).standing)
 
 
-def test_half_a_stride_goes_on_in_the_mirror(walks):
-    walk, several = walks
-    found = looped(Clip(several.poses[: round(0.4 * walk.n_frames)], 120.0, "steps"), mirror=True)
+def test_half_stride_is_continued_by_its_mirror_image(walks):
+    walk, excerpt = walks
+    found = looped(Clip(excerpt.poses[: round(0.4 * walk.n_frames)], 120.0, "steps"), mirror=True)
     assert found.kind == "half stride"
     assert found.clip.closes()
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
     half = round(found.clip.n_frames / 2)
     image = mirrored(found.clip)
-    ours, theirs = (np.abs(c.velocities()[:, 6:]).mean(axis=1) for c in (found.clip, image))
-    np.testing.assert_allclose(ours[: half - 2], np.roll(theirs, -half + 1)[: half - 2], rtol=0.1, atol=0.05)
+    speeds, image_speeds = (np.abs(c.velocities()[:, 6:]).mean(axis=1) for c in (found.clip, image))
+    np.testing.assert_allclose(speeds[: half - 2], np.roll(image_speeds, -half + 1)[: half - 2], rtol=0.1, atol=0.05)
 
 
-def test_no_half_stride_in_the_mirror_is_told(walks):
+def test_mirror_option_without_a_half_stride_is_refused(walks):
     standing = Clip(np.repeat(embedded("cheer").poses[:1], 12, axis=0), 120.0, "still")
     with pytest.raises(ModelError, match=r"--mirror.*expected a gait"):
         looped(standing, mirror=True)
 
 
-def test_of_a_minute_of_walking_a_lap_is_taken(walks):
+def test_lap_of_a_minute_of_walking_is_a_whole_number_of_strides(walks):
     walk = walks[0]
     rows = [walk.poses[:-1]]
     for _ in range(27):
@@ -178,7 +178,7 @@ def test_of_a_minute_of_walking_a_lap_is_taken(walks):
     assert laps == pytest.approx(round(laps), abs=0.05)
 
 
-def test_feet_in_the_air_bear_nothing():
+def test_feet_in_the_air_bear_no_load():
     flip = resampled(embedded("backflip"), 120.0)
     rough = Clip(flip.poses + 1e-3 * np.random.default_rng(0).normal(size=flip.poses.shape), 120.0, "rough")
     schedule = stances(flip, rough)
@@ -187,19 +187,19 @@ def test_feet_in_the_air_bear_nothing():
     assert not (schedule.pushing & high).any()
 
 
-@pytest.mark.parametrize("wish", ["1:9", "two", "2:1"])
-def test_a_wrong_loop_is_told_in_one_line(walks, wish):
+@pytest.mark.parametrize("option", ["1:9", "two", "2:1"])
+def test_invalid_loop_option_is_refused(walks, option):
     with pytest.raises(ModelError, match=r"--loop .*expected"):
-        looped(walks[1], wish)
+        looped(walks[1], option)
 
 
-def test_a_mirrored_mirror_is_the_motion(walks):
+def test_mirroring_swaps_the_soles_and_mirroring_twice_gives_the_motion(walks):
     np.testing.assert_allclose(pose_difference(mirrored(mirrored(walks[0])).poses, walks[0].poses), 0.0, atol=1e-12)
-    ours, theirs = sole_points(walks[0].poses), sole_points(mirrored(walks[0]).poses)
-    np.testing.assert_allclose(ours[:, :4] * (1, -1, 1), theirs[:, 4:], atol=1e-9)
+    original, mirror_image = sole_points(walks[0].poses), sole_points(mirrored(walks[0]).poses)
+    np.testing.assert_allclose(original[:, :4] * (1, -1, 1), mirror_image[:, 4:], atol=1e-9)
 
 
-def test_the_walks_feet_stand_by_turns(walks):
+def test_feet_of_a_walk_stand_alternately(walks):
     schedule = stances(walks[0], walks[0])
     left, right = schedule.standing[:, :4].any(axis=1), schedule.standing[:, 4:].any(axis=1)
     assert 0.5 < left.mean() < 0.75
@@ -209,7 +209,7 @@ def test_the_walks_feet_stand_by_turns(walks):
 
 @pytest.fixture(scope="module")
 def hop():
-    """Four seconds that close, in which the standing body hops once at 1 s and drifts by 2 cm and back."""
+    """A closed clip of 4 s in which a standing body hops once at 1 s and drifts by 2 cm and back."""
     still = resampled(embedded("cheer"), 120.0).poses[0]
     poses = np.repeat(still[None], 480, axis=0)
     t = np.arange(480) / 479.0
@@ -218,7 +218,7 @@ def hop():
     return Clip(poses, 120.0, "hop")
 
 
-def test_a_stance_over_the_seam_has_one_place_however_long(hop):
+def test_stance_across_the_seam_has_one_place(hop):
     schedule = stances(hop, hop)
     assert hop.closes()
     assert schedule.standing[[0, -1]].all()
@@ -226,24 +226,24 @@ def test_a_stance_over_the_seam_has_one_place_however_long(hop):
     np.testing.assert_allclose(schedule.places[0], schedule.places[-1], atol=1e-9)
 
 
-def test_a_sphere_keeps_its_place_ever_less_beside_a_stance(walks):
+def test_place_weight_ramps_linearly_beside_a_stance(walks):
     schedule = stances(walks[0], walks[0])
-    share, standing = schedule.kept[:, 0], schedule.standing[:, 0]
+    weight, standing = schedule.kept[:, 0], schedule.standing[:, 0]
     lands = int(np.flatnonzero(np.diff(standing.astype(int)) > 0)[0]) + 1
-    rising = share[lands - 7 : lands + 1]
+    rising = weight[lands - 7 : lands + 1]
     np.testing.assert_allclose(rising, np.arange(8) / 7.0, atol=1e-12)
     np.testing.assert_array_equal(schedule.places[lands - 6 : lands, 0], np.tile(schedule.places[lands, 0], (6, 1)))
-    assert (share[standing] == 1.0).all()
+    assert (weight[standing] == 1.0).all()
 
 
-def test_nothing_keeps_a_place_in_flight(hop):
+def test_place_weight_is_zero_in_flight(hop):
     schedule = stances(hop, hop)
     flies = ~schedule.standing.any(axis=1)
     assert flies.any()
     assert (schedule.kept[flies] == 0.0).all()
 
 
-def test_skate_is_the_way_from_the_median_place_of_each_stance():
+def test_stance_slide_is_the_largest_distance_from_the_median_place():
     points = np.zeros((10, 2, 3))
     points[:4, 0, 0] = 0.0, 0.0, 0.0, 0.03
     points[6:, 0, 1] = 0.1, 0.1, 0.1, 0.14
@@ -254,26 +254,26 @@ def test_skate_is_the_way_from_the_median_place_of_each_stance():
     np.testing.assert_allclose(stance_slides(points, ~np.ones((10, 2), dtype=bool)), [0.0])
 
 
-def test_the_standing_body_bears_its_weight(walks):
+def test_mean_load_of_a_walk_is_the_body_weight(walks):
     walk = walks[0]
     loads = borne(walk, stances(walk, walk)).loads.sum(axis=1)
     assert loads.mean() == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_low_part_of_a_sole_that_bears_nothing_and_moves_does_not_skate(walks):
-    """A toe that rolls off is as low as one that stands."""
+def test_low_moving_sole_part_without_load_does_not_count_as_foot_skate(walks):
+    """A toe that rolls off is as low as a standing one."""
     walk = walks[0]
     schedule = stances(walk, walk)
     points = sole_points(walk.poses)
-    every = stance_slides(points, schedule.standing)
-    assert well_formed(walk, ()).slid < every.max()
+    all_slides = stance_slides(points, schedule.standing)
+    assert well_formed(walk, ()).slid < all_slides.max()
 
 
-def test_the_embedded_walk_is_well_formed(walks):
+def test_embedded_walk_is_well_formed(walks):
     assert well_formed(walks[0], ()).faults() == ()
 
 
-def test_a_pose_that_does_not_belong_stands_out(walks):
+def test_pose_foreign_to_the_motion_is_an_outlier(walks):
     poses = walks[0].poses.copy()
     poses[20, 3:] = np.tile([1.0, 0, 0, 0], 18)
     assert outliers(walks[0]) == 0
@@ -281,7 +281,7 @@ def test_a_pose_that_does_not_belong_stands_out(walks):
 
 
 @pytest.mark.slow
-def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
+def test_preparation_makes_a_captured_walk_well_formed(mocap, tmp_path):
     outcome = prepare_file(mocap / "snu/walk.bvh", tmp_path / "walk.bvh", report=tmp_path)
     made, after, follows, *_ = outcome
     before = well_formed(made.captured, clip_flights(made.captured))
@@ -297,12 +297,12 @@ def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
         rf"<td>the physical figure follows it for 20 s with a residual of {100 * follows.residual:.1f} % of weight"
     )
     assert re.search(r"<th>physical figure</th><td>the physical figure (falls|follows).*" + followed, page)
-    again = load(tmp_path / "walk.bvh").clip
-    np.testing.assert_allclose(pose_difference(again.poses, made.clip.poses), 0.0, atol=1e-7)
+    reloaded = load(tmp_path / "walk.bvh").clip
+    np.testing.assert_allclose(pose_difference(reloaded.poses, made.clip.poses), 0.0, atol=1e-7)
 
 
 @pytest.mark.slow
-def test_a_captured_cartwheel_is_made_feasible_on_feet_and_hands(mocap, tmp_path):
+def test_preparation_makes_a_captured_cartwheel_feasible_on_feet_and_hands(mocap, tmp_path):
     outcome = prepare_file(mocap / "snu/cart.bvh", tmp_path / "cart.bvh")
     assert outcome.made.near
     assert outcome.made.hands.seconds > 0.5
@@ -313,7 +313,7 @@ def test_a_captured_cartwheel_is_made_feasible_on_feet_and_hands(mocap, tmp_path
 
 
 @pytest.mark.slow
-def test_a_captured_dance_turns_on_its_feet(mocap, tmp_path):
+def test_preparation_of_a_captured_dance_lets_feet_turn_without_skating(mocap, tmp_path):
     outcome = prepare_file(mocap / "deepmimic/humanoid3d_dance_a.txt", tmp_path / "dance.bvh")
     assert outcome.made.near
     assert outcome.made.fidelity.joints < OTHERWISE
@@ -322,8 +322,8 @@ def test_a_captured_dance_turns_on_its_feet(mocap, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_body_whose_root_wanders_over_standing_feet_has_a_feasible_motion_near(tmp_path):
-    # Feet that drift with the root at up to 0.26 m/s stand, so the root is brought back over them.
+def test_preparation_removes_root_drift_over_standing_feet(tmp_path):
+    # Feet that drift with the root at up to 0.26 m/s count as standing, so the root is moved back over them.
     cheer = embedded("cheer")
     poses = np.concatenate((cheer.poses, cheer.poses[1:]))
     poses[:, 0] += 0.25 * np.sin(np.linspace(0.0, 2 * np.pi, len(poses)))
@@ -348,13 +348,13 @@ def long_walk(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_part_of_a_long_file_can_be_prepared(long_walk):
+def test_part_of_a_long_file_can_be_prepared(long_walk):
     made = prepared(long_walk, "10:12.2")
     assert made.captured.duration > 120.0
     assert made.clip.duration == pytest.approx(2.2, abs=0.01)
 
 
-def test_the_whole_of_a_long_file_is_refused(long_walk):
+def test_whole_file_longer_than_120_s_is_refused(long_walk):
     with pytest.raises(
         ModelError, match=r"long.bvh: lasts 13\d.* at most 120 s, or a part of it by `hvf prepare --loop START:END`"
     ):
@@ -362,7 +362,7 @@ def test_the_whole_of_a_long_file_is_refused(long_walk):
 
 
 @pytest.mark.slow
-def test_what_a_file_lacks_is_said_in_the_terminal(tmp_path, capsys):
+def test_prepare_command_prints_missing_joints_and_dropped_frames(tmp_path, capsys):
     walk = embedded("walk")
     write_rig(Rig(without=("clavicle",), leading=1), Clip(walk.poses[::4], walk.fps / 4, "walk"), tmp_path / "r.bvh")
     assert main(["prepare", str(tmp_path / "r.bvh"), str(tmp_path / "out.bvh")]) == 0
@@ -372,23 +372,23 @@ def test_what_a_file_lacks_is_said_in_the_terminal(tmp_path, capsys):
     assert lines[-1].startswith("r: ")
 
 
-def test_prepared_clips_are_kept_by_the_code_that_prepares_them():
+def test_cache_key_covers_the_module_that_prepares_clips():
     assert prepared.__module__ == prepared_clip._PREPARING_MODULE
 
 
-def test_a_target_that_exists_is_left(tmp_path):
+def test_existing_target_is_not_overwritten(tmp_path):
     write_bvh(embedded("walk"), tmp_path / "walk.bvh")
     with pytest.raises(ModelError, match="--overwrite"):
         prepare_file(tmp_path / "walk.bvh", tmp_path / "walk.bvh")
 
 
 @pytest.mark.parametrize(("degrees", "near"), [(10.0, True), (60.0, False)])
-def test_a_motion_that_takes_a_joint_far_beyond_its_range_is_not_near(degrees, near, monkeypatch, tmp_path):
-    """As a run that is cut at full speed came to rest: it is tried again within the ranges, then kept as captured."""
-    tried = []
+def test_motion_with_a_joint_far_beyond_its_range_is_not_near_the_capture(degrees, near, monkeypatch, tmp_path):
+    """As when a run cut at full speed comes to rest. It is solved again within the ranges, then left as captured."""
+    attempts = []
 
     def bent(clip, schedule, **options):
-        tried.append(clip)
+        attempts.append(clip)
         poses = clip.poses.copy()
         knee = 7 + 4 * JOINTS.index("right_knee")
         poses[10, knee : knee + 4] = np.cos(np.deg2rad(degrees) / 2), 0.0, -np.sin(np.deg2rad(degrees) / 2), 0.0
@@ -398,7 +398,7 @@ def test_a_motion_that_takes_a_joint_far_beyond_its_range_is_not_near(degrees, n
     write_bvh(embedded("cheer"), tmp_path / "r.bvh")
     made = prepared(tmp_path / "r.bvh", "0:1" if near else "open")
     assert made.near is near
-    assert len(tried) == (1 if near else 2)
+    assert len(attempts) == (1 if near else 2)
     assert np.rad2deg(beyond_ranges(made.clip.poses).max()) < 30.0
-    said = " ".join(advice(made))
-    assert said == "" if near else re.search(r"takes a joint \d\d° beyond its range", said)
+    message = " ".join(advice(made))
+    assert message == "" if near else re.search(r"takes a joint \d\d° beyond its range", message)

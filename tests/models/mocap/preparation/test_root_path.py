@@ -11,7 +11,7 @@ FPS = 120.0
 
 
 def _ramp(n: int) -> Array:
-    """0 to 1 with rest at both ends and constant speed between."""
+    """A ramp from 0 to 1 with rest at both ends and constant speed between."""
     speed = np.clip(np.minimum(np.arange(n) - 20, n - 21 - np.arange(n)) / 6.0, 0.0, 1.0)
     return np.cumsum(speed) / speed.sum()
 
@@ -20,17 +20,17 @@ def _standing() -> Array:
     return resampled(embedded("cheer"), FPS).poses[0]
 
 
-def test_a_body_that_slides_over_the_floor_under_load_is_held_by_its_feet():
+def test_body_sliding_over_the_floor_under_load_is_held_by_its_feet():
     poses = np.repeat(_standing()[None], 130, axis=0)
     poses[:, 0] += 1.0 * _ramp(130)  # 1.2 m/s
     clip = Clip(poses, FPS, "slides")
-    carried = on_resting_support(clip, smoothed(clip))
-    way = np.ptp(sole_points(carried.poses)[:, :, 0], axis=0)
-    assert way.max() < 0.15  # what is slower than a standing foot may move stays
-    np.testing.assert_array_equal(carried.poses[:, 2:], clip.poses[:, 2:])
+    held = on_resting_support(clip, smoothed(clip))
+    travel = np.ptp(sole_points(held.poses)[:, :, 0], axis=0)
+    assert travel.max() < 0.15  # motion slower than the bound of a standing foot remains
+    np.testing.assert_array_equal(held.poses[:, 2:], clip.poses[:, 2:])
 
 
 @pytest.mark.parametrize("name", ["walk", "run", "jump"])
-def test_a_capture_whose_feet_rest_under_load_keeps_its_path(name: str):
+def test_clip_whose_feet_rest_under_load_keeps_its_path(name: str):
     clip = resampled(embedded(name), FPS)
     assert on_resting_support(clip, smoothed(clip)) is clip

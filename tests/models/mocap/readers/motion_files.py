@@ -1,4 +1,4 @@
-"""Small motion files of every format that load, from which broken ones are made."""
+"""Small valid motion files of every format, from which tests derive malformed ones."""
 
 import json
 

@@ -22,34 +22,34 @@ def random_clip(seed, n=60, fps=120.0):
     return Clip(np.hstack((rng.normal(size=(n, 3)), quaternions.reshape(n, -1))), fps, "random")
 
 
-def reread(clip, folder):
+def round_trip(clip, folder):
     path = Path(folder) / "clip.bvh"
     write_bvh(clip, path)
-    again = own_clip(read_bvh(path))
-    assert again is not None
-    return again
+    reloaded = own_clip(read_bvh(path))
+    assert reloaded is not None
+    return reloaded
 
 
-def largest_gap(one, other):
+def largest_difference(one, other):
     return np.abs(pose_difference(one.poses, other.poses)).max()
 
 
-def test_any_rotations_come_back(tmp_path):
+def test_random_rotations_survive_the_round_trip(tmp_path):
     clip = random_clip(0)
-    again = reread(clip, tmp_path)
-    assert largest_gap(clip, again) < 1e-9
-    assert again.fps == clip.fps
-    assert again.name == "clip"
+    reloaded = round_trip(clip, tmp_path)
+    assert largest_difference(clip, reloaded) < 1e-9
+    assert reloaded.fps == clip.fps
+    assert reloaded.name == "clip"
 
 
-def test_gimbal_lock_loses_nothing(tmp_path):
+def test_gimbal_lock_orientations_survive_the_round_trip(tmp_path):
     """Every joint at every combination of right angles: each order of Euler angles locks at some of them."""
     right_angles = Rotation.create_group("O").as_quat(scalar_first=True)
     nearly = (Rotation.create_group("O") * Rotation.from_rotvec([3e-9, -2e-9, 1e-9])).as_quat(scalar_first=True)
     poses = np.tile(rest_pose(), (48, 1))
     poses[:, 3:] = np.tile(np.vstack((right_angles, nearly)), 18)
     clip = Clip(poses, 30.0, "right angles")
-    assert largest_gap(clip, reread(clip, tmp_path)) < 1e-9
+    assert largest_difference(clip, round_trip(clip, tmp_path)) < 1e-9
 
 
 @given(
@@ -58,16 +58,16 @@ def test_gimbal_lock_loses_nothing(tmp_path):
     fps=st.floats(0.5, 1000.0),
 )
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_joint_and_rate_come_back(tmp_path, rotation, joint, fps):
+def test_any_joint_rotation_and_frame_rate_survive_the_round_trip(tmp_path, rotation, joint, fps):
     poses = np.tile(rest_pose(), (2, 1))
     poses[:, 3 + 4 * joint : 7 + 4 * joint] = Rotation.from_rotvec(rotation).as_quat(scalar_first=True)
     clip = Clip(poses, fps, "one joint")
-    again = reread(clip, tmp_path)
-    assert largest_gap(clip, again) < 1e-9
-    assert again.fps == pytest.approx(fps, rel=5e-5)
+    reloaded = round_trip(clip, tmp_path)
+    assert largest_difference(clip, reloaded) < 1e-9
+    assert reloaded.fps == pytest.approx(fps, rel=5e-5)
 
 
-def test_the_files_own_kinematics_are_mujocos(tmp_path):
+def test_forward_kinematics_of_the_file_match_mujoco(tmp_path):
     clip, model = random_clip(4, n=5), figure_model()
     write_bvh(clip, tmp_path / "clip.bvh")
     motion = read_bvh(tmp_path / "clip.bvh")
@@ -80,7 +80,7 @@ def test_the_files_own_kinematics_are_mujocos(tmp_path):
         np.testing.assert_allclose(positions[k] / 100, data.xpos[1:][:, [1, 2, 0]], atol=1e-8)
 
 
-def test_channels_are_exactly_the_57_and_joints_the_figures(tmp_path):
+def test_file_has_57_channels_and_the_joints_of_the_figure(tmp_path):
     write_bvh(random_clip(5, n=1), tmp_path / "clip.bvh")
     text = (tmp_path / "clip.bvh").read_text()
     assert sum(int(line.split()[1]) for line in text.splitlines() if "CHANNELS" in line) == 57
@@ -90,7 +90,7 @@ def test_channels_are_exactly_the_57_and_joints_the_figures(tmp_path):
     assert len(BODIES) == len(motion.joints)
 
 
-def test_angles_do_not_jump_from_frame_to_frame(tmp_path):
+def test_written_angles_do_not_jump_from_frame_to_frame(tmp_path):
     angle = np.linspace(0.0, 6 * np.pi, 200)
     poses = np.tile(rest_pose(), (200, 1))
     poses[:, 3], poses[:, 6] = np.cos(angle / 2), np.sin(angle / 2)
@@ -100,7 +100,7 @@ def test_angles_do_not_jump_from_frame_to_frame(tmp_path):
     assert np.abs(np.diff(table, axis=0)).max() < 10.0
 
 
-def test_a_file_of_the_figure_is_not_retargeted_and_a_scaled_one_is(tmp_path):
+def test_file_of_the_figure_is_not_retargeted_but_a_scaled_one_is(tmp_path):
     write_bvh(embedded("walk"), tmp_path / "own.bvh")
     assert load(tmp_path / "own.bvh").report is None
     other = tmp_path / "scaled.bvh"
@@ -111,8 +111,8 @@ def test_a_file_of_the_figure_is_not_retargeted_and_a_scaled_one_is(tmp_path):
     assert report.taken["left_thigh"] == "left_hip"
 
 
-def test_blocks_give_the_same_file_as_the_whole(tmp_path: Path) -> None:
-    """Angles go on over the edges of blocks, also where a joint has turned by more than half a turn."""
+def test_writing_in_blocks_gives_the_same_file_as_the_whole_clip(tmp_path: Path) -> None:
+    """Angles are continuous across blocks, also where a joint has turned by more than half a turn."""
     clip = embedded("spin")
     write_bvh(clip, tmp_path / "whole.bvh")
     edges = [0, 1, 2, 50, 120, clip.n_frames]
@@ -121,6 +121,6 @@ def test_blocks_give_the_same_file_as_the_whole(tmp_path: Path) -> None:
     assert (tmp_path / "blocks.bvh").read_text() == (tmp_path / "whole.bvh").read_text()
 
 
-def test_a_wrong_number_of_frames_is_told(tmp_path: Path) -> None:
+def test_wrong_number_of_frames_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="3 frames were given; expected 4"):
         write_bvh_blocks(tmp_path / "short.bvh", 4, 60.0, [random_clip(1, n=3).poses])

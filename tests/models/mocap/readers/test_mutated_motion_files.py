@@ -20,7 +20,7 @@ TOKENS = (
 
 @st.composite
 def mutations(draw, text):
-    """The text with a few pieces cut out, doubled, swapped for tokens or strewn with bytes."""
+    """The text with a few pieces removed, duplicated or replaced by tokens or random text, and perhaps truncated."""
     content = text
     for _ in range(draw(st.integers(1, 4))):
         at = draw(st.integers(0, len(content)))
@@ -62,29 +62,29 @@ def test_mutated_amc_and_asf_files_load_or_are_refused(tmp_path, skeleton, conte
 @given(content=mutations(DEEPMIMIC), character=st.none() | mutations(CHARACTER))
 @FUZZ
 def test_mutated_deepmimic_files_load_or_are_refused(tmp_path, content, character):
-    beside = tmp_path / "m_character.txt"
-    beside.unlink(missing_ok=True)
+    character_file = tmp_path / "m_character.txt"
+    character_file.unlink(missing_ok=True)
     if character is not None:
-        beside.write_text(character, encoding="utf-8", errors="replace")
+        character_file.write_text(character, encoding="utf-8", errors="replace")
     (tmp_path / "m_walk.txt").write_text(content, encoding="utf-8", errors="replace")
     assert_loads_or_is_refused(tmp_path / "m_walk.txt")
 
 
 @given(content=st.binary(max_size=200), suffix=st.sampled_from((".bvh", ".amc", ".txt", ".json", "")))
 @FUZZ
-def test_any_bytes_are_refused(tmp_path, content, suffix):
+def test_random_bytes_are_refused(tmp_path, content, suffix):
     (tmp_path / "m.asf").write_text(ASF)
     (tmp_path / f"m{suffix}").write_bytes(content)
     with pytest.raises(MotionFileError):
         read_motion(tmp_path / f"m{suffix}")
 
 
-def test_real_files_cut_anywhere_load_or_are_refused(mocap, tmp_path):
+def test_truncated_captures_load_or_are_refused(mocap, tmp_path):
     """A cut in the last number of a frame is still a number; everywhere else it is an error."""
-    chance = random.Random(7)
+    rng = random.Random(7)
     for name in ("snu/run.bvh", "xia/xia_rest_1frame.bvh", "deepmimic/humanoid3d_run.txt"):
         content = (mocap / name).read_bytes()
         path = tmp_path / name.rsplit("/", 1)[1].replace("humanoid3d_", "")
         for _ in range(12):
-            path.write_bytes(content[: chance.randrange(len(content))])
+            path.write_bytes(content[: rng.randrange(len(content))])
             assert_loads_or_is_refused(path)

@@ -1,4 +1,4 @@
-"""What the formats allow and naive readers stumble over, in files of a few lines."""
+"""Valid but unusual features of the formats, in files of a few lines."""
 
 import json
 
@@ -41,11 +41,11 @@ def read_text(tmp_path, text, name="motion.bvh"):
     return read_motion(path)
 
 
-def places(motion):
+def joint_positions(motion):
     return motion.global_positions(motion.global_rotations())
 
 
-def test_each_joint_has_its_own_order_of_rotations(tmp_path):
+def test_bvh_rotation_order_is_read_for_each_joint(tmp_path):
     motion = read_text(tmp_path, CHAIN)
     root = Rotation.from_euler("ZXY", [10, 20, 30], degrees=True)
     thigh = root * Rotation.from_euler("YXZ", [40, 50, 60], degrees=True)
@@ -55,36 +55,36 @@ def test_each_joint_has_its_own_order_of_rotations(tmp_path):
     assert motion.joints == ("Hips", "Bip01 L Thigh")
 
 
-def test_angles_that_wrap_by_a_full_turn_are_the_same_rotation(tmp_path):
+def test_bvh_angles_that_differ_by_a_full_turn_are_the_same_rotation(tmp_path):
     motion = read_text(tmp_path, CHAIN)
     first, second = (Rotation.from_quat(motion.rotations[k], scalar_first=True) for k in (0, 1))
     np.testing.assert_allclose((first * second.inv()).magnitude(), 0.0, atol=1e-12)
 
 
-def test_position_channels_replace_the_offset_on_any_joint(tmp_path):
+def test_bvh_position_channels_replace_the_offset_on_any_joint(tmp_path):
     text = CHAIN.replace("CHANNELS 3 Yrotation", "CHANNELS 4 Zposition Yrotation").replace(" 40 ", " 7 40 ")
     motion = read_text(tmp_path, text)
     np.testing.assert_allclose(motion.translations[0], [[10, 20, 30], [0, -5.9e-14, 7]])
     np.testing.assert_allclose(motion.offsets, [[1, 2, 3], [0, -5.9e-14, 4]])
 
 
-def test_positions_that_are_nil_leave_the_joint_at_its_offset(tmp_path):
-    """As MakeHuman writes channels of positions on every joint: displacements, of which there are none."""
-    six = "CHANNELS 6 Xposition Yposition Zposition Yrotation"
-    text = CHAIN.replace("CHANNELS 3 Yrotation", six)
+def test_bvh_position_channels_of_zeros_leave_the_joint_at_its_offset(tmp_path):
+    """MakeHuman writes position channels on every joint that are displacements, all of them zero."""
+    six_channels = "CHANNELS 6 Xposition Yposition Zposition Yrotation"
+    text = CHAIN.replace("CHANNELS 3 Yrotation", six_channels)
     still = read_text(tmp_path, text.replace(" 40 ", " 0 -0.000001 0.0 40 "))
     np.testing.assert_allclose(still.translations, [[[10, 20, 30], [0, 0, 4]], [[11, 21, 31], [0, 0, 4]]], atol=1e-5)
     moved = read_text(tmp_path, text.replace(" 40 ", " 0 3.9 0.7 40 "))
     np.testing.assert_allclose(moved.translations[:, 1], [[0, 3.9, 0.7]] * 2)
 
 
-def test_rotations_may_stand_before_positions(tmp_path):
+def test_bvh_rotation_channels_may_precede_position_channels(tmp_path):
     text = CHAIN.replace(
         "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation",
         "6 Zrotation Xrotation Yrotation Xposition Yposition Zposition",
     ).replace("10 20 30 10 20 30 40", "10 20 30 10 20 30 40")
-    motion, plain = read_text(tmp_path, text), read_text(tmp_path, CHAIN)
-    np.testing.assert_allclose(motion.rotations[0], plain.rotations[0])
+    motion, reference = read_text(tmp_path, text), read_text(tmp_path, CHAIN)
+    np.testing.assert_allclose(motion.rotations[0], reference.rotations[0])
     np.testing.assert_allclose(motion.translations[0, 0], [10, 20, 30])
 
 
@@ -107,20 +107,22 @@ def test_rotations_may_stand_before_positions(tmp_path):
         lambda text: text.replace("ROOT Hips\n{", "ROOT Hips {"),
     ],
 )
-def test_the_same_motion_written_differently(tmp_path, change):
-    np.testing.assert_array_equal(places(read_text(tmp_path, change(CHAIN))), places(read_text(tmp_path, CHAIN)))
+def test_bvh_formatting_variants_give_the_same_motion(tmp_path, change):
+    np.testing.assert_array_equal(
+        joint_positions(read_text(tmp_path, change(CHAIN))), joint_positions(read_text(tmp_path, CHAIN))
+    )
 
 
-def test_a_joint_may_have_several_ends(tmp_path):
+def test_bvh_joint_may_have_several_end_sites(tmp_path):
     end = "\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 0 0\n\t\t}\n"
     motion = read_text(tmp_path, CHAIN.replace(end, end.replace("0 0 0", "0 -1 -2") + end.replace("0 0 0", "0 -1 5")))
     np.testing.assert_array_equal(motion.tips[1], [0, -1, -2])
     np.testing.assert_array_equal(motion.further_tips[1], [[0, -1, 5]])
     assert motion.of_joints([0, 1]).further_tips.keys() == {1}
-    np.testing.assert_array_equal(places(motion), places(read_text(tmp_path, CHAIN)))
+    np.testing.assert_array_equal(joint_positions(motion), joint_positions(read_text(tmp_path, CHAIN)))
 
 
-def test_one_frame_and_positions_without_rotations(tmp_path):
+def test_bvh_with_one_frame_and_position_channels_alone_is_read(tmp_path):
     text = """HIERARCHY
 ROOT a
 { OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition
@@ -131,11 +133,11 @@ Frame Time: 0.545
 1 2 3 4 5 6
 """
     motion = read_text(tmp_path, text)
-    np.testing.assert_array_equal(places(motion)[0], [[1, 2, 3], [7, 7, 7]])
+    np.testing.assert_array_equal(joint_positions(motion)[0], [[1, 2, 3], [7, 7, 7]])
     assert motion.fps == pytest.approx(1 / 0.545)
 
 
-def test_the_joint_that_travels_need_not_be_the_first(tmp_path):
+def test_bvh_translated_joint_need_not_be_the_root(tmp_path):
     text = """HIERARCHY
 ROOT reference
 { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
@@ -146,24 +148,24 @@ Frame Time: 0.04
 90 0 0 1 0 0 0 0 0
 90 0 0 2 0 0 0 0 0
 """
-    np.testing.assert_allclose(places(read_text(tmp_path, text))[:, 1], [[0, 1, 0], [0, 2, 0]], atol=1e-15)
+    np.testing.assert_allclose(joint_positions(read_text(tmp_path, text))[:, 1], [[0, 1, 0], [0, 2, 0]], atol=1e-15)
 
 
-def test_one_frame_more_than_declared_is_read_and_said(tmp_path):
+def test_bvh_frame_beyond_the_declared_number_is_read_and_remarked(tmp_path):
     motion = read_text(tmp_path, CHAIN.replace("Frames: 2", "Frames: 1"))
-    np.testing.assert_array_equal(places(motion), places(read_text(tmp_path, CHAIN)))
+    np.testing.assert_array_equal(joint_positions(motion), joint_positions(read_text(tmp_path, CHAIN)))
     assert motion.remarks == ("the file has 2 frames, one more than the 1 it declares: the last one is read, too",)
     assert read_text(tmp_path, CHAIN).remarks == ()
 
 
-def test_what_a_reader_remarks_is_in_the_report(tmp_path):
+def test_remarks_of_a_reader_are_in_the_report(tmp_path):
     (tmp_path / "motion.bvh").write_text(BVH.replace("Frames: 2", "Frames: 1"))
     report = load(tmp_path / "motion.bvh").report
     assert report is not None
     assert "the file has 2 frames, one more than the 1 it declares: the last one is read, too" in report.lines()
 
 
-def test_frame_times_are_taken_for_whole_rates_only_when_they_are_rounded_ones(tmp_path):
+def test_bvh_frame_time_gives_a_whole_rate_only_if_it_is_that_rate_rounded(tmp_path):
     rates = {".0083333": 120.0, "0.033333": 30.0, "0.016667": 60.0, "0.008342": 1 / 0.008342, "0.0417083750417": 23.976}
     for written, rate in rates.items():
         assert read_text(tmp_path, CHAIN.replace(".0083333", written)).fps == pytest.approx(rate, rel=1e-9), written
@@ -230,34 +232,36 @@ def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path)
             "\n", "\r\n"
         ),
     )
-    np.testing.assert_allclose(places(radians), places(degrees), atol=1e-12)
+    np.testing.assert_allclose(joint_positions(radians), joint_positions(degrees), atol=1e-12)
     root = Rotation.from_euler("xyz", [40, 50, 60], degrees=True)
     own = Rotation.from_euler("xyz", [10, 20, 30], degrees=True)
     thigh = own * Rotation.from_euler("xz", [15, -25], degrees=True) * own.inv()
     np.testing.assert_allclose(
-        places(degrees)[0, 2], np.array([1, 2, 3]) + (root * thigh).apply([0, -2, 0]), atol=1e-12
+        joint_positions(degrees)[0, 2], np.array([1, 2, 3]) + (root * thigh).apply([0, -2, 0]), atol=1e-12
     )
     np.testing.assert_allclose(degrees.tips[2], [0, -3, 0])
     assert (degrees.fps, degrees.timed) == (120.0, False)
 
 
-def test_the_lines_of_an_asf_s_hierarchy_may_stand_in_any_order(tmp_path):
+def test_asf_hierarchy_lines_may_be_in_any_order(tmp_path):
     asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
     amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25")
     turned = asf.replace("    root thigh\n    thigh shank\n", "    thigh shank\n    root thigh\n")
     assert turned != asf
-    np.testing.assert_array_equal(places(read_acclaim(tmp_path, turned, amc)), places(read_acclaim(tmp_path, asf, amc)))
+    np.testing.assert_array_equal(
+        joint_positions(read_acclaim(tmp_path, turned, amc)), joint_positions(read_acclaim(tmp_path, asf, amc))
+    )
 
 
-def test_amc_frames_may_be_numbered_from_anywhere_at_any_constant_step(tmp_path):
+def test_amc_frame_numbers_may_start_anywhere_with_any_constant_step(tmp_path):
     asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
     amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25")
-    plain = read_acclaim(tmp_path, asf, amc)
+    reference = read_acclaim(tmp_path, asf, amc)
     every_second = read_acclaim(tmp_path, asf, amc.replace("\n1\n", "\n100\n").replace("\n2\n", "\n102\n"))
-    np.testing.assert_array_equal(places(every_second), places(plain))
+    np.testing.assert_array_equal(joint_positions(every_second), joint_positions(reference))
 
 
-def test_a_bone_that_no_amc_frame_mentions_is_not_turned(tmp_path):
+def test_amc_bone_without_values_is_not_rotated_and_remarked(tmp_path):
     asf = ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30")
     amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25").replace("thigh 15 -25\n", "")
     motion = read_acclaim(tmp_path, asf, amc)
@@ -291,13 +295,13 @@ def test_deepmimic_rows_of_unequal_duration_are_resampled(tmp_path):
     np.testing.assert_allclose(2 * np.arcsin(motion.rotations[:, 0, 2]), 0.02 * np.arange(6), atol=1e-6)
 
 
-def test_the_format_is_told_by_content_where_the_suffix_does_not(tmp_path):
+def test_format_is_detected_by_content_if_the_suffix_is_ambiguous(tmp_path):
     assert read_text(tmp_path, CHAIN, name="motion.txt").joints[0] == "Hips"
     text = json.dumps({"Frames": [deepmimic_row(0.1, 0.0, 0.0)]})
     assert read_text(tmp_path, text, name="motion").joints[0] == "root"
 
 
-def test_names_in_other_encodings_are_read(tmp_path):
+def test_bvh_joint_names_in_latin_1_are_read(tmp_path):
     motion = read_text(tmp_path, CHAIN.encode().replace(b"Hips", "Hüfte".encode("latin-1")))
     assert motion.joints[0].startswith("H")
     assert read_bvh(tmp_path / "motion.bvh").n_frames == 2

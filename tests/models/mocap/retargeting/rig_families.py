@@ -1,7 +1,7 @@
-"""What programs call the joints of a body."""
+"""Joint names by program or vendor."""
 
-# Sides; pelvis, abdomen, chest, neck, head; clavicle, upper arm, forearm, hand; thigh, shank, foot, toe. @ is the side,
-# as the family writes it, and ~ a blank in a name.
+# Words for the sides; pelvis, abdomen, chest, neck, head; clavicle, upper arm, forearm, hand, thigh, shank, foot, toe.
+# @ stands for the side's word, and ~ for a blank in a name.
 FAMILIES = {
     "MotionBuilder": ("Left Right", "Hips Spine Spine1 Neck Head",
                 "@Shoulder @Arm @ForeArm @Hand @UpLeg @Leg @Foot @ToeBase"),

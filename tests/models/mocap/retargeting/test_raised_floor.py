@@ -1,4 +1,4 @@
-"""A body that stands on boxes or stairs, of which the file says nothing, or whose place is in another unit."""
+"""Bodies on boxes or stairs that the file does not contain, and root positions in another unit."""
 
 import numpy as np
 import pytest
@@ -12,16 +12,16 @@ from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 
 def climbing(height, first, last):
-    """Laps of a walk around a square, from `first` to `last` of the time over a hill of a height [m]."""
+    """Laps of a walk around a square, over a hill of a height [m] between the shares `first` and `last` of the time."""
     clip = embedded("walk")
     laps, lap = [], clip.poses
     for _ in range(4):
         for _ in range(2):
             laps.append(lap[:-1])
             lap = clip.displacement.moved(lap)
-        here = lap[0, :2]
+        corner = lap[0, :2]
         for degrees in range(6, 96, 6):
-            x, y = here - Rotation.from_euler("z", degrees, degrees=True).as_matrix()[:2, :2] @ here
+            x, y = corner - Rotation.from_euler("z", degrees, degrees=True).as_matrix()[:2, :2] @ corner
             turned = PlanarDisplacement(x, y, np.deg2rad(degrees)).moved(lap)
             laps.append(turned[:1])
         lap = turned
@@ -36,14 +36,14 @@ def report_of(clip, path, zero="upright T"):
     return load(path).report
 
 
-def test_a_body_that_climbs_for_most_of_the_time_tells_what_is_up(tmp_path):
-    """Not even its rig confirms the vertical, but along any other axis it does not stand at all."""
+def test_up_axis_is_found_for_a_body_that_climbs_for_most_of_the_time(tmp_path):
+    """Even without a rig that confirms the vertical: along any other axis the body does not stand at all."""
     report = report_of(climbing(1.5, 0.0, 1.0), tmp_path / "r.bvh", "along X")
     assert report.up == "+Y"
     assert report.confidence > 1.0
 
 
-def test_a_body_that_climbs_leaning_tells_what_is_up_where_its_rig_stands_so_too(tmp_path):
+def test_up_axis_of_a_leaning_climb_is_found_only_if_the_rig_confirms_it(tmp_path):
     leaning = climbing(1.5, 0.0, 1.0)
     turn = Rotation.from_euler("y", 20.0, degrees=True)
     leaning.poses[:, :3] = turn.apply(leaning.poses[:, :3])
@@ -55,7 +55,7 @@ def test_a_body_that_climbs_leaning_tells_what_is_up_where_its_rig_stands_so_too
         report_of(leaning, tmp_path / "r.bvh", "along X")
 
 
-def test_a_body_that_climbs_higher_than_any_studio_does_not_tell_what_is_up(tmp_path):
+def test_up_axis_is_not_determined_for_a_climb_higher_than_any_studio(tmp_path):
     """Its root is in another unit than its bones."""
     write_rig(Rig(zero="along X"), climbing(150.0, 0.0, 1.0), tmp_path / "r.bvh")
     with pytest.raises(MotionFileError, match="the motion does not tell what is up"):
@@ -63,15 +63,15 @@ def test_a_body_that_climbs_higher_than_any_studio_does_not_tell_what_is_up(tmp_
 
 
 @pytest.mark.parametrize("height", [0.2, 1.0])
-def test_a_body_above_the_floor_for_longer_than_a_flight_is_said(height, tmp_path):
+def test_body_above_the_floor_for_longer_than_a_flight_is_remarked(height, tmp_path):
     report = report_of(climbing(height, 0.3, 1.0), tmp_path / "r.bvh")
-    (said,) = [remark for remark in report.remarks if "above the floor" in remark]
-    assert abs(float(said.split("up to ")[1].split(" m ")[0]) - height) < 0.05
-    assert "which no flight lasts" in said
+    (floor_remark,) = [remark for remark in report.remarks if "above the floor" in remark]
+    assert abs(float(floor_remark.split("up to ")[1].split(" m ")[0]) - height) < 0.05
+    assert "which no flight lasts" in floor_remark
 
 
 @pytest.mark.parametrize("name", ["walk", "jump", "backflip", "run"])
-def test_flights_and_steps_are_no_raised_floor(name, tmp_path):
+def test_flights_and_steps_give_no_floor_remark(name, tmp_path):
     report = report_of(embedded(name), tmp_path / "r.bvh")
     assert not [remark for remark in report.remarks if "the floor" in remark]
 
@@ -86,7 +86,7 @@ def test_flight_that_lasts_too_long_reports_the_true_frame_rate(slower, tmp_path
     assert "--frame-rate" in remark
 
 
-def test_feet_that_hang_from_a_root_that_does_not_move_are_told_so():
+def test_root_that_does_not_move_is_given_as_the_reason_for_hanging_feet():
     clearance = np.where(np.arange(400) < 200, 0.0, 0.3)
     (remark,) = floor_remarks(clearance, np.zeros((400, 3)), 100.0, 0)
     assert "its root does not move in the file" in remark
@@ -94,7 +94,7 @@ def test_feet_that_hang_from_a_root_that_does_not_move_are_told_so():
     assert "it stands on something" in remark
 
 
-def test_what_is_beneath_the_floor_is_said_with_its_depth_and_time():
+def test_floor_penetration_is_remarked_with_depth_and_time():
     clearance = np.zeros(200)
     clearance[50:60] = -0.28
     assert list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0)) == [
@@ -105,7 +105,7 @@ def test_what_is_beneath_the_floor_is_said_with_its_depth_and_time():
     assert not list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0))
 
 
-def test_hops_that_follow_each_other_are_no_raised_floor():
-    """Each of them lasts less than a second, however many there are."""
+def test_consecutive_hops_give_no_floor_remark():
+    """Each of them lasts less than a second, for any number of hops."""
     clearance = np.tile(np.concatenate((np.full(90, 0.3), np.zeros(10))), 5)
     assert not list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 100.0, 0))

@@ -13,8 +13,9 @@ from models.mocap.motion.clip import pose_difference
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
+from tests.models.mocap.readers.motion_files import AMC, ASF
 
-# Walk, run, jump, dance and kick, each from skeletons that differ in rest pose, names, axes and units.
+# Walk, run, jump, dance and kick, from skeletons that differ in rest pose, names, axes and units.
 MOTIONS = (
     "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "cmu_amc/02_04.amc", "cmu_bvh/131_03.bvh", "snu/walk.bvh", "snu/run.bvh",
     "snu/dance.bvh", "snu/kick.bvh", "snu/cart.bvh", "deepmimic/humanoid3d_walk.txt", "deepmimic/humanoid3d_run.txt",
@@ -30,8 +31,8 @@ def model():
     return figure_model()
 
 
-def figure_in_the_world(model, clip, frames):
-    """MuJoCo's own kinematics: body positions, and heights of the soles' contact points."""
+def mujoco_kinematics(model, clip, frames):
+    """Body positions, and heights of the contact points of the soles, by MuJoCo."""
     data = mujoco.MjData(model)
     contacts = [model.geom(name).id for name in FOOT_CONTACTS]
     bodies, soles = [], []
@@ -44,33 +45,35 @@ def figure_in_the_world(model, clip, frames):
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_arms_and_legs_point_where_the_sources_do(mocap, model, name):
-    """In a frame that turns with neither file: the angles between limbs, and of each with the line of the hips."""
+def test_limbs_point_in_the_directions_of_the_source(mocap, model, name):
+    """Compared after one rotation of the source's axes that fits all limbs in all frames."""
     motion = read_motion(mocap / name)
     roles = roles_of(motion.joints, motion.parents)
     clip = load(mocap / name).clip
     frames = range(0, motion.n_frames, max(1, motion.n_frames // 60))
-    bodies, _ = figure_in_the_world(model, clip, frames)
+    bodies, _ = mujoco_kinematics(model, clip, frames)
     places = motion.global_positions(motion.global_rotations())[frames]
-    ours, theirs = [], []
+    figure_limbs, source_limbs = [], []
     for side in ("left", "right"):
         for body, child in LIMBS.items():
             limb = f"{side}_{body}"
-            ours.append(bodies[:, BODIES.index(f"{side}_{child}")] - bodies[:, BODIES.index(limb)])
-            theirs.append(places[:, roles.ends[limb]] - places[:, roles.segments[limb]])
-    ours, theirs = (np.stack(x, axis=1) / np.linalg.norm(x, axis=2).T[..., None] for x in (ours, theirs))
+            figure_limbs.append(bodies[:, BODIES.index(f"{side}_{child}")] - bodies[:, BODIES.index(limb)])
+            source_limbs.append(places[:, roles.ends[limb]] - places[:, roles.segments[limb]])
+    figure_limbs, source_limbs = (
+        np.stack(x, axis=1) / np.linalg.norm(x, axis=2).T[..., None] for x in (figure_limbs, source_limbs)
+    )
     # One rotation takes the file's axes to the world's for the whole clip.
-    turn, _ = Rotation.align_vectors(ours.reshape(-1, 3), theirs.reshape(-1, 3))
-    turned = turn.apply(theirs.reshape(-1, 3)).reshape(theirs.shape)
-    angles = np.rad2deg(2 * np.arcsin(np.clip(np.linalg.norm(ours - turned, axis=2) / 2, 0, 1)))
+    axis_turn, _ = Rotation.align_vectors(figure_limbs.reshape(-1, 3), source_limbs.reshape(-1, 3))
+    turned = axis_turn.apply(source_limbs.reshape(-1, 3)).reshape(source_limbs.shape)
+    angles = np.rad2deg(2 * np.arcsin(np.clip(np.linalg.norm(figure_limbs - turned, axis=2) / 2, 0, 1)))
     assert np.median(angles, axis=0).max() < 1.0
     assert angles.max() < 3.0
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_the_figure_stands_on_the_floor_at_the_origin_and_looks_ahead(mocap, model, name):
+def test_figure_stands_on_the_floor_at_the_origin_facing_forwards(mocap, model, name):
     clip = load(mocap / name).clip
-    _, soles = figure_in_the_world(model, clip, range(clip.n_frames))
+    _, soles = mujoco_kinematics(model, clip, range(clip.n_frames))
     lowest = soles.min(axis=1)
     # Frames with a foot on the floor are many, and few go deeper than a shoe's sole.
     assert np.quantile(lowest, 0.05) > -0.05
@@ -83,7 +86,7 @@ def test_the_figure_stands_on_the_floor_at_the_origin_and_looks_ahead(mocap, mod
 
 
 @pytest.mark.parametrize("name", [name for name in MOTIONS if "bvh_test" not in name and "Geno" not in name])
-def test_knees_and_elbows_bend_as_a_humans(mocap, name):
+def test_knees_and_elbows_bend_in_human_directions(mocap, name):
     clip = load(mocap / name).clip
     joints = {joint: quaternions.logarithm(clip.poses[:, 3 + 4 * k : 7 + 4 * k]) for k, joint in enumerate(BODIES)}
     for side, sign in (("left", -1.0), ("right", 1.0)):
@@ -94,8 +97,8 @@ def test_knees_and_elbows_bend_as_a_humans(mocap, name):
         assert (sign * elbow[bent, 2] > -np.deg2rad(10)).all() or "snu/kick" in name, side
 
 
-def test_amc_and_bvh_of_one_motion_give_one_clip(mocap):
-    """The BVH's first frame is a rest pose, which is left out."""
+def test_amc_and_bvh_of_one_motion_give_the_same_clip(mocap):
+    """The first frame of the BVH is a rest pose, which is dropped."""
     amc, (bvh, report, _) = load(mocap / "cmu_amc/01_01.amc").clip, load(mocap / "cmu_amc/01_01.bvh")
     assert report.dropped == 1
     assert "left out: the first frame" in "\n".join(report.lines())
@@ -108,10 +111,10 @@ def test_amc_and_bvh_of_one_motion_give_one_clip(mocap):
     np.testing.assert_allclose(bvh.poses[:, :3], amc.poses[:, :3], atol=1e-2)
 
 
-def test_a_flight_keeps_its_parabola(mocap, model):
+def test_centre_of_mass_of_a_flight_keeps_its_parabola(mocap, model):
     """CMU's jump: the figure's centre of mass falls with g times its size over the performer's."""
     clip, report, _ = load(mocap / "cmu_amc/02_04.amc")
-    _, soles = figure_in_the_world(model, clip, range(clip.n_frames))
+    _, soles = mujoco_kinematics(model, clip, range(clip.n_frames))
     flying = np.flatnonzero(soles.min(axis=1) > 0.1)
     data, heights = mujoco.MjData(model), []
     for pose in clip.poses[flying]:
@@ -135,54 +138,56 @@ def test_a_flight_keeps_its_parabola(mocap, model):
         ("quirks/bvh_test3.bvh", "+Z", "+Y", "inches"),
     ],
 )
-def test_axes_and_units_are_worked_out_and_said(mocap, name, up, facing, unit):
+def test_axes_and_unit_are_inferred_and_reported(mocap, name, up, facing, unit):
     _, report, _ = load(mocap / name)
     assert (report.up, report.facing) == (up, facing)
     assert report.unit.startswith(unit)
-    said = "\n".join(report.lines())
-    assert up in said
-    assert unit in said
+    report_text = "\n".join(report.lines())
+    assert up in report_text
+    assert unit in report_text
 
 
-def test_the_same_clip_in_two_units_gives_the_same_steps(mocap):
+def test_clip_in_two_units_gives_the_same_motion(mocap):
     """Both hold the performer of 131_03; the second, in metres, goes on for 146 frames."""
     small, large = (read_motion(mocap / f"cmu_bvh/{name}131_03.bvh") for name in ("", "scaled_"))
     n = small.n_frames
     large = replace(large, rotations=large.rotations[:n], translations=large.translations[:n])
-    ours, theirs = (retarget(motion, roles_of(motion.joints, motion.parents))[0] for motion in (small, large))
-    np.testing.assert_allclose(pose_difference(ours.poses, theirs.poses), 0.0, atol=5e-3)
+    first, second = (retarget(motion, roles_of(motion.joints, motion.parents))[0] for motion in (small, large))
+    np.testing.assert_allclose(pose_difference(first.poses, second.poses), 0.0, atol=5e-3)
 
 
-AXES = [turn for turn in Rotation.create_group("O") if turn.magnitude() > 0.1]
+AXES = [axis_turn for axis_turn in Rotation.create_group("O") if axis_turn.magnitude() > 0.1]
 
 
-@pytest.mark.parametrize("turn", AXES[::4], ids=[str(turn.as_rotvec(degrees=True).round()) for turn in AXES[::4]])
-def test_any_axes_and_any_unit_give_the_same_clip(mocap, turn):
+@pytest.mark.parametrize(
+    "axis_turn", AXES[::4], ids=[str(axis_turn.as_rotvec(degrees=True).round()) for axis_turn in AXES[::4]]
+)
+def test_any_axes_and_any_unit_give_the_same_clip(mocap, axis_turn):
     motion = read_motion(mocap / "snu/run.bvh")
     roles = roles_of(motion.joints, motion.parents)
-    q = turn.as_quat(scalar_first=True)
+    q = axis_turn.as_quat(scalar_first=True)
     other = replace(
         motion,
-        offsets=100 * turn.apply(motion.offsets),
-        tips=100 * turn.apply(motion.tips),
+        offsets=100 * axis_turn.apply(motion.offsets),
+        tips=100 * axis_turn.apply(motion.tips),
         translations=100 * quaternions.rotated(q, motion.translations),
         rotations=quaternions.product(quaternions.product(q, motion.rotations), quaternions.conjugate(q)),
     )
-    (clip, report), (same, turned) = retarget(motion, roles), retarget(other, roles)
-    np.testing.assert_allclose(pose_difference(clip.poses, same.poses), 0.0, atol=1e-9)
-    assert turned.scale == pytest.approx(report.scale / 100)
-    sign, axis = np.sign(turn.apply([0, 1, 0]).sum()), int(np.argmax(np.abs(turn.apply([0, 1, 0]))))
-    assert turned.up == f"{'+' if sign > 0 else '−'}{'XYZ'[axis]}"
+    (clip, report), (clip_of_other, report_of_other) = retarget(motion, roles), retarget(other, roles)
+    np.testing.assert_allclose(pose_difference(clip.poses, clip_of_other.poses), 0.0, atol=1e-9)
+    assert report_of_other.scale == pytest.approx(report.scale / 100)
+    sign, axis = np.sign(axis_turn.apply([0, 1, 0]).sum()), int(np.argmax(np.abs(axis_turn.apply([0, 1, 0]))))
+    assert report_of_other.up == f"{'+' if sign > 0 else '−'}{'XYZ'[axis]}"
 
 
-def test_junk_is_listed_and_does_not_take_a_part(mocap):
+def test_foreign_joints_are_listed_as_unused_and_take_no_role(mocap):
     _, report, _ = load(mocap / "snu/kick.bvh")
     assert {"R_Foot", "R_Tibia", "L_Humerus", "Torso"} <= set(report.unused)
     assert report.taken["right_shank"] == "Character1_RightLeg"
     assert report.missing == ()
 
 
-def test_a_dozen_of_the_joints_that_are_not_used_are_named_and_all_are_counted(mocap):
+def test_report_names_twelve_unused_joints_and_counts_all(mocap):
     _, report, _ = load(mocap / "snu/kick.bvh")
     (line,) = (
         line for line in report._replace(unused=tuple(f"face{k}" for k in range(145))).lines() if "unused" in line
@@ -237,9 +242,9 @@ SKELETONS = {
 PARENTS = (-1, 0, 1, 2, 3, 4, 3, 6, 7, 8, 3, 10, 11, 12, 1, 14, 15, 16, 1, 18, 19, 20)
 
 
-@pytest.mark.parametrize("kind", SKELETONS)
-def test_names_of_every_family_are_known(kind):
-    roles = roles_of(SKELETONS[kind], PARENTS)
+@pytest.mark.parametrize("family", SKELETONS)
+def test_joint_names_of_skeleton_families_get_their_roles(family):
+    roles = roles_of(SKELETONS[family], PARENTS)
     assert not isinstance(roles, str), roles
     expected = (1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 19, 20)
     assert tuple(roles.segments[body] for body in BODIES) == expected
@@ -247,21 +252,21 @@ def test_names_of_every_family_are_known(kind):
     assert roles.ends["right_forearm"] == 13
 
 
-def test_a_rest_pose_with_hanging_arms_becomes_hanging_arms(mocap, model):
+def test_rest_pose_with_hanging_arms_keeps_them_hanging(mocap, model):
     """Zero rotations of DeepMimic's humanoid: arms and legs straight down, soles level."""
     motion = read_motion(mocap / "deepmimic/humanoid3d_walk.txt")
     still = np.zeros_like(motion.rotations[:1])
     still[..., 0] = 1.0
     rest = replace(motion, rotations=still, translations=motion.translations[:1])
     clip, _ = retarget(rest, roles_of(motion.joints, motion.parents))
-    bodies, soles = figure_in_the_world(model, clip, [0])
+    bodies, soles = mujoco_kinematics(model, clip, [0])
     for side in ("left", "right"):
         arm = bodies[0, BODIES.index(f"{side}_hand")] - bodies[0, BODIES.index(f"{side}_upper_arm")]
         np.testing.assert_allclose(arm / np.linalg.norm(arm), [0, 0, -1], atol=1e-9)
     np.testing.assert_allclose(soles, 0.0, atol=1e-9)
 
 
-def test_what_is_no_human_is_refused_in_one_line(mocap):
+def test_skeleton_without_legs_is_refused(mocap):
     with pytest.raises(
         MotionFileError, match=r"sinusoidal.bvh:1: no joint is taken for the left_thigh \(among base, ch"
     ):
@@ -278,3 +283,16 @@ def test_joints_moved_by_positions_alone_are_refused(mocap, tmp_path):
     (tmp_path / "positions.bvh").write_text("\n".join([header + "MOTION", "Frames: 2", "Frame Time: 0.1", *lines]))
     with pytest.raises(MotionFileError, match="moved by positions alone; expected rotation channels"):
         load(tmp_path / "positions.bvh")
+
+
+NON_HUMAN_LEGS = "which are no human's: the file's unit is another"
+
+
+@pytest.mark.parametrize(("length", "human"), [("0.45", True), ("0.01", False), ("45", False), ("1", True)])
+def test_unit_of_the_format_is_doubted_if_it_gives_legs_of_no_human(tmp_path, length, human):
+    (tmp_path / "1.asf").write_text(ASF.replace("length 0.45", f"length {length}"))
+    (tmp_path / "1_1.amc").write_text(AMC)
+    report = load(tmp_path / "1_1.amc").report
+    assert report is not None
+    assert "(the format says so), legs" in report.unit
+    assert (NON_HUMAN_LEGS in report.unit) != human

@@ -8,7 +8,7 @@ from models.mocap.retargeting.skeleton_roles import roles_of
 
 
 def tree(text):
-    """Joints and parents of a skeleton in lines of chains; a chain begins with a joint of an earlier one."""
+    """Joints and parents of a skeleton given as lines of chains; a chain starts at a joint of an earlier one."""
     joints, parents = [], []
     for line in text.strip().splitlines():
         chain = line.split()
@@ -19,7 +19,7 @@ def tree(text):
     return tuple(joints), tuple(parents)
 
 
-def taken(text):
+def joints_by_role(text):
     joints, parents = tree(text)
     roles = roles_of(joints, parents)
     assert not isinstance(roles, str), roles
@@ -28,8 +28,8 @@ def taken(text):
     }
 
 
-def both(text, left, right):
-    """Lines with @ for either side."""
+def with_both_sides(text, left, right):
+    """The text with every line that contains @ repeated for the left and the right side."""
     lines = text.strip().splitlines()
     return "\n".join(line.replace("@", side) for line in lines for side in ((left, right) if "@" in line else ("",)))
 
@@ -37,7 +37,7 @@ def both(text, left, right):
 # Trees of rigs as vendors ship them, shortened, and the joints of the left side and the middle, in the order of PARTS.
 PARTS = ("pelvis", "abdomen", "chest", "head", "left_clavicle", "left_upper_arm", "left_forearm", "left_hand",
          "left_thigh", "left_shank", "left_foot", "end of left_foot")  # fmt: skip
-RIGS = {
+VENDOR_RIGS = {
     "MMD": (
         """センター 上半身 上半身2 首 頭 左目
         上半身2 @肩P @肩 @肩C @腕 @腕捩 @ひじ @手捩 @手首 @人指１
@@ -150,10 +150,10 @@ RIGS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", RIGS)
-def test_rigs_as_they_are_shipped(kind):
-    text, sides, expected = RIGS[kind]
-    found = taken(both(text, *sides.split()))
+@pytest.mark.parametrize("rig", VENDOR_RIGS)
+def test_joints_of_vendor_rigs_get_the_expected_roles(rig):
+    text, sides, expected = VENDOR_RIGS[rig]
+    found = joints_by_role(with_both_sides(text, *sides.split()))
     assert [found.get(part, "-") for part in PARTS] == expected.split()
     assert {part.replace("left", "right") for part in found} == {part.replace("left", "right") for part in found
             if "left" not in part}  # fmt: skip
@@ -170,7 +170,7 @@ def test_rigs_as_they_are_shipped(kind):
         ("Head_M", "", "head"), ("左ひざ", "left", "knee"), ("thigh_stretch.l", "left", "thigh"), ("001", "", ""),
     ],
 )  # fmt: skip
-def test_sides_and_words_of_a_name(joint, side, bare):
+def test_joint_name_is_split_into_side_and_word(joint, side, bare):
     sided = frozenset(("arm", "farm", "femur", "leg", "thigh", "collar", "upleg", "forearm", "ball", "knee"))
     (name,) = joint_names((joint,), sided, frozenset(("head",)))
     assert (name.side, name.bare) == (side, bare)
@@ -180,42 +180,42 @@ LEGS = "hips @Thigh @Shin @Foot\nhips spine chest neck head\n"
 
 
 @pytest.mark.parametrize(
-    ("arms", "refused"),
+    ("arms", "message"),
     [
         ("chest @Arm @Cubitus @Hand", "left_forearm, though leftCubitus is below leftArm"),
         ("chest @Arm @Forearm @Manus", "left_hand, though leftManus is below leftForearm"),
-        # A forearm that hangs on the chest is none of this arm.
+        # A forearm whose parent is the chest does not belong to this arm.
         ("chest @Arm @Middle @Hand\nchest @Forearm", "left_forearm, though leftMiddle is below leftArm"),
     ],
 )
-def test_a_limb_that_goes_on_by_an_unknown_name_is_refused(arms, refused):
-    assert roles_of(*tree(both(LEGS + arms, "left", "right"))) == refused
+def test_arm_with_an_unknown_joint_name_is_refused(arms, message):
+    assert roles_of(*tree(with_both_sides(LEGS + arms, "left", "right"))) == message
 
 
-def test_a_leg_that_goes_on_by_an_unknown_name_is_refused():
-    text = both("hips @Thigh @Shin @Pes @Toe", "left", "right")
+def test_leg_with_an_unknown_joint_name_is_refused():
+    text = with_both_sides("hips @Thigh @Shin @Pes @Toe", "left", "right")
     assert roles_of(*tree(text)) == "left_foot, though leftPes is below leftShin"
 
 
-def test_what_is_right_below_a_shank_is_the_foot_though_it_is_called_a_toe():
-    found = taken(both("hips @Thigh @Shin @Toe @ToeEnd\nhips spine chest", "left", "right"))
+def test_joint_directly_below_the_shank_is_the_foot_even_if_named_toe():
+    found = joints_by_role(with_both_sides("hips @Thigh @Shin @Toe @ToeEnd\nhips spine chest", "left", "right"))
     assert found["left_foot"] == "leftToe"
-    found = taken(both("hips @Thigh @Shin @Foot @Toe\nhips spine chest", "left", "right"))
+    found = joints_by_role(with_both_sides("hips @Thigh @Shin @Foot @Toe\nhips spine chest", "left", "right"))
     assert found["left_foot"] == "leftFoot"
 
 
-def test_legs_in_numbers_are_not_guessed():
+def test_numbered_leg_joints_are_refused():
     """Whether leg 1 is the thigh, or leg 2 its twist, cannot be told."""
-    assert roles_of(*tree(both("hips @Leg1 @Leg2 @Leg3 @Foot", "left", "right"))) == "left_thigh"
+    assert roles_of(*tree(with_both_sides("hips @Leg1 @Leg2 @Leg3 @Foot", "left", "right"))) == "left_thigh"
 
 
-def test_a_hand_of_the_other_arm_is_no_match():
-    joints, parents = tree(both(LEGS + "chest @Arm @Forearm", "left", "right"))
+def test_hand_below_the_forearm_of_the_other_side_is_refused():
+    joints, parents = tree(with_both_sides(LEGS + "chest @Arm @Forearm", "left", "right"))
     crossed = (*joints, "leftHand", "rightHand")
     parents = (*parents, joints.index("rightForearm"), joints.index("leftForearm"))
     assert roles_of(crossed, parents) == "left_hand, though rightHand is below leftForearm"
 
 
-def test_all_bodies_of_the_figure_are_found():
-    found = taken(both(LEGS + "chest @Shoulder @Arm @Forearm @Hand", "left", "right"))
+def test_complete_rig_has_joints_for_all_bodies_of_the_figure():
+    found = joints_by_role(with_both_sides(LEGS + "chest @Shoulder @Arm @Forearm @Hand", "left", "right"))
     assert set(BODIES) <= found.keys()

@@ -1,4 +1,4 @@
-"""Roles that a person states: the same motion as by names, or an error that says what would be right."""
+"""Role files: the same motion as by joint names, or an error that names the valid choices."""
 
 import re
 
@@ -16,8 +16,8 @@ JOINT = re.compile(r"(ROOT|JOINT) (\S+)")
 
 
 @pytest.fixture
-def rig(tmp_path):
-    """The same rig twice, with a vendor's names and with numbers; and the roles of the second, by its joints."""
+def named_and_numbered(tmp_path):
+    """One rig with the joint names of a vendor and with numbers, and the joint of each role in the second."""
     walk = embedded("walk")
     path, bare = tmp_path / "named.bvh", tmp_path / "bare.bvh"
     write_rig(Rig(zero="random", twists="{}Twist", fingers=True), Clip(walk.poses[::3], walk.fps / 3, "walk"), path)
@@ -29,34 +29,34 @@ def rig(tmp_path):
     return path, bare, {role: numbers[joint] for role, joint in (report.taken | toes).items()}
 
 
-def written(roles, tmp_path):
+def write_role_file(roles, tmp_path):
     path = tmp_path / "roles.toml"
     path.write_text("".join(f'{role} = "{joint}"\n' for role, joint in roles.items()))
     return path
 
 
-def test_stated_roles_give_the_motion_that_names_give(rig, tmp_path):
-    named, bare, roles = rig
+def test_role_file_gives_the_same_motion_as_joint_names(named_and_numbered, tmp_path):
+    named, bare, roles = named_and_numbered
     with pytest.raises(MotionFileError, match=r"no joint is taken for the left_thigh \(among .*--roles FILE"):
         load(bare)
-    ours = load(bare, Hints(roles=written(roles, tmp_path))).clip
-    np.testing.assert_allclose(ours.poses, load(named).clip.poses, atol=1e-12)
+    by_roles = load(bare, Hints(roles=write_role_file(roles, tmp_path))).clip
+    np.testing.assert_allclose(by_roles.poses, load(named).clip.poses, atol=1e-12)
 
 
-def test_the_middle_of_the_body_may_be_left_out(rig, tmp_path):
-    _, bare, roles = rig
+def test_role_file_may_omit_the_trunk_and_head(named_and_numbered, tmp_path):
+    _, bare, roles = named_and_numbered
     limbs = {role: joint for role, joint in roles.items() if role.startswith(("left", "right"))}
-    report = load(bare, Hints(roles=written(limbs, tmp_path))).report
+    report = load(bare, Hints(roles=write_role_file(limbs, tmp_path))).report
     assert report.taken == {role: joint for role, joint in roles.items() if "toe" not in role and role != "head"}
     assert report.missing == ("head (follows chest)",)
 
 
-def changed(roles, **changes):
+def with_changes(roles, **changes):
     return {role: joint for role, joint in (roles | changes).items() if joint is not None}
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"left_knee": "Bone.001"}, r"roles.toml: no role 'left_knee'; expected one of pelvis, abdomen, .*left_toe"),
         ({"left_thigh": "Bone.999"}, r"left_thigh: no joint of bare.bvh called 'Bone.999'; expected one of Bone.000"),
@@ -64,51 +64,51 @@ def changed(roles, **changes):
         ({"left_toe": "Bone.000"}, r"Bone.000 is both pelvis and left_toe; expected a joint for one role"),
     ],
 )
-def test_errors_say_what_would_be_right(rig, tmp_path, capsys, changes, said):
-    _, bare, roles = rig
-    path = written(changed(roles, **changes), tmp_path)
+def test_error_of_an_invalid_role_names_the_valid_choices(named_and_numbered, tmp_path, capsys, changes, message):
+    _, bare, roles = named_and_numbered
+    path = write_role_file(with_changes(roles, **changes), tmp_path)
     for command in ("convert", "prepare"):
         assert main([command, str(bare), str(tmp_path / "out.bvh"), "--roles", str(path)]) == 2
-        assert re.search(said, capsys.readouterr().err)
+        assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / "out.bvh").exists()
 
 
-def test_parts_of_a_limb_in_the_wrong_order_are_refused(rig, tmp_path):
-    _, bare, roles = rig
-    swapped = changed(roles, left_forearm=roles["left_hand"], left_hand=roles["left_forearm"])
+def test_parts_of_a_limb_in_the_wrong_order_are_refused(named_and_numbered, tmp_path):
+    _, bare, roles = named_and_numbered
+    swapped = with_changes(roles, left_forearm=roles["left_hand"], left_hand=roles["left_forearm"])
     with pytest.raises(MotionFileError, match=r"is above .* in the skeleton; expected clavicle and then upper_arm and"):
-        load(bare, Hints(roles=written(swapped, tmp_path)))
+        load(bare, Hints(roles=write_role_file(swapped, tmp_path)))
 
 
 @pytest.mark.parametrize("text", ["left_thigh = Bone", "left_thigh = 3", "[roles]\nleft_thigh = 'a'", ""])
-def test_a_file_of_another_form_is_refused(rig, tmp_path, text):
+def test_role_file_of_another_format_is_refused(named_and_numbered, tmp_path, text):
     (tmp_path / "roles.toml").write_text(text)
     with pytest.raises(MotionFileError, match=r"roles.toml"):
-        load(rig[1], Hints(roles=tmp_path / "roles.toml"))
+        load(named_and_numbered[1], Hints(roles=tmp_path / "roles.toml"))
 
 
-@pytest.mark.parametrize(("size", "said"), [(None, "a readable role file"), (0, "a role file"),
+@pytest.mark.parametrize(("size", "message"), [(None, "a readable role file"), (0, "a role file"),
                                             (200_000, "a role file of at most 0.1 MB")])  # fmt: skip
-def test_what_is_no_role_file_is_said_to_be_none(rig, tmp_path, size, said):
+def test_missing_empty_or_oversized_role_file_is_refused(named_and_numbered, tmp_path, size, message):
     path = tmp_path / "roles.toml"
     if size is not None:
         path.write_bytes(b"#" * size)
-    with pytest.raises(MotionFileError, match=rf"roles.toml.*; expected {said}$"):
-        load(rig[1], Hints(roles=path))
+    with pytest.raises(MotionFileError, match=rf"roles.toml.*; expected {message}$"):
+        load(named_and_numbered[1], Hints(roles=path))
 
 
-def test_names_that_two_joints_have_are_refused(rig, tmp_path):
-    _, bare, roles = rig
+def test_joint_name_that_two_joints_have_is_refused(named_and_numbered, tmp_path):
+    _, bare, roles = named_and_numbered
     bare.write_text(bare.read_text().replace(f"{roles['right_shank']}\n", f"{roles['left_shank']}\n"))
     with pytest.raises(MotionFileError, match=r"left_shank: 2 joints of bare.bvh called"):
-        load(bare, Hints(roles=written(roles, tmp_path)))
+        load(bare, Hints(roles=write_role_file(roles, tmp_path)))
 
 
-def test_a_joint_that_names_call_otherwise_can_be_stated(mocap, tmp_path):
-    """CMU's hand beyond the wrist, and the wrist as the forearm's end."""
+def test_role_file_may_state_toes_and_wrists_of_a_capture(mocap, tmp_path):
+    """In CMU's skeleton the hand is beyond the wrist, and the wrist is the end of the forearm."""
     source = mocap / "cmu_amc/02_01.amc"
     loaded = load(source)
     ends = {f"{side}_{end}": f"{side[0]}{joint}" for side in ("left", "right")
             for end, joint in (("toe", "toes"), ("wrist", "wrist"))}  # fmt: skip
-    ours = load(source, Hints(roles=written(loaded.report.taken | ends, tmp_path)))
-    np.testing.assert_allclose(ours.clip.poses, loaded.clip.poses, atol=1e-12)
+    by_roles = load(source, Hints(roles=write_role_file(loaded.report.taken | ends, tmp_path)))
+    np.testing.assert_allclose(by_roles.clip.poses, loaded.clip.poses, atol=1e-12)

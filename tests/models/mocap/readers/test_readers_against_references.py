@@ -1,4 +1,4 @@
-"""Joint positions against readers by other people, or against a second derivation where there is none."""
+"""Joint positions against third-party readers, or against an independent derivation where there is none."""
 
 from pathlib import Path
 
@@ -38,28 +38,28 @@ def positions_of(motion):
     return motion.global_positions(motion.global_rotations())
 
 
-def test_the_list_of_files_is_complete(mocap):
+def test_list_of_bvh_files_is_complete(mocap):
     assert sorted(str(path.relative_to(mocap)) for path in mocap.glob("**/*.bvh")) == sorted(BVH_FILES)
 
 
 @pytest.mark.parametrize("name", [name for name in BVH_FILES if name != POSITION_CHANNELS_ON_EVERY_JOINT])
 @pytest.mark.filterwarnings("ignore:Rest pose suggests")
-def test_bvh_joint_positions_are_pybvhs(mocap, name):
+def test_bvh_joint_positions_match_pybvh(mocap, name):
     pybvh = pytest.importorskip("pybvh")
-    motion, other = read_bvh(mocap / name), pybvh.read_bvh_file(str(mocap / name))
-    assert list(motion.joints) == other.joint_names
-    assert np.abs(positions_of(motion) - other.joint_positions()).max() <= 1e-6 * stature(motion)
-    assert motion.fps == pytest.approx(1.0 / other.frame_time, rel=5e-5)
+    motion, reference = read_bvh(mocap / name), pybvh.read_bvh_file(str(mocap / name))
+    assert list(motion.joints) == reference.joint_names
+    assert np.abs(positions_of(motion) - reference.joint_positions()).max() <= 1e-6 * stature(motion)
+    assert motion.fps == pytest.approx(1.0 / reference.frame_time, rel=5e-5)
 
 
 @pytest.mark.parametrize("name", [*SHORT_FILES, *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FILES)])
-def test_bvh_joint_positions_are_bvhios(mocap, name):
+def test_bvh_joint_positions_match_bvhio(mocap, name):
     bvhio = pytest.importorskip("bvhio")
     motion = read_bvh(mocap / name)
-    other, positions = bvhio.readAsHierarchy(str(mocap / name)), positions_of(motion)
+    reference, positions = bvhio.readAsHierarchy(str(mocap / name)), positions_of(motion)
     for frame in sorted({0, motion.n_frames // 2, motion.n_frames - 1}):
-        other.loadPose(frame)
-        expected = {joint.Name: np.array(joint.PositionWorld) for joint, _, _ in other.layout()}
+        reference.loadPose(frame)
+        expected = {joint.Name: np.array(joint.PositionWorld) for joint, _, _ in reference.layout()}
         for joint, position in zip(motion.joints, positions[frame], strict=True):
             # It computes in single precision: seven digits of wherever the figure stands.
             error = np.abs(position - expected[joint]).max()
@@ -67,7 +67,7 @@ def test_bvh_joint_positions_are_bvhios(mocap, name):
 
 
 def matrix_positions(asf: Path, amc: Path):
-    """ASF/AMC a second time: regular expressions and matrices, bone by bone, as in Lander's description."""
+    """Joint positions of an ASF/AMC by regular expressions and matrices, bone by bone, as in Lander's description."""
     import re
 
     text = asf.read_text().replace("\r", "")
@@ -89,21 +89,21 @@ def matrix_positions(asf: Path, amc: Path):
         root = values["root"]
         places = {"root": root[:3]}
 
-        def place(parent, start, turn, values=values, places=places):
+        def place_children(parent, start, turn, values=values, places=places):
             for name in children.get(parent, []):
                 bone, axis, dof = bones[name]
                 angles = np.zeros(3)
                 angles[dof] = values.get(name, np.zeros(0))
-                there = turn @ axis @ Rotation.from_euler("xyz", angles, degrees=True).as_matrix() @ axis.T
+                child_rotation = turn @ axis @ Rotation.from_euler("xyz", angles, degrees=True).as_matrix() @ axis.T
                 places[name] = start
-                place(name, start + there @ bone, there)
+                place_children(name, start + child_rotation @ bone, child_rotation)
 
-        place("root", root[:3], Rotation.from_euler("xyz", root[3:], degrees=True).as_matrix())
+        place_children("root", root[:3], Rotation.from_euler("xyz", root[3:], degrees=True).as_matrix())
         yield places
 
 
 @pytest.mark.parametrize("name", ["02_01", "02_03", "02_04", "16_09"])
-def test_amc_joint_positions_are_those_of_a_second_derivation(mocap, name):
+def test_amc_joint_positions_match_an_independent_derivation(mocap, name):
     folder = mocap / "cmu_amc"
     motion = read_amc(folder / f"{name}.amc")
     positions = positions_of(motion)
@@ -118,7 +118,7 @@ def test_amc_joint_positions_are_those_of_a_second_derivation(mocap, name):
     assert motion.unit == pytest.approx(0.0254 / 0.45)
 
 
-def test_amc_and_bvh_of_one_motion_turn_every_bone_alike(mocap):
+def test_amc_and_bvh_of_one_motion_have_equal_bone_rotations(mocap):
     """The BVH prepends a frame, and leaves out the bone from thorax to neck; rotations and legs are the same."""
     amc, bvh = read_amc(mocap / "cmu_amc/01_01.amc"), read_bvh(mocap / "cmu_amc/01_01.bvh")
     assert bvh.n_frames == amc.n_frames + 1
@@ -128,18 +128,18 @@ def test_amc_and_bvh_of_one_motion_turn_every_bone_alike(mocap):
         "upperback": "Spine", "thorax": "Spine1", "lclavicle": "LeftShoulder", "lhumerus": "LeftArm",
         "lradius": "LeftForeArm", "lwrist": "LeftHand", "lhand": "LeftFingerBase", "rradius": "RightForeArm",
     }  # fmt: skip
-    ours, theirs = amc.global_rotations(), bvh.global_rotations()[1:]
-    places, their_places = amc.global_positions(ours), positions_of(bvh)[1:]
+    amc_rotations, bvh_rotations = amc.global_rotations(), bvh.global_rotations()[1:]
+    amc_positions, bvh_positions = amc.global_positions(amc_rotations), positions_of(bvh)[1:]
     for bone, joint in names.items():
         i, j = amc.joints.index(bone), bvh.joints.index(joint)
-        turns = quaternions.product(quaternions.conjugate(ours[:, i]), theirs[:, j])
+        turns = quaternions.product(quaternions.conjugate(amc_rotations[:, i]), bvh_rotations[:, j])
         # Angles have four decimals of a degree in one file and six digits in the other.
         assert np.linalg.norm(quaternions.logarithm(turns), axis=1).max() < 2e-5, bone
         if bone in ("root", "lfemur", "ltibia", "lfoot", "ltoes"):
-            assert np.abs(places[:, i] - their_places[:, j]).max() < 2e-4, bone
+            assert np.abs(amc_positions[:, i] - bvh_positions[:, j]).max() < 2e-4, bone
 
 
-def test_deepmimic_joint_positions_are_those_of_a_second_derivation(mocap):
+def test_deepmimic_joint_positions_match_an_independent_derivation(mocap):
     """Scipy's rotations along the chains of the character file, by name."""
     import json
 
@@ -172,7 +172,7 @@ def test_deepmimic_joint_positions_are_those_of_a_second_derivation(mocap):
             assert np.abs(positions[k] - expected).max() <= 1e-6 * 1.6, path.name
 
 
-def test_deepmimics_own_humanoid_is_that_of_the_character_file(mocap, tmp_path):
+def test_default_deepmimic_humanoid_matches_the_character_file(mocap, tmp_path):
     original = mocap / "deepmimic/humanoid3d_walk.txt"
     (tmp_path / "walk.txt").write_bytes(original.read_bytes())
     with_file, without = read_motion(original), read_motion(tmp_path / "walk.txt")
