@@ -85,7 +85,7 @@ def test_time_starts_at_zero_and_advances_by_the_period(make) -> None:
     np.testing.assert_allclose(make().ticks(6)["t"], np.arange(6) * 1e-3, atol=1e-12)
 
 
-def test_a_hand_is_finite_with_a_unit_quaternion(make) -> None:
+def test_hand_state_is_finite_with_unit_quaternion(make) -> None:
     ticks = make().ticks(TICKS)
     assert all(np.isfinite(channel).all() for channel in ticks.values())
     np.testing.assert_allclose(np.linalg.norm(ticks["quaternion"], axis=1), 1.0, atol=1e-9)
@@ -93,7 +93,7 @@ def test_a_hand_is_finite_with_a_unit_quaternion(make) -> None:
     assert not ticks["gaps"].any()
 
 
-def test_reading_again_in_the_same_tick_tells_the_same(make) -> None:
+def test_reading_twice_in_one_tick_returns_the_same_state(make) -> None:
     made = make()
     made.ticks(20)
     if made.before_tick is not None:
@@ -114,7 +114,7 @@ def test_velocity_is_the_rate_of_position(make) -> None:
     np.testing.assert_allclose(integrated, covered, atol=0.1 * np.linalg.norm(covered))
 
 
-def test_a_force_that_is_not_finite_never_reaches_the_motors_and_is_latched(make) -> None:
+def test_force_that_is_not_finite_is_latched_and_never_reaches_the_motors(make) -> None:
     program = follow_program()
     made = make(program=program)
     made.ticks(10)
@@ -126,7 +126,7 @@ def test_a_force_that_is_not_finite_never_reaches_the_motors_and_is_latched(make
     assert (ticks["fault"] == Fault.FORCE_NOT_FINITE).all()
 
 
-def test_after_a_fault_the_motors_stay_off_until_the_servo_is_rearmed_and_the_force_comes_back_slowly(make) -> None:
+def test_motors_stay_off_until_rearmed_and_then_force_ramps_in(make) -> None:
     made = make()
     made.ticks(10)
     made.servo.field.limiter[0] = np.nan
@@ -142,13 +142,13 @@ def test_after_a_fault_the_motors_stay_off_until_the_servo_is_rearmed_and_the_fo
     assert np.abs(np.diff(size)).max() < 0.2
 
 
-def test_a_run_is_the_same_again(make) -> None:
+def test_repeated_runs_are_identical(make) -> None:
     first, second = make().ticks(TICKS), make().ticks(TICKS)
     for name, channel in first.items():
         np.testing.assert_array_equal(channel, second[name], err_msg=name)
 
 
-def test_what_is_recorded_can_be_replayed(make, tmp_path: Path) -> None:
+def test_recording_replays_to_the_same_positions(make, tmp_path: Path) -> None:
     made = make()
     with Recorder(tmp_path / "run.h5", {}, 1, groups(made.servo), {}) as recorder:
         loop = Loop(made.servo, made.world, record_into(recorder, made.servo, made.world), before_tick=made.before_tick)
@@ -160,14 +160,14 @@ def test_what_is_recorded_can_be_replayed(make, tmp_path: Path) -> None:
         np.testing.assert_array_equal(again["p"], recording.channel("ticks", "p")[:])
 
 
-def test_the_linkage_is_shown_where_the_hand_is(make) -> None:
+def test_displayed_linkage_tip_is_at_the_hand_position(make) -> None:
     made = make()
     made.ticks(100)
     tip = made.world.data.site("phantom/tip").xpos - made.world.data.body("phantom/base").xpos
     np.testing.assert_allclose(tip, made.servo.device.hand[1:4], atol=5e-4)
 
 
-def test_a_replay_that_is_too_short_is_refused_before_it_runs(rows) -> None:
+def test_replay_shorter_than_the_run_is_refused_before_it_starts(rows) -> None:
     world = device_world()
     made = Made(bare_servo(world, replayed_hand(rows, world)), world)
     with pytest.raises(SimError, match=f"ends after {TICKS} ticks .* ask for 0.4 s or less"):
@@ -175,7 +175,7 @@ def test_a_replay_that_is_too_short_is_refused_before_it_runs(rows) -> None:
     made.ticks(TICKS)
 
 
-def test_a_replay_past_its_end_is_a_fault_and_the_hand_stays(rows) -> None:
+def test_replay_past_its_end_is_a_fault_and_holds_the_last_position(rows) -> None:
     world = device_world()
     servo = bare_servo(world, replayed_hand(rows, world))
     ticks, _ = run(servo, TICKS + 5)
@@ -189,17 +189,17 @@ def test_a_replay_past_its_end_is_a_fault_and_the_hand_stays(rows) -> None:
     [(np.zeros((0, 15)), r"shape \(0, 15\)"), (np.zeros((3, 14)), r"shape \(3, 14\)"),
      (np.array([[0.0] * 15, [np.nan] * 15]), "not finite in row 1")],
 )  # fmt: skip
-def test_rows_that_are_no_hand_are_refused(bad, says) -> None:
+def test_replay_rows_of_wrong_shape_or_not_finite_are_refused(bad, says) -> None:
     with pytest.raises(SimError, match=says):
         replayed_hand(bad, device_world())
 
 
-def test_a_replay_at_another_rate_is_refused(rows) -> None:
+def test_replay_at_another_rate_is_refused(rows) -> None:
     with pytest.raises(SimError, match=r"every 0\.002 s"):
         replayed_hand(rows, device_world(), 2e-3)
 
 
-def test_an_exchange_answers_each_reading_and_leaves_fault_and_torque() -> None:
+def test_exchange_answers_each_reading_with_torque_and_fault() -> None:
     world = device_world()
     device = exchange(world, CUTOFF)
     made = Made(bare_servo(world, device), world, driven(device))

@@ -31,16 +31,16 @@ class Process(NamedTuple):
     test: str
 
 
-_COUNTED = "test_what_a_bus_does_now_and_then"
-_SERVO_STOPPED = "test_a_servo_that_was_stopped"
-_WATCHDOG = "test_a_device_s_watchdog_lets_go"
-_RECORDER = "test_the_recorder_frozen_and_killed"
-_PAGE = "test_a_page_that_is_frozen_and_killed"
+_COUNTED = "test_occasional_bus_errors"
+_SERVO_STOPPED = "test_stopped_servo_misses_deadlines"
+_WATCHDOG = "test_device_watchdog_releases"
+_RECORDER = "test_recorder_frozen_and_killed"
+_PAGE = "test_servo_does_not_wait_for_a_frozen_or_killed_page"
 PROCESSES = (
     Process("duplicated, lost, late and singly spoiled reports, a third of all", 5, "at once", "not", "not",
             "nothing: they are counted", "whole", _COUNTED),
     Process("host away for 5, 50, 500 ms", 3, "its next tick", "not", "10 (firmware's watchdog)",
-            "nothing: a gap, ramped in again", "whole", "test_a_host_that_was_away"),
+            "nothing: a gap, ramped in again", "whole", "test_late_host_trips_the_watchdog"),
     Process("servo SIGSTOP, 50 ms", 1, "when it goes on", "not", "not", "nothing: missed deadlines are counted",
             "whole", _SERVO_STOPPED),
     Process("servo SIGSTOP, 500 ms", 1, "when it goes on", "0", "0", "SERVO_LATE", "whole", _SERVO_STOPPED),
@@ -49,9 +49,9 @@ PROCESSES = (
     Process("servo SIGKILL, device on packets", 1, "20 ms (device's watchdog)", "it is dead", "at once",
             "none: the controls say that it is gone", "up to then", _WATCHDOG),
     Process("device's process killed", 1, "next tick", "0", "it is dead",
-            "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_a_device_that_is_gone"),
+            "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_killed_device"),
     Process("controls frozen", 1, "the heartbeat's time", "0", "0", "CONTROL_LOST", "whole",
-            "test_controls_that_freeze"),
+            "test_frozen_controls"),
     Process("page SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
     Process("page SIGKILL", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
     Process("recorder SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole after 5 s or less",
@@ -59,7 +59,7 @@ PROCESSES = (
     Process("recorder SIGKILL", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
             _RECORDER),
     Process("disk full", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
-            "test_a_full_disk_ends_the_recording"),
+            "test_full_disk_ends_the_recording"),
 )  # fmt: skip
 
 

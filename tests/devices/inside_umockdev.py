@@ -32,7 +32,7 @@ def phantom(tmp_path):
     made.node.close()
 
 
-def test_hidapi_is_the_wheel_s_own_and_sees_the_node(phantom) -> None:
+def test_hidapi_from_the_wheel_lists_the_node(phantom) -> None:
     (row,) = hid_backend().enumerate()
     assert (row["vendor_id"], row["usage_page"], row["usage"]) == (0x16C0, 0xFF48, 0x56)
     (device,) = found_devices()
@@ -40,7 +40,7 @@ def test_hidapi_is_the_wheel_s_own_and_sees_the_node(phantom) -> None:
 
 
 @pytest.mark.parametrize("name", ["hid", "hid:HVF-0001", "hidraw:/dev/hidraw0"])
-def test_it_is_opened_by_any_of_its_names(phantom, name) -> None:
+def test_phantom_opens_by_each_of_its_names(phantom, name) -> None:
     driver = open_device(name)
     phantom.tell()
     reading = np.zeros(9)
@@ -49,7 +49,7 @@ def test_it_is_opened_by_any_of_its_names(phantom, name) -> None:
     driver.close()
 
 
-def test_a_read_waits_as_long_as_it_is_told_and_no_longer(phantom) -> None:
+def test_read_waits_until_its_timeout_or_a_report(phantom) -> None:
     driver, reading = open_device("hid"), np.zeros(9)
     begin = time.perf_counter()
     assert not driver.read(reading, 0.05)
@@ -61,7 +61,7 @@ def test_a_read_waits_as_long_as_it_is_told_and_no_longer(phantom) -> None:
     driver.close()
 
 
-def test_unplugging_is_a_fault_when_reading_and_when_writing_and_letting_go_raises_nothing(phantom) -> None:
+def test_unplugging_faults_reads_and_writes_but_not_release(phantom) -> None:
     driver = open_device("hid")
     driver.write(np.zeros(3), True)
     phantom.node.unplug()
@@ -74,7 +74,7 @@ def test_unplugging_is_a_fault_when_reading_and_when_writing_and_letting_go_rais
     driver.close()
 
 
-def test_reports_that_are_short_long_or_spoiled_arrive_as_they_were_sent(phantom) -> None:
+def test_malformed_reports_arrive_unaltered(phantom) -> None:
     driver, reading = open_device("hid"), np.zeros(9)
     genuine = phantom.firmware.tick()
     for size in (1, 63, 65):
@@ -90,7 +90,7 @@ def test_reports_that_are_short_long_or_spoiled_arrive_as_they_were_sent(phantom
     driver.close()
 
 
-def test_follow_through_hidapi_and_the_firmware_is_the_simulation_s_run_within_a_millimetre(tmp_path) -> None:
+def test_follow_through_hidapi_and_firmware_matches_simulation_within_1_mm(tmp_path) -> None:
     behind = NodeFirmware(tmp_path)
     places, rig = device_follow(lambda device: NodeRig(device, open_device("hid"), behind, behind.node))
     assert rig.fault == Fault.NONE
@@ -100,7 +100,7 @@ def test_follow_through_hidapi_and_the_firmware_is_the_simulation_s_run_within_a
     assert rms(places, simulated_follow()) < 1e-3
 
 
-def test_follow_through_hidapi_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(phantom) -> None:
+def test_follow_through_hidapi_firmware_and_gate_matches_simulation_within_1_mm(phantom) -> None:
     driver = LockStep(open_device("hid"), phantom)
     places = gated_follow(driver)["p"]
     assert driver.telemetry[READ] == LAP * 1e3
@@ -109,7 +109,7 @@ def test_follow_through_hidapi_the_firmware_and_the_gate_is_the_simulation_s_run
     assert rms(places, simulated_follow()) < 1e-3
 
 
-def test_a_touch_is_recognised_and_nothing_is_sent_to_it(capsys) -> None:
+def test_touch_is_listed_but_refused_and_nothing_is_sent_to_it(capsys) -> None:
     node = HidrawNode(MOUSE, 0x2988, 0x0304, "Touch", "T-1")
     (device,) = found_devices()
     assert (device.kind, device.name) == ("touch", "")
@@ -122,7 +122,7 @@ def test_a_touch_is_recognised_and_nothing_is_sent_to_it(capsys) -> None:
     node.close()
 
 
-def test_any_other_device_is_listed_and_refused() -> None:
+def test_unrelated_hid_device_is_listed_but_refused() -> None:
     node = HidrawNode(MOUSE, 0x046D, 0xC077, "Mouse")
     (device,) = found_devices()
     assert (device.kind, device.name, device.product) == ("other", "", "Mouse")
@@ -134,7 +134,7 @@ def test_any_other_device_is_listed_and_refused() -> None:
     node.close()
 
 
-def test_a_spacemouse_is_opened_by_its_kind_and_by_its_node() -> None:
+def test_spacemouse_opens_by_kind_and_by_node() -> None:
     node = HidrawNode(SPACEMOUSE_DESCRIPTOR, 0x256F, 0xC635, "SpaceMouse Compact")
     for name in ("spacemouse", "spacemouse:/dev/hidraw0"):
         driver = open_device(name)
@@ -144,7 +144,7 @@ def test_a_spacemouse_is_opened_by_its_kind_and_by_its_node() -> None:
     node.close()
 
 
-def test_a_node_that_may_not_be_opened_has_its_udev_rule_printed(phantom, capsys, monkeypatch) -> None:
+def test_node_without_permission_is_reported_with_its_udev_rule(phantom, capsys, monkeypatch) -> None:
     monkeypatch.setattr("sim.devices.hardware_list.os.access", lambda path, mode: path != "/dev/hidraw0")
     (device,) = found_devices()
     assert not device.usable
@@ -154,7 +154,7 @@ def test_a_node_that_may_not_be_opened_has_its_udev_rule_printed(phantom, capsys
     assert "/etc/udev/rules.d/70-hvf.rules" in said
 
 
-def test_the_doctor_measures_how_a_device_answers_with_its_motors_off(phantom, capsys) -> None:
+def test_doctor_measures_link_with_motors_off(phantom, capsys) -> None:
     done = threading.Event()
 
     def live() -> None:
@@ -221,7 +221,7 @@ def hardware(*arguments: str) -> int:
     return main(["hardware", *arguments])
 
 
-def test_a_device_is_calibrated_certified_run_and_reported_from_the_command_line(held, tmp_path, capsys) -> None:
+def test_device_is_calibrated_certified_run_and_reported_from_the_command_line(held, tmp_path, capsys) -> None:
     """With a real certificate, through hidapi and its node, in processes of its own."""
     field = ("--mode", "follow", *RATES)
     assert main(["certify", *field, "--out", str(tmp_path / "certificate")]) == 0
@@ -248,7 +248,7 @@ def test_a_device_is_calibrated_certified_run_and_reported_from_the_command_line
     assert main(["report", str(tmp_path / "run")]) == 0
 
 
-def test_a_device_that_forgot_its_zero_is_armed_with_a_calibration_of_this_power_up_only(held, tmp_path) -> None:
+def test_calibration_of_an_earlier_power_up_is_refused_for_a_device_without_stored_zero(held, tmp_path) -> None:
     held.power_up(calibrated=False)
     file = str(tmp_path / "device.json")
     with playing(held):

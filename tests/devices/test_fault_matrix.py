@@ -24,18 +24,18 @@ def assert_lets_go_and_stays(order: Order, seed: int, library: Path, folder: Pat
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=lambda order: order.do.__name__)
-def test_the_force_is_zero_within_two_ticks_and_the_reason_is_latched(order, firmware_library, tmp_path) -> None:
+def test_force_is_zero_within_two_ticks_and_fault_is_latched(order, firmware_library, tmp_path) -> None:
     assert_lets_go_and_stays(order, 0, firmware_library, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", ORDERS, ids=lambda order: order.do.__name__)
-def test_so_it_is_wherever_and_whenever_it_comes(order, firmware_library, tmp_path) -> None:
+def test_fault_is_handled_at_every_seeded_time_and_place(order, firmware_library, tmp_path) -> None:
     for seed in range(1, INJECTIONS):
         assert_lets_go_and_stays(order, seed, firmware_library, tmp_path)
 
 
-def test_the_table_in_the_documents_has_every_injection_and_at_least_a_hundred() -> None:
+def test_documented_table_lists_every_injection_and_at_least_100_runs() -> None:
     page = PAGE.read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| ") and not line.startswith("| injected")]
     assert [row.split("|")[1].strip() for row in rows] == [order.words for order in (*ORDERS, *PROCESSES)]
@@ -44,7 +44,7 @@ def test_the_table_in_the_documents_has_every_injection_and_at_least_a_hundred()
 
 
 @pytest.mark.parametrize("seed", range(INJECTIONS))
-def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(firmware_library, tmp_path, seed: int) -> None:
+def test_occasional_bus_errors_are_counted_without_loss_of_force(firmware_library, tmp_path, seed: int) -> None:
     """Losses, duplicates, reports that bunch up, and one spoiled report at a time."""
     rng, wire = np.random.default_rng([seed, 19]), Wire(firmware_library)
     wire.active(20)
@@ -76,7 +76,7 @@ def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(firmware_lib
 
 
 @pytest.mark.parametrize("milliseconds", [5, 50, 500])
-def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(
+def test_late_host_trips_the_watchdog_and_force_ramps_in_again(
     firmware_library, tmp_path, milliseconds: int
 ) -> None:
     wire = Wire(firmware_library)
@@ -98,7 +98,7 @@ def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(
     assert wire.recorded(tmp_path / "run.h5")
 
 
-def test_another_fault_does_not_hide_the_first(firmware_library) -> None:
+def test_later_fault_does_not_replace_the_first(firmware_library) -> None:
     wire = Wire(firmware_library)
     wire.active(50)
     wire.firmware.sensors.amplifier_fault = 1

@@ -49,17 +49,17 @@ def told(device) -> np.ndarray:
     return reading
 
 
-def test_who_it_is_that_it_has_no_watchdog_and_that_it_is_calibrated(hd) -> None:
+def test_identity_is_calibrated_and_without_watchdog(hd) -> None:
     assert HdapiDevice(hd).identity == ("Mock Premium", "HDAPI", "M-42", "", True, False, True, 0, True)
 
 
 @pytest.mark.parametrize(("state", "calibrated"), [(0x5000, True), (0x5001, True), (0x5002, False)])
-def test_a_device_that_can_calibrate_itself_is_asked_to(hd, state, calibrated) -> None:
+def test_device_that_needs_calibration_is_calibrated_if_it_can(hd, state, calibrated) -> None:
     hd.mock_calibration(state)
     assert HdapiDevice(hd).identity.calibrated is calibrated
 
 
-def test_millimetres_become_metres_and_the_first_button_the_switch(hd, clock) -> None:
+def test_position_is_in_metres_and_first_button_is_the_switch(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     pose(hd, [30.0, -20.0, 10.0])
     hd.mock_buttons(3)
@@ -71,7 +71,7 @@ def test_millimetres_become_metres_and_the_first_button_the_switch(hd, clock) ->
     assert not device.read(reading, 0.0)
 
 
-def test_the_force_of_the_torques_is_what_the_motors_give_while_commands_come(hd, clock) -> None:
+def test_motor_force_is_that_of_the_torques_until_commands_time_out(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     hd.mock_tick()
     theta, force = tuple(told(device)[3:6]), (0.5, -1.0, 0.3)
@@ -94,7 +94,7 @@ def test_the_force_of_the_torques_is_what_the_motors_give_while_commands_come(hd
     assert not three(hd).any()
 
 
-def test_no_command_exceeds_the_device_s_nominal_force_and_none_makes_the_library_complain(hd, clock) -> None:
+def test_force_stays_within_nominal_force_without_library_errors(hd, clock) -> None:
     device, rng = HdapiDevice(hd, clock=clock), np.random.default_rng(7)
     for _ in range(300):
         torque = rng.normal(0.0, 3.0, 3) * rng.choice([1.0, 1e3, 1e9])
@@ -110,7 +110,7 @@ def test_no_command_exceeds_the_device_s_nominal_force_and_none_makes_the_librar
 
 
 @pytest.mark.parametrize("code", ERRORS)
-def test_every_error_of_the_library_is_a_fault_with_its_name(hd, clock, code) -> None:
+def test_library_error_is_a_fault_with_its_name(hd, clock, code) -> None:
     device = HdapiDevice(hd, clock=clock)
     device.write(np.zeros(3), True)
     hd.mock_velocity(300.0, 400.0, 0.0)
@@ -126,7 +126,7 @@ def test_every_error_of_the_library_is_a_fault_with_its_name(hd, clock, code) ->
     told(device)  # once
 
 
-def test_the_columns_of_its_transform_are_the_stylus_s_axes_in_its_own(hd, clock) -> None:
+def test_transform_columns_are_the_stylus_axes(hd, clock) -> None:
     device, rng, r_HP = HdapiDevice(hd, clock=clock), np.random.default_rng(8), Rotation.from_matrix(R_HP)
     for _ in range(50):
         turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3))
@@ -137,7 +137,7 @@ def test_the_columns_of_its_transform_are_the_stylus_s_axes_in_its_own(hd, clock
         assert (Rotation.from_quat(q, scalar_first=True).inv() * r_HP * turn * r_HP.inv()).magnitude() < 1e-12
 
 
-def test_where_the_phantom_cannot_be_or_what_is_no_number_is_a_fault(hd, clock) -> None:
+def test_unreachable_or_invalid_pose_is_a_fault(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     for p, rotation, fault in [
         ([0.0, 0.0, 900.0], None, Fault.LEFT_WORKSPACE), ([np.nan, 0.0, 0.0], None, Fault.READING_NOT_FINITE),
@@ -151,7 +151,7 @@ def test_where_the_phantom_cannot_be_or_what_is_no_number_is_a_fault(hd, clock) 
         assert refused.value.fault is fault
 
 
-def test_what_is_closed_gives_no_force_and_can_be_opened_again(hd, clock) -> None:
+def test_closed_device_gives_no_force_and_opens_again(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     device.write(np.ones(3), True)
     hd.mock_tick()
@@ -162,7 +162,7 @@ def test_what_is_closed_gives_no_force_and_can_be_opened_again(hd, clock) -> Non
     HdapiDevice(hd).close()
 
 
-def test_the_vendor_s_own_thread_serves_a_thousand_times_a_second(hd) -> None:
+def test_vendor_thread_serves_at_1_khz(hd) -> None:
     hd.mock_manual(0)
     device = HdapiDevice(hd)
     reading, n, first = np.zeros(9), 0, time.perf_counter()
@@ -177,7 +177,7 @@ def test_the_vendor_s_own_thread_serves_a_thousand_times_a_second(hd) -> None:
     assert hd.mock_frames() == frames
 
 
-def test_its_thread_waits_for_no_python_and_lets_go_when_no_command_comes(hd) -> None:
+def test_vendor_thread_runs_without_the_gil_and_stops_force_without_commands(hd) -> None:
     hd.mock_manual(0)
     device, libc = HdapiDevice(hd), ctypes.PyDLL(None)  # which keeps the GIL
     while not device.read(np.zeros(9), 0.5):
@@ -190,7 +190,7 @@ def test_its_thread_waits_for_no_python_and_lets_go_when_no_command_comes(hd) ->
     device.close()
 
 
-def test_a_read_waits_for_a_sample_as_long_as_it_is_told_and_no_longer(hd) -> None:
+def test_read_waits_until_its_timeout_or_a_sample(hd) -> None:
     device = HdapiDevice(hd)
     first = time.perf_counter()
     assert not device.read(np.zeros(9), 0.05)
@@ -202,7 +202,7 @@ def test_a_read_waits_for_a_sample_as_long_as_it_is_told_and_no_longer(hd) -> No
     tick.join()
 
 
-def test_a_reading_carries_when_it_was_made_by_the_clock(hd) -> None:
+def test_reading_carries_its_sampling_time(hd) -> None:
     device, before = HdapiDevice(hd), time.perf_counter()
     hd.mock_tick()
     after = time.perf_counter()
@@ -210,7 +210,7 @@ def test_a_reading_carries_when_it_was_made_by_the_clock(hd) -> None:
     assert before <= told(device)[1] <= after
 
 
-def test_a_command_that_is_half_written_is_not_heard_and_the_last_one_grows_old(hd, clock) -> None:
+def test_half_written_command_is_ignored_and_the_last_one_times_out(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     hd.mock_tick()
     told(device)
@@ -228,7 +228,7 @@ def test_a_command_that_is_half_written_is_not_heard_and_the_last_one_grows_old(
     assert not three(hd).any()
 
 
-def test_a_sample_that_is_half_written_is_none(hd, clock) -> None:
+def test_half_written_sample_is_not_read(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     hd.mock_tick()
     device._memory.sample.changes[0] += 1
@@ -238,7 +238,7 @@ def test_a_sample_that_is_half_written_is_none(hd, clock) -> None:
 
 
 @pytest.mark.parametrize("clock", [time.perf_counter, lambda: time.perf_counter()])
-def test_a_driver_that_nobody_closed_leaves_the_thread_what_it_needs(hd, clock) -> None:
+def test_unclosed_driver_keeps_alive_what_the_vendor_thread_uses(hd, clock) -> None:
     hd.mock_manual(0)
     device = HdapiDevice(hd, clock=clock)
     device.write(np.ones(3), True)
@@ -256,24 +256,24 @@ def test_a_driver_that_nobody_closed_leaves_the_thread_what_it_needs(hd, clock) 
     [("mock_missing", "HD_DEVICE_FAULT; expected a name"),
      ("mock_no_scheduler", "scheduler at 1000 Hz: HD_TIMER_ERROR")],
 )  # fmt: skip
-def test_a_device_or_scheduler_that_is_not_there_is_a_line(hd, order, says) -> None:
+def test_missing_device_or_scheduler_is_reported_in_one_line(hd, order, says) -> None:
     getattr(hd, order)(1)
     with pytest.raises(SimError, match=says):
         HdapiDevice(hd)
 
 
-def test_another_name_is_a_line(hd) -> None:
+def test_other_device_name_is_refused(hd) -> None:
     with pytest.raises(SimError, match="does not open Left"):
         HdapiDevice(hd, "Left")
 
 
-def test_a_library_that_is_missing_is_a_line_with_what_to_install(monkeypatch) -> None:
+def test_missing_library_error_names_what_to_install(monkeypatch) -> None:
     monkeypatch.setattr("sim.devices.vendor_library.ctypes.util.find_library", lambda name: None)
     with pytest.raises(SimError, match="install 3D Systems' OpenHaptics"):
         HDAPI.load()
 
 
-def test_a_library_that_is_another_is_a_line(tmp_path) -> None:
+def test_wrong_library_is_reported_in_one_line(tmp_path) -> None:
     (tmp_path / "libHD.so").write_text("not a library")
     with pytest.raises(SimError, match="is not OpenHaptics' library HD"):
         HDAPI.load(str(tmp_path / "libHD.so"))

@@ -37,11 +37,11 @@ def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
     return HidPhantom(handle, "in memory", clock)
 
 
-def test_a_device_says_who_it_is(driver: HidPhantom, firmware: Firmware) -> None:
+def test_identity_is_read_from_the_device(driver: HidPhantom, firmware: Firmware) -> None:
     assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot, False)
 
 
-def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
+def test_joint_angles_are_read_to_half_an_encoder_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
     firmware.turn_to(POSE)
     firmware.sensors.pressed = 1
     handle.tick()
@@ -57,7 +57,7 @@ def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: Firmw
     np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest
 
 
-def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver, handle, firmware) -> None:
+def test_joint_torques_reach_the_shafts_within_rounding(driver, handle, firmware) -> None:
     rng = np.random.default_rng(4)
     for _ in range(200):
         torque = rng.uniform(-1.0, 1.0, 3) * PREMIUM_1_5.peak_torque
@@ -69,7 +69,7 @@ def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver
     assert not firmware.joint_torque.any()
 
 
-def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finite_lets_go(
+def test_torque_is_limited_to_peak_and_not_finite_torque_switches_off(
     driver, handle, firmware
 ) -> None:
     rng = np.random.default_rng(5)
@@ -88,7 +88,7 @@ def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finit
             assert not firmware.motors.on
 
 
-def test_temperatures_round_trip_loss_jitter_and_staleness_are_told(driver, handle, firmware, clock) -> None:
+def test_telemetry_measures_temperature_round_trip_loss_jitter_and_staleness(driver, handle, firmware, clock) -> None:
     reading, told = np.zeros(9), driver.telemetry
     assert np.isnan(told[ROUND_TRIP])
     for k in range(202):
@@ -107,7 +107,7 @@ def test_temperatures_round_trip_loss_jitter_and_staleness_are_told(driver, hand
     assert told[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
 
 
-def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
+def test_calibration_is_stored_in_the_device(driver, handle, firmware) -> None:
     firmware.turn_to(POSE)
     handle.tick()
     driver.calibrate(np.array([0.0, 0.1, -0.1]), np.zeros(3))
@@ -121,7 +121,7 @@ def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
     np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
 
 
-def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_reading_on(handle, firmware, driver) -> None:
+def test_commands_are_accepted_from_the_first_reading_after_a_previous_session(handle, firmware, driver) -> None:
     """The firmware takes no number twice; where the last program stopped, the device tells."""
     reading, torque = np.zeros(9), np.array([0.1, -0.1, 0.1])
     for _ in range(500):
@@ -142,7 +142,7 @@ def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_readi
 
 
 @pytest.mark.parametrize("calibrated", [True, False])
-def test_a_device_that_began_again_goes_on_only_if_it_still_knows_its_zero(
+def test_reset_device_continues_only_if_it_kept_its_zero(
     driver, handle, firmware, calibrated
 ) -> None:
     reading = np.zeros(9)
@@ -169,7 +169,7 @@ def driven(driver: HidPhantom, handle: FirmwareHandle, clock: Clock, ticks: int)
         driver.read(np.zeros(9), 0.0)
 
 
-def test_where_numbers_wrap_commands_are_heard_and_missed_as_before(handle, firmware, clock) -> None:
+def test_commands_are_accepted_and_missed_ones_detected_where_numbers_wrap(handle, firmware, clock) -> None:
     for number in (2**31 - 1, 2**32 - 6):
         assert firmware.take(output_report(False, firmware.boot, number, 10_000, [0, 0, 0], 0))
     handle.tick()
@@ -184,7 +184,7 @@ def test_where_numbers_wrap_commands_are_heard_and_missed_as_before(handle, firm
     assert lost.value.fault is Fault.DEVICE_REPORTED
 
 
-def test_motors_that_do_not_come_on_are_a_fault(handle, firmware, clock) -> None:
+def test_motors_that_stay_off_are_a_fault(handle, firmware, clock) -> None:
     handle.tick()
     driver = HidPhantom(handle, "in memory", clock)
     driver.read(np.zeros(9), 0.0)
@@ -196,7 +196,7 @@ def test_motors_that_do_not_come_on_are_a_fault(handle, firmware, clock) -> None
 
 
 @pytest.mark.parametrize("angle", [np.nan, np.inf, 1e30])
-def test_a_calibration_that_no_counts_can_hold_is_refused_and_not_sent(driver, handle, firmware, angle) -> None:
+def test_calibration_beyond_32_bit_counts_is_refused_and_not_sent(driver, handle, firmware, angle) -> None:
     handle.tick()
     before = firmware.feature(protocol.CALIBRATION)
     with pytest.raises(SimError, match="expected numbers of 32 bits"):
@@ -204,14 +204,14 @@ def test_a_calibration_that_no_counts_can_hold_is_refused_and_not_sent(driver, h
     assert firmware.feature(protocol.CALIBRATION) == before
 
 
-def test_a_device_without_a_peak_torque_has_no_motors_and_one_whose_watchdog_has_no_time_has_none(handle) -> None:
+def test_device_without_peak_torque_or_watchdog_time_reports_no_motors_or_watchdog(handle) -> None:
     other_feature(protocol.IDENTITY, peak_torque=0)(handle)
     assert not HidPhantom(handle, "x").identity.forces
     other_feature(protocol.IDENTITY, watchdog_max_us=0)(handle)
     assert not HidPhantom(handle, "x").identity.watchdog
 
 
-def test_a_calibration_without_a_reading_is_refused(driver) -> None:
+def test_calibration_without_a_reading_is_refused(driver) -> None:
     with pytest.raises(SimError, match="nothing to calibrate"):
         driver.calibrate(np.zeros(3), np.zeros(3))
 
@@ -234,7 +234,7 @@ def other_feature(number: int, **changed):
     return feature
 
 
-def test_another_major_version_is_a_fault_and_another_minor_one_is_not(handle: FirmwareHandle) -> None:
+def test_other_major_version_is_a_fault_and_other_minor_version_is_not(handle: FirmwareHandle) -> None:
     other_feature(protocol.IDENTITY, minor=9)(handle)
     HidPhantom(handle, "x")
     other_feature(protocol.IDENTITY, major=2)(handle)
@@ -248,14 +248,14 @@ def test_another_major_version_is_a_fault_and_another_minor_one_is_not(handle: F
     [(protocol.IDENTITY, {"magic": 5}, "the mark 0x5; expected 0x31465648"),
      (protocol.CALIBRATION, {"counts_per_turn": 0}, "expected none to be 0")],
 )  # fmt: skip
-def test_a_device_that_is_another_or_has_no_scale_is_refused(handle, number, changed, says) -> None:
+def test_device_with_wrong_magic_or_zero_scale_is_refused(handle, number, changed, says) -> None:
     other_feature(number, **changed)(handle)
     with pytest.raises(SimError, match=says):
         HidPhantom(handle, "x")
 
 
 @pytest.mark.slow
-def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+def test_follow_through_firmware_matches_simulation_within_1_mm(handle, firmware) -> None:
     places, rig = device_follow(
         lambda device: Rig(device, HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
     )
@@ -264,6 +264,6 @@ def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre
 
 
 @pytest.mark.slow
-def test_follow_through_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+def test_follow_through_firmware_and_gate_matches_simulation_within_1_mm(handle, firmware) -> None:
     driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
     assert rms(gated_follow(driver)["p"], simulated_follow()) < 1e-3

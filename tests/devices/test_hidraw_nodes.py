@@ -27,15 +27,15 @@ def inside(*arguments: str, seconds: float = 240.0) -> str:
 
 
 @pytest.mark.slow
-def test_the_contract_of_a_device_holds_for_hid_and_spacemouse_through_their_nodes() -> None:
+def test_device_contract_holds_for_hid_and_spacemouse_through_nodes() -> None:
     assert "18 passed" in inside("tests/contract/test_device_contract.py", "-k", "node")
 
 
 @pytest.mark.slow
-def test_the_driver_the_list_and_the_doctor_see_a_real_node() -> None:
+def test_driver_device_list_and_doctor_work_on_a_node() -> None:
     assert "15 passed" in inside("tests/devices/inside_umockdev.py", "-k", "not command_line")
 
 
 @pytest.mark.processes
-def test_a_device_behind_a_real_node_is_certified_and_run_from_the_command_line() -> None:
+def test_device_behind_a_node_is_certified_and_run_from_the_command_line() -> None:
     assert "1 passed" in inside("tests/devices/inside_umockdev.py", "-k", "command_line", seconds=600.0)

@@ -38,7 +38,7 @@ class Scripted(TipDevice):
         self.given.append(None)
 
 
-def test_the_tip_is_read_in_the_hand_frame_with_its_switch_and_a_number() -> None:
+def test_tip_is_read_in_the_hand_frame_with_switch_and_sequence_number() -> None:
     driver, reading = TipDriver(Scripted(TipPose(HERE, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
     assert driver.read(reading, 0.0)
     np.testing.assert_allclose(forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(HERE)), atol=1e-12)
@@ -48,7 +48,7 @@ def test_the_tip_is_read_in_the_hand_frame_with_its_switch_and_a_number() -> Non
     assert not driver.read(reading, 0.0)
 
 
-def test_the_force_is_the_field_s_and_no_larger_than_the_device_gives() -> None:
+def test_written_force_is_the_field_force_up_to_the_device_limit() -> None:
     device, rng = Scripted(TipPose(HERE)), np.random.default_rng(3)
     driver, reading = TipDriver(device, "here"), np.zeros(9)
     driver.read(reading, 0.0)
@@ -64,7 +64,7 @@ def test_the_force_is_the_field_s_and_no_larger_than_the_device_gives() -> None:
     assert device.given[-1] is None
 
 
-def test_a_torque_that_is_no_number_releases_it() -> None:
+def test_torque_that_is_not_finite_releases_the_device() -> None:
     device = Scripted(TipPose(HERE))
     driver = TipDriver(device, "here")
     with pytest.raises(DriverFault) as refused:
@@ -83,7 +83,7 @@ def test_a_torque_that_is_no_number_releases_it() -> None:
         (TipPose(np.array([0.9, 0.0, 0.0])), Fault.LEFT_WORKSPACE),
     ],
 )  # fmt: skip
-def test_what_it_raises_and_what_is_no_pose_is_a_fault_and_no_reading(pose, fault) -> None:
+def test_exception_or_invalid_pose_is_a_fault_without_reading(pose, fault) -> None:
     driver, reading = TipDriver(Scripted(pose), "here"), np.zeros(9)
     with pytest.raises(DriverFault) as refused:
         driver.read(reading, 0.0)
@@ -91,7 +91,7 @@ def test_what_it_raises_and_what_is_no_pose_is_a_fault_and_no_reading(pose, faul
     assert not reading.any()
 
 
-def test_an_error_is_printed_once_with_its_line(capsys) -> None:
+def test_exception_is_printed_once(capsys) -> None:
     driver = TipDriver(Scripted(ValueError("a bad cable")), "here")
     for _ in range(3):
         with pytest.raises(DriverFault):
@@ -99,7 +99,7 @@ def test_an_error_is_printed_once_with_its_line(capsys) -> None:
     assert capsys.readouterr().err.strip().count("ValueError: a bad cable") == 1
 
 
-def test_letting_go_never_raises() -> None:
+def test_release_error_is_not_raised() -> None:
     class Stuck(Scripted):
         def release(self):
             raise RuntimeError("stuck")
@@ -107,7 +107,7 @@ def test_letting_go_never_raises() -> None:
     TipDriver(Stuck(), "here").let_go()
 
 
-def test_one_that_takes_no_force_has_no_motors() -> None:
+def test_device_without_write_has_no_motors() -> None:
     class Mouse(TipDevice):
         def read(self):
             return None
@@ -117,7 +117,7 @@ def test_one_that_takes_no_force_has_no_motors() -> None:
 
 
 @pytest.mark.slow
-def test_follow_through_it_is_the_simulation_s_run_within_a_millimetre() -> None:
+def test_follow_matches_simulation_within_1_mm() -> None:
     def rig(device):
         tip = LinkageTip(Linkage())
         return Rig(device, TipDriver(tip, "here", clock=lambda: tip.linkage.ticks * 1e-3), tip)
@@ -127,7 +127,7 @@ def test_follow_through_it_is_the_simulation_s_run_within_a_millimetre() -> None
     assert rms(there, simulated_follow()) < 1e-3
 
 
-def test_the_example_is_opened_by_file_and_class() -> None:
+def test_example_device_opens_by_file_and_class() -> None:
     name = f"{EXAMPLE}:Mass"
     check_there(name)
     driver = open_device(name)
@@ -147,7 +147,7 @@ def test_the_example_is_opened_by_file_and_class() -> None:
         ("def", "own.py:Mine", "SyntaxError"),
     ],
 )  # fmt: skip
-def test_a_file_that_gives_no_device_is_one_line(tmp_path, text, name, why) -> None:
+def test_file_without_usable_device_is_reported_in_one_line(tmp_path, text, name, why) -> None:
     if text is not None:
         (tmp_path / "own.py").write_text(text, encoding="utf-8")
     with pytest.raises(SimError, match=why) as refused:

@@ -70,7 +70,7 @@ def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, 
 @pytest.mark.parametrize(
     ("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
 )
-def test_a_push_right_towards_the_user_or_down_goes_there_at_the_top_speed(mouse, cap, clock, push, way) -> None:
+def test_full_push_moves_the_tip_at_top_speed_in_its_direction(mouse, cap, clock, push, way) -> None:
     tip(mouse, clock, 1)
     cap.push(*push)
     p, _ = tip(mouse, clock, 100)
@@ -80,7 +80,7 @@ def test_a_push_right_towards_the_user_or_down_goes_there_at_the_top_speed(mouse
     np.testing.assert_array_equal(p, q)
 
 
-def test_a_turn_turns_the_stylus_about_the_same_axes(mouse, cap, clock) -> None:
+def test_twist_turns_the_stylus_about_the_same_axis(mouse, cap, clock) -> None:
     tip(mouse, clock, 1)
     cap.turn(0, 0, -350)
     _, reading = tip(mouse, clock, 100)
@@ -89,7 +89,7 @@ def test_a_turn_turns_the_stylus_about_the_same_axes(mouse, cap, clock) -> None:
     np.testing.assert_allclose(q, [np.cos(half), 0.0, 0.0, np.sin(half)], atol=1e-9)
 
 
-def test_six_axes_in_one_report_and_the_buttons(mouse, cap, clock) -> None:
+def test_six_axes_in_one_report_and_buttons_are_read(mouse, cap, clock) -> None:
     tip(mouse, clock, 1)
     cap.queue.append(b"\x01" + np.array([350, 0, 0, 0, 0, -350], "<i2").tobytes())
     cap.queue.append(b"\x03\x01\x00")
@@ -99,7 +99,7 @@ def test_six_axes_in_one_report_and_the_buttons(mouse, cap, clock) -> None:
     assert stylus_orientation(reading[3:6], reading[6:9])[3] > 0.0
 
 
-def test_whatever_it_sends_the_tip_stays_in_the_workspace_and_the_gimbal_in_its_range(mouse, cap, clock) -> None:
+def test_tip_stays_in_workspace_and_gimbal_in_range_for_random_input(mouse, cap, clock) -> None:
     rng, reading = np.random.default_rng(8), np.zeros(9)
     for _ in range(400):
         cap.push(*rng.integers(-500, 500, 3))
@@ -117,7 +117,7 @@ def test_whatever_it_sends_the_tip_stays_in_the_workspace_and_the_gimbal_in_its_
             assert np.abs(step).max() <= TOP_SPEED * 0.05 + 1e-9
 
 
-def test_a_cap_that_nobody_touches_does_not_drift_and_other_reports_are_left_out(mouse, cap, clock) -> None:
+def test_untouched_cap_does_not_drift_and_other_reports_are_ignored(mouse, cap, clock) -> None:
     cap.push(5, -5, 8)
     cap.queue.append(b"\x17\x64")  # a battery's
     cap.queue.append(b"\x01\x00")  # too short
@@ -127,7 +127,7 @@ def test_a_cap_that_nobody_touches_does_not_drift_and_other_reports_are_left_out
     assert mouse.telemetry[READ] == 1.0
 
 
-def test_it_has_no_force_and_unplugging_it_is_a_fault(mouse, cap, clock) -> None:
+def test_device_has_no_force_and_unplugging_is_a_fault(mouse, cap, clock) -> None:
     assert not mouse.identity.forces
     mouse.write(np.ones(3), True)
     cap.plugged = False

@@ -113,7 +113,7 @@ def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
                 last = force
 
 
-def test_such_sequences_do_reach_the_motors(firmware_library) -> None:
+def test_random_sequences_can_reach_the_motors(firmware_library) -> None:
     """Else the property would hold of a device that is never on."""
     firmware = Firmware(firmware_library)
     handle = Watched(firmware)
@@ -130,7 +130,7 @@ def test_such_sequences_do_reach_the_motors(firmware_library) -> None:
 
 
 @pytest.mark.parametrize("kind", ["hdapi", "dhd"])
-def test_a_library_is_sent_what_the_gate_lets_through_also_while_it_is_ramped_in(kind: str, tmp_path) -> None:
+def test_vendor_library_receives_the_gated_force_also_during_the_ramp(kind: str, tmp_path) -> None:
     if kind == "hdapi":
         behind = BehindHd(mock_hd(tmp_path), Linkage())
         device = HdapiDevice(behind.library, clock=lambda: behind.linkage.ticks * 1e-3)

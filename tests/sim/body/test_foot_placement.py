@@ -69,7 +69,7 @@ def _soles(pose, change=None):
 @pytest.mark.parametrize(
     ("shift", "turn"), [((0.02, -0.03, 0.01), (0, 0, 0)), ((0, 0, 0), (2, -3, 4)), ((0.03, 0, 0), (3, 2, -2))]
 )
-def test_feet_in_flight_go_over_their_places_whatever_the_root_does(shift, turn):
+def test_feet_in_flight_keep_their_places_under_a_displaced_root(shift, turn):
     reference = _in_flight()
     pose = _astray(reference, shift, turn)
     change = _added(pose, np.zeros(57), reference) / OMEGA**2
@@ -78,7 +78,7 @@ def test_feet_in_flight_go_over_their_places_whatever_the_root_does(shift, turn)
     assert np.linalg.norm(left[:, :2]) < 0.1 * np.linalg.norm(away[:, :2])
 
 
-def test_they_go_at_the_rate_at_which_the_root_strays():
+def test_feet_in_flight_compensate_the_drift_velocity_of_the_root():
     reference, velocity = _in_flight(), np.zeros(57)
     velocity[:6] = 0.1, -0.05, 0.2, 0.1, 0.2, -0.3
     rate = _added(reference, velocity, reference) / (2.0 * OMEGA)
@@ -88,27 +88,27 @@ def test_they_go_at_the_rate_at_which_the_root_strays():
     assert np.linalg.norm(left[:, :2]) < 0.1 * np.linalg.norm(drift[:, :2])
 
 
-def test_feet_are_displaced_by_no_more_than_their_reach():
+def test_foot_displacement_is_limited_by_the_placement_reach():
     reference = _in_flight()
     pose, still, reach = _astray(reference, (0.4, 0.0, 0.0), (0, 0, 0)), np.zeros(57), 0.02
     moved = _soles(pose, _added(pose, still, reference, reach) / OMEGA**2) - _soles(pose)
     np.testing.assert_allclose(moved[:, 0], -reach, rtol=0.1)
 
 
-def test_a_figure_at_its_reference_is_left_as_it_is():
+def test_figure_at_its_reference_gets_no_placement():
     pose = _in_flight()
     np.testing.assert_array_equal(_added(pose, np.zeros(57), pose), 0.0)
 
 
 @pytest.mark.parametrize("turn", [(180, 0, 0), (0, 100, 0)])
-def test_in_a_somersault_feet_that_are_not_under_the_root_are_left_as_they_are(turn):
+def test_feet_not_under_the_root_are_not_placed(turn):
     reference = _astray(_in_flight(), (0, 0, 1.0), turn)
     pose = _astray(reference, (0.03, 0.02, 0), (0, 0, 0))
     np.testing.assert_array_equal(_added(pose, np.zeros(57), reference), 0.0)
 
 
 @pytest.mark.slow
-def test_a_somersault_is_not_disturbed():
+def test_placement_does_not_disturb_a_somersault():
     """Up to its landing at 1.67 s, which takes all that its legs have with placed feet and without."""
     clip = embedded("backflip")
     placed, left = (
@@ -122,7 +122,7 @@ def test_a_somersault_is_not_disturbed():
 
 
 @pytest.mark.slow
-def test_a_capture_that_jumps_again_and_again_does_not_fall():
+def test_repeated_captured_jumps_do_not_fall():
     file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
@@ -132,7 +132,7 @@ def test_a_capture_that_jumps_again_and_again_does_not_fall():
 
 
 @pytest.mark.slow
-def test_placed_feet_lower_what_a_series_of_jumps_lacks():
+def test_placement_lowers_the_residual_of_repeated_jumps():
     file = MOCAP / "animated_drawings" / "jumping.bvh"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")

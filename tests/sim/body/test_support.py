@@ -29,7 +29,7 @@ def _supports(motion: ClipMotion, frames):
     return np.array(shares), np.array(nears)
 
 
-def test_points_that_a_walk_lifts_within_the_time_of_unloading_are_released_and_those_that_rest_bear_load():
+def test_points_about_to_lift_are_released_and_resting_points_bear_load():
     step = 0.005
     times = np.arange(0.0, 4.4, step)
     motion = clip_motion(embedded("walk"), times)
@@ -48,7 +48,7 @@ def test_points_that_a_walk_lifts_within_the_time_of_unloading_are_released_and_
     assert np.mean(nears[rests] > 0.5) > 0.8
 
 
-def test_before_a_flight_the_last_points_bear_load_although_they_are_about_to_leave():
+def test_last_points_before_a_flight_bear_load_until_takeoff():
     times = np.arange(0.0, 2.4, 0.002)
     motion = clip_motion(embedded("jump"), times)
     lowest = (sole_points(motion.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1)

@@ -26,7 +26,7 @@ def add(parts: Parts, number: int, twice: bool, into: Array) -> None:
         into[i] += parts.factor * parts.numbers[i] * number * (2.0 if twice else 1.0)
 
 
-def test_a_kept_call_does_what_the_call_does_and_makes_no_memory() -> None:
+def test_call_equals_the_direct_call_and_allocates_nothing() -> None:
     parts, into, other = Parts(np.arange(5.0), 3.0), np.zeros(5), np.zeros(5)
     number = np.array([7.0])
     call = KeptCall(add, (parts,), number, (True, into))
@@ -46,13 +46,13 @@ def test_a_kept_call_does_what_the_call_does_and_makes_no_memory() -> None:
     np.testing.assert_array_equal(into, other + 6.0)
 
 
-def test_what_the_function_raises_comes_out() -> None:
+def test_exceptions_of_the_function_are_raised() -> None:
     call = KeptCall(add, (Parts(np.zeros(2), 1.0),), np.array([-1.0]), (False, np.zeros(2)))
     with pytest.raises(ValueError, match="no such number"):
         call()
 
 
-def test_arguments_live_as_long_as_the_call_and_no_longer() -> None:
+def test_arguments_live_exactly_as_long_as_the_call() -> None:
     into = np.zeros(3)
     references = sys.getrefcount(into)
     call = KeptCall(add, (Parts(np.ones(3), 1.0),), np.array([2.0]), (False, into))

@@ -34,21 +34,21 @@ def edited(tree: Path, name: str, text: str) -> str:
     return hashed()
 
 
-def test_a_change_in_what_a_module_imports_however_far_is_another_hash(tree: Path) -> None:
+def test_change_in_a_direct_or_transitive_import_changes_the_hash(tree: Path) -> None:
     before = hashed()
     own = edited(tree, "controllers/haptic_map/cylindrical.py", "\nAGAIN = 1\n")
     assert own != before
     assert edited(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != own
 
 
-def test_a_comment_a_docstring_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
+def test_comments_docstrings_and_unrelated_modules_leave_the_hash(tree: Path) -> None:
     before = hashed()
     assert edited(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
     assert edited(tree, "controllers/rotations.py", '\n"""Words that stand alone."""\n') == before
     assert edited(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
 
 
-def test_what_is_kept_of_files_gives_the_same_hash_and_nothing_kept_or_nonsense_does_no_harm(tree: Path) -> None:
+def test_hash_is_the_same_with_a_stored_corrupt_or_missing_cache_file(tree: Path) -> None:
     first = hashed()
     (kept,) = (tree / "cache").rglob("code.json")
     assert hashed() == first

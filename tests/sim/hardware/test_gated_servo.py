@@ -27,7 +27,7 @@ from tests.sim.hardware.emulation import (
 )
 
 
-def test_follow_through_a_driver_is_the_simulation_s_run_within_a_millimetre() -> None:
+def test_follow_through_a_driver_matches_simulation_within_1_mm() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     servo.device.faults[FAULT_RAMP] = 0.0
@@ -40,7 +40,7 @@ def test_follow_through_a_driver_is_the_simulation_s_run_within_a_millimetre() -
     assert np.sqrt(np.mean(apart**2)) < 1e-3
 
 
-def test_from_arming_to_active_the_force_is_ramped_in_and_a_hand_that_lets_go_is_led() -> None:
+def test_force_ramps_in_from_arming_to_active_and_guides_a_released_stylus() -> None:
     ticker = Ticker(gated_servo(holds=1.5, small=5.0))
     rows = run(ticker, 4000, request=ARM)
     assert not rows["fault"].any()
@@ -61,7 +61,7 @@ def test_disarmed_motors_are_off() -> None:
     assert not rows["state"].any()
 
 
-def test_disarming_lets_go_in_its_tick() -> None:
+def test_disarming_switches_off_in_the_same_tick() -> None:
     ticker = Ticker(gated_servo(**AT_ONCE))
     first = active(ticker)
     assert columns(ticker.row[None])["torque"].any()
@@ -71,32 +71,32 @@ def test_disarming_lets_go_in_its_tick() -> None:
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_reading_that_is_no_number(place: int, bad: float) -> None:
+def test_reading_that_is_not_finite_is_a_fault(place: int, bad: float) -> None:
     assert_lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_joint_that_jumps(axis: int) -> None:
+def test_joint_jump_is_a_fault(axis: int) -> None:
     assert_lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
 
 
-def test_a_clock_that_goes_back() -> None:
+def test_clock_that_goes_back_is_a_fault() -> None:
     assert_lets_go("spoil", clock_back, Fault.CLOCK_BACK)
 
 
 @pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
 @pytest.mark.parametrize("where", ["read_fault", "write_fault"])
-def test_a_fault_that_the_driver_tells(fault: Fault, value: float, where: str) -> None:
+def test_driver_fault_is_latched(fault: Fault, value: float, where: str) -> None:
     assert_lets_go(where, (fault, value), fault)
 
 
 @pytest.mark.parametrize("stalled", [5, 50, 500])
-def test_a_device_that_stalls_for_five_periods_or_more(stalled: int) -> None:
+def test_stall_of_five_periods_or_more_is_a_fault(stalled: int) -> None:
     assert_lets_go("silent", stalled, Fault.READING_STALE, within=8)
 
 
 @pytest.mark.parametrize("stalled", [1, 3, 4])
-def test_a_device_that_stalls_for_less_than_five_periods_is_no_fault(stalled: int) -> None:
+def test_stall_of_less_than_five_periods_is_no_fault(stalled: int) -> None:
     broken = Broken(gated_servo(**AT_ONCE).driver)
     ticker = Ticker(gated_servo(broken, **AT_ONCE))
     first = active(ticker)
@@ -108,7 +108,7 @@ def test_a_device_that_stalls_for_less_than_five_periods_is_no_fault(stalled: in
 
 @pytest.mark.parametrize("part", ["limiter", "tank", "params"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_memory_or_a_field_that_is_no_number(part: str, bad: float) -> None:
+def test_memory_or_parameters_that_are_not_finite_are_a_fault(part: str, bad: float) -> None:
     faults = {"limiter": Fault.LIMITER_NOT_FINITE, "tank": Fault.TANK_NOT_FINITE, "params": Fault.FORCE_NOT_FINITE}
     parts = gated_servo(program=follow_program(), **AT_ONCE)
     ticker = Ticker(parts)
@@ -154,7 +154,7 @@ def assert_faulted(ticker: Ticker, first: int, fault: Fault, within: int = 2) ->
     assert all(np.isfinite(rows[name]).all() for name in ("force", "torque", "p", "v"))
 
 
-def test_encoder_offsets_are_taken_off_once_also_where_no_reading_came() -> None:
+def test_encoder_offsets_are_subtracted_once_also_without_new_readings() -> None:
     offset = (0.01, -0.02, 0.005)
     parts = gated_servo(linkage=Linkage(offset=offset), **AT_ONCE)
     ticker = Ticker(GatedServo(*parts[:4], np.array(offset)))
@@ -171,7 +171,7 @@ def test_encoder_offsets_are_taken_off_once_also_where_no_reading_came() -> None
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])
-def test_a_loop_that_is_too_stiff_is_quieted_and_the_hand_is_led_all_the_same(stiffness: float, damping: float) -> None:
+def test_unstable_loop_is_damped_by_the_detector_and_still_guides(stiffness: float, damping: float) -> None:
     """Far beyond the certificate's boundary: without the detector they shake the hand until they are too fast."""
     program = follow_program(stiffness, damping)
     bare = Ticker(gated_servo(program=program, holds=2.0, small=10.0, dead_man=False,
@@ -186,14 +186,14 @@ def test_a_loop_that_is_too_stiff_is_quieted_and_the_hand_is_led_all_the_same(st
     assert rows["distance"][-1000:].max() < 5e-3
 
 
-def test_only_an_exchange_can_be_gated() -> None:
+def test_servo_without_exchange_is_refused() -> None:
     world = device_world()
     parts = gated_servo()._replace(servo=bare_servo(world, simulated(world)))
     with pytest.raises(SimError, match="expected an Exchange"):
         Ticker(parts)
 
 
-def test_a_linkage_that_cannot_be_is_refused() -> None:
+def test_invalid_linkage_is_refused() -> None:
     with pytest.raises(SimError, match="must not be negative"):
         Linkage(coulomb=(-1.0, 0.0, 0.0))
     with pytest.raises(SimError, match="rotors have to give"):

@@ -91,7 +91,7 @@ def found(record) -> tuple[Identified, np.ndarray]:
 
 
 @pytest.mark.slow
-def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_intervals(found) -> None:
+def test_hidden_parameters_are_within_their_intervals(found) -> None:
     draws = [found, *(identified(8000 + k) for k in range(int(os.environ.get("HVF_DRAWS", "1")) - 1))]
     shares = np.abs([(f.values - hidden) / f.margins for f, hidden in draws])
     within = int(np.sum(shares.max(axis=1) <= 1.0))
@@ -107,7 +107,7 @@ def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_interv
 
 
 @pytest.mark.slow
-def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
+def test_intervals_are_narrow_enough_to_be_useful(found) -> None:
     result, hidden = found
     margins = dict(zip(NAMES, result.margins, strict=True))
     assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.001
@@ -118,7 +118,7 @@ def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
 
 
 @pytest.mark.slow
-def test_a_torque_that_is_not_in_the_equations_widens_the_intervals_and_is_covered_by_them(record, found) -> None:
+def test_unmodelled_torque_widens_the_intervals_that_then_cover_the_errors(record, found) -> None:
     """A ripple of one percent of the friction, the same again in every lap, which no average takes out."""
     motions, hidden = record
     rippled = [
@@ -131,7 +131,7 @@ def test_a_torque_that_is_not_in_the_equations_widens_the_intervals_and_is_cover
 
 
 @pytest.mark.slow
-def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_up() -> None:
+def test_motion_that_leaves_the_delay_unidentifiable_is_refused() -> None:
     """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
     linkage, heavier = drawn(np.random.default_rng(5000))
     s = np.linspace(0.0, 2.0 * np.pi, 97)
@@ -142,7 +142,7 @@ def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_
         identify_linkage([moved(linkage, heavier, saddle) for saddle in saddles])
 
 
-def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
+def test_motions_are_split_at_gaps_and_short_ones_dropped() -> None:
     n = 4000
     tick, clock, zeros = np.arange(n, dtype=float), np.arange(n) * 1e-3, np.zeros((n, 3))
     tick[1500:] += 3.0
@@ -153,7 +153,7 @@ def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
     assert 3 * WINDOW > 0.19
 
 
-def test_a_device_that_rests_tells_nothing() -> None:
+def test_too_little_or_motionless_data_is_refused() -> None:
     clock, zeros = np.arange(3000) * 1e-3, np.zeros((3000, 3))
     with pytest.raises(SimError, match="expected 56 of each"):
         identify_linkage([Motion(clock, zeros, zeros)])

@@ -45,7 +45,7 @@ RUNS = {
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
 @pytest.mark.parametrize("device", BEHIND)
-def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(device: str, tmp_path: Path) -> None:
+def test_servo_loop_makes_no_heap_calls_in_2000_ticks(device: str, tmp_path: Path) -> None:
     """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself, in the servo or a vendor's thread."""
     library = compiled(tmp_path, HERE / "heap_calls.c")
     environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
@@ -76,7 +76,7 @@ class Aside(EmulatedPhantom):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_no_field_that_a_device_can_be_given_takes_memory(name: str) -> None:
+def test_fields_of_hardware_runs_allocate_nothing(name: str) -> None:
     config = resolved(RUNS[name])
     session, period = session_of(served(config)), config.clock.servo_period
     driver = Aside(SceneConfig(servo_period=period), start_of(session), holds=0.0)

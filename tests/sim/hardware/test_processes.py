@@ -30,7 +30,7 @@ from sim.hardware.recorder_process import RecordingJob, record_rows
 from sim.hardware.servo_process import Ended, ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
-from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
+from tests.sim.hardware.process_factories import PERIOD, device, in_process, over_packets
 
 CLOCK = ServoClock(late=20.0, heartbeat=20.0)
 """So long that a busy machine makes no fault of its own; a test of lateness or silence has a clock of its own."""
@@ -90,7 +90,7 @@ def assert_whole(path: Path, ended: Ended | None) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_with_a_recorder_says_nothing_on_its_error_stream(tmp_path: Path) -> None:
+def test_run_with_a_recorder_writes_nothing_to_stderr(tmp_path: Path) -> None:
     """Neither while it runs, nor when its three processes end."""
     script = (
         "import pathlib, sys; from tests.sim.hardware.test_processes import running\n"
@@ -104,7 +104,7 @@ def test_a_run_with_a_recorder_says_nothing_on_its_error_stream(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Path) -> None:
+def test_recorder_frozen_and_killed_costs_only_rows(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
         assert run.recorder is not None
@@ -130,7 +130,7 @@ def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Pa
 
 
 @pytest.mark.processes
-def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_recording_of_a_run_is_complete_and_counts_missed_deadlines(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
         assert_goes_on(run, 200)
@@ -156,7 +156,7 @@ def bystander(status: SharedNumbers, began: SharedNumbers) -> None:
 
 
 @pytest.mark.slow
-def test_a_page_that_is_frozen_and_killed_is_not_waited_for(tmp_path: Path) -> None:
+def test_servo_does_not_wait_for_a_frozen_or_killed_page(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     began, seen = SharedNumbers(1), np.zeros(1)
     context = multiprocessing.get_context("spawn")
@@ -182,7 +182,7 @@ def limited(size: int, *arguments) -> None:
 
 
 @pytest.mark.processes
-def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
+def test_full_disk_ends_the_recording_but_not_the_run(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with HardwareRun(in_process, PERIOD, CLOCK, job(path)) as run:
         assert run.recorder is not None
@@ -199,7 +199,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.processes
-def test_controls_that_freeze_are_a_fault_and_controls_that_are_back_can_clear_it(tmp_path: Path) -> None:
+def test_frozen_controls_are_a_fault_that_returning_controls_can_clear(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path, ServoClock(late=20.0, heartbeat=SILENT)) as run:
         time.sleep(2.0 * SILENT)
@@ -225,7 +225,7 @@ def goes_past(run: HardwareRun, ticks: int = 20) -> None:
 
 @pytest.mark.processes
 @pytest.mark.parametrize("stall", [0.05, 0.5])
-def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(tmp_path: Path, stall: float) -> None:
+def test_stopped_servo_misses_deadlines_and_does_not_catch_up(tmp_path: Path, stall: float) -> None:
     """A stop of 50 ms is counted where more is allowed; one of 500 ms is a fault where 200 ms are."""
     path = tmp_path / "run.h5"
     with running(path, ServoClock(late=LATE if stall > LATE else 20.0, heartbeat=20.0)) as run:
@@ -249,7 +249,7 @@ def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(tmp
 
 
 @pytest.mark.slow
-def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed(tmp_path: Path) -> None:
+def test_device_watchdog_releases_when_the_servo_is_stopped_or_killed(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown, seen = SharedNumbers(SHOWN_SIZE), np.zeros(SHOWN_SIZE)
@@ -292,7 +292,7 @@ def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed(tmp_pat
 
 
 @pytest.mark.processes
-def test_a_device_that_is_gone_is_a_fault(tmp_path: Path) -> None:
+def test_killed_device_is_a_fault(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
@@ -326,6 +326,6 @@ def refuses() -> None:
 
 
 @pytest.mark.processes
-def test_a_device_that_cannot_be_opened_is_said_in_its_own_words() -> None:
+def test_error_on_opening_a_device_reaches_the_controls() -> None:
     with HardwareRun(refuses, PERIOD, CLOCK) as run, pytest.raises(SimError, match="no such device"):
         run.start()

@@ -25,7 +25,7 @@ def ring() -> Iterator[Ring]:
     made.close()
 
 
-def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
+def test_reader_never_sees_a_partial_write(numbers: SharedNumbers) -> None:
     other, stop, seen = pickle.loads(pickle.dumps(numbers)), threading.Event(), np.zeros(64)
     numbers.write(seen)  # compiled before anybody reads
 
@@ -50,14 +50,14 @@ def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
     assert len(values) > 1
 
 
-def test_a_writer_that_was_killed_in_a_write_is_told_of(numbers: SharedNumbers) -> None:
+def test_write_of_a_killed_writer_is_not_read(numbers: SharedNumbers) -> None:
     into = np.zeros(64)
     assert numbers.read(into)
     numbers.count[0] += 1
     assert not numbers.read(into)
 
 
-def test_a_ring_gives_every_row_once_in_order(ring: Ring) -> None:
+def test_ring_returns_every_row_once_in_order(ring: Ring) -> None:
     for k in range(5):
         ring.append(np.array([k, -k]))
     rows, lost = ring.take()
@@ -69,7 +69,7 @@ def test_a_ring_gives_every_row_once_in_order(ring: Ring) -> None:
     assert (len(ring.take()[0]), lost) == (0, 0)
 
 
-def test_a_ring_that_was_not_emptied_in_time_counts_what_is_gone(ring: Ring) -> None:
+def test_ring_overflow_counts_lost_rows(ring: Ring) -> None:
     for k in range(30):
         ring.append(np.array([k, 0.0]))
     rows, lost = ring.take()
@@ -80,7 +80,7 @@ def test_a_ring_that_was_not_emptied_in_time_counts_what_is_gone(ring: Ring) -> 
     assert (rows[0, 0], lost) == (30.0, 0)
 
 
-def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ring, capfd) -> None:
+def test_process_that_ends_without_closing_writes_nothing_to_stderr(numbers, ring, capfd) -> None:
     child = multiprocessing.get_context("spawn").Process(target=len, args=((numbers, ring),))
     child.start()
     child.join()
@@ -88,7 +88,7 @@ def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ri
     assert capfd.readouterr().err == ""
 
 
-def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_given(ring: Ring) -> None:
+def test_rows_overwritten_during_take_are_counted_and_not_returned(ring: Ring) -> None:
     for k in range(7):
         ring.append(np.array([k, 0.0]))
     copied = ring.numbers

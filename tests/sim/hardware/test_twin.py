@@ -23,13 +23,13 @@ def pushed() -> tuple[dict, dict]:
     return rows, Twin(SceneConfig()).follow(rows)
 
 
-def test_the_twin_predicts_a_tick_within_the_encoders_resolution(pushed) -> None:
+def test_prediction_of_a_tick_is_within_encoder_resolution(pushed) -> None:
     rows, twin = pushed
     assert not rows["fault"].any()
     assert np.sqrt(np.mean(twin["apart"][300:] ** 2)) < 5e-5
 
 
-def test_the_hand_s_force_is_found_where_it_pushes_and_where_it_does_not(pushed) -> None:
+def test_hand_force_is_the_filtered_push_and_otherwise_zero(pushed) -> None:
     _, twin = pushed
     t = np.arange(4000) * 1e-3
     true = np.where((t > 2.0) & (t < 3.0), 1.5 * np.sin(np.pi * (t - 2.0)) ** 2, 0.0)[:, None] * np.array(
@@ -42,7 +42,7 @@ def test_the_hand_s_force_is_found_where_it_pushes_and_where_it_does_not(pushed)
     assert np.sqrt(np.mean(error[500:] ** 2)) < 0.08
 
 
-def test_blocks_of_any_size_give_the_same(pushed) -> None:
+def test_block_sizes_do_not_change_the_result(pushed) -> None:
     rows, whole = pushed
     twin, cuts = Twin(SceneConfig()), [0, 1, 20, 333, 1000, 4000]
     parts = [twin.follow({k: v[a:b] for k, v in rows.items()}) for a, b in itertools.pairwise(cuts)]
@@ -50,7 +50,7 @@ def test_blocks_of_any_size_give_the_same(pushed) -> None:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), channel)
 
 
-def test_a_twin_begins_again_where_ticks_are_missing(pushed) -> None:
+def test_observer_restarts_where_ticks_are_missing(pushed) -> None:
     rows, _ = pushed
     kept = np.r_[0:1000, 1500:2500]
     twin = Twin(SceneConfig()).follow({k: v[kept] for k, v in rows.items()})
@@ -59,7 +59,7 @@ def test_a_twin_begins_again_where_ticks_are_missing(pushed) -> None:
     assert np.sqrt(np.mean(twin["apart"][1300:] ** 2)) < 5e-5
 
 
-def test_the_tip_s_force_is_the_one_whose_torques_they_are() -> None:
+def test_tip_force_solves_the_transposed_jacobian() -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         theta = tuple(rng.uniform(-0.6, 0.6, 3))

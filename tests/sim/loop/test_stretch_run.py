@@ -59,7 +59,7 @@ def ran() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
     return run()
 
 
-def test_the_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(ran) -> None:
+def test_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(ran) -> None:
     _, field, told = ran
     held = told["switch"] > 0.0
     period = SECONDS / len(held)
@@ -77,14 +77,14 @@ def test_the_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(ran) -> No
     assert distances[0] < 1e-9
 
 
-def test_the_rubber_pulls_the_hand_back(ran) -> None:
+def test_rubber_pulls_the_hand_back(ran) -> None:
     _, field, told = ran
     last = np.flatnonzero(told["switch"] > 0.0)[-1]
     away = told["p"][last] - field.curve.point(0.5)
     np.testing.assert_allclose(told["force"][last], -MODE.rubber * away, atol=0.1)
 
 
-def test_the_figure_shows_the_animation_under_the_held_point(ran) -> None:
+def test_figure_shows_the_animation_at_the_held_point(ran) -> None:
     session, _, told = ran
     last = np.flatnonzero(told["switch"] > 0.0)[-1]
     points = np.array([told["p"][last], session.curve.point(0.5)])
@@ -96,12 +96,12 @@ def test_the_figure_shows_the_animation_under_the_held_point(ran) -> None:
     assert before.max() > 3.0 * under.max()
 
 
-def test_the_same_run_bends_the_same_curve_to_the_last_bit(ran) -> None:
+def test_repeated_runs_bend_the_curve_identically(ran) -> None:
     _, _, told = ran
     np.testing.assert_array_equal(run()[2]["memory"], told["memory"])
 
 
-def test_a_bent_curve_is_kept_and_drawn(ran, tmp_path) -> None:
+def test_bent_curve_is_saved_loaded_and_drawn(ran, tmp_path) -> None:
     session, field, told = ran
     bent, path = field.edited(told["memory"]), tmp_path / CURVE_FILE
     save_curve(bent, path)
@@ -125,7 +125,7 @@ def test_a_bent_curve_is_kept_and_drawn(ran, tmp_path) -> None:
     "text",
     ["{", "[1]", '{"times": 1}', '{"times": [0], "positions": [], "quaternions": [], "periodic": 1}', "[" * 9999],
 )
-def test_a_file_that_is_no_curve_is_refused(text: str, tmp_path) -> None:
+def test_file_without_a_curve_is_refused(text: str, tmp_path) -> None:
     path = tmp_path / CURVE_FILE
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SimError, match=r"curve\.json: no curve"):
@@ -134,7 +134,7 @@ def test_a_file_that_is_no_curve_is_refused(text: str, tmp_path) -> None:
         load_curve(tmp_path / "missing.json")
 
 
-def test_a_curve_whose_numbers_make_no_sense_is_refused_with_them(tmp_path) -> None:
+def test_curve_with_invalid_numbers_is_refused_with_them(tmp_path) -> None:
     path = tmp_path / CURVE_FILE
     save_curve(Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), path)
     path.write_text(path.read_text(encoding="utf-8").replace("[0.0, 1.0]", "[1.0, 1.0]"), encoding="utf-8")

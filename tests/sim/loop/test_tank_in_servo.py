@@ -51,14 +51,14 @@ def injected(p, force):
     ],
     ids=lambda changes: changes["mode"],
 )
-def test_a_field_as_it_is_meant_is_never_held_back(changes):
+def test_built_in_fields_are_never_limited(changes):
     session, _, _, tank = run(None, config=run_config(clips=CLIPS, seconds=1.0, **changes))
     assert np.all(tank[:, 1] == 1.0)
     assert tank[:, 0].min() > 0.5 * tank[0, 0] > 0.0
     assert session.servo.field.tank[TANK_ENERGY] == tank[-1, 0]
 
 
-def test_without_need_the_tank_changes_no_bit_of_a_force():
+def test_unneeded_tank_leaves_forces_bit_for_bit():
     config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=lap_pushes(0.0, 1.0))
     session, p, force, _ = run(None, config=config, seconds=0.5)
     _, other_p, other_force, _ = run(session.field.program(), OPEN, 0.5, config)
@@ -66,7 +66,7 @@ def test_without_need_the_tank_changes_no_bit_of_a_force():
     np.testing.assert_array_equal(p, other_p)
 
 
-def test_what_a_hand_puts_into_a_spring_it_gets_back():
+def test_energy_stored_by_the_hand_in_a_spring_is_given_back():
     """A push of 4 N stores more than the tank held at first could lose; the way back is not held back."""
     config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=lap_pushes(0.0, 1.0, 4.0)[:1])
     tank = EnergyTank(1e-3, power=0.012, capacity=2.0, initial=2e-3)
@@ -97,7 +97,7 @@ def late(ticks):
 
 
 @pytest.mark.parametrize("make", [lambda: wrong, lambda: late(25)], ids=["wrong sign", "late"])
-def test_a_wrong_law_gets_no_more_than_its_budget(make):
+def test_active_law_injects_no_more_than_its_budget(make):
     tank = EnergyTank(1e-3, power=0.02, capacity=0.5, initial=0.02)
     config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=(Push(0.0, 0.1, 2.0),))
     _, p, force, held = run(PythonLaw(make()).program(), tank, 1.5, config)

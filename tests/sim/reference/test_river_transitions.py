@@ -67,7 +67,7 @@ def _rates(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rate[:, 6:].max(axis=1), rate[:, :3].max(axis=1)
 
 
-def test_pose_and_velocity_are_continuous_at_a_change_and_without_inertialisation_they_are_not(clips_of_rivers) -> None:
+def test_pose_and_velocity_are_continuous_only_with_inertialisation(clips_of_rivers) -> None:
     joint, root = _rates(_played(clips_of_rivers, BLEND))
     jumping_joint, jumping_root = _rates(_played(clips_of_rivers, 0.0))
     # Within what the clips themselves do elsewhere.
@@ -84,7 +84,7 @@ def test_pose_and_velocity_are_continuous_at_a_change_and_without_inertialisatio
     assert jumping_root.max() > root.max()
 
 
-def test_the_figure_goes_on_where_it_stands(clips_of_rivers) -> None:
+def test_figure_continues_from_its_place_on_the_floor(clips_of_rivers) -> None:
     poses = _played(clips_of_rivers, BLEND)
     ground = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1) / PERIOD
     # It walked more than a metre before, and is not pulled back.
@@ -92,7 +92,7 @@ def test_the_figure_goes_on_where_it_stands(clips_of_rivers) -> None:
     assert ground.max() < 2.0
 
 
-def test_feet_that_touch_the_floor_step_instead_of_sliding(clips_of_rivers) -> None:
+def test_feet_in_contact_step_instead_of_sliding(clips_of_rivers) -> None:
     poses, data = _played(clips_of_rivers, BLEND), mujoco.MjData(FIGURE)
     ids = [FIGURE.geom(name).id for name in FOOT_CONTACTS]
     points = np.empty((len(poses), len(ids), 3))
@@ -113,7 +113,7 @@ def test_feet_that_touch_the_floor_step_instead_of_sliding(clips_of_rivers) -> N
             assert step[first:last, of_side][rows, lowest][low].sum() < 0.02
 
 
-def test_while_no_river_has_the_hand_the_last_clip_plays(clips_of_rivers) -> None:
+def test_last_clip_plays_while_no_river_has_the_hand(clips_of_rivers) -> None:
     np.testing.assert_array_equal(_played(clips_of_rivers, BLEND, True), _played(clips_of_rivers, BLEND))
 
 
@@ -133,7 +133,7 @@ def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
     return poses
 
 
-def test_a_hand_that_leaves_all_rivers_leaves_the_figure_standing(clips_of_rivers) -> None:
+def test_figure_stands_while_the_hand_is_outside_all_rivers(clips_of_rivers) -> None:
     poses = _thrown(clips_of_rivers, True)
     joint, root = _rates(poses)
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
@@ -165,20 +165,20 @@ def _jerk(poses: np.ndarray) -> float:
     return float(np.abs(np.diff(velocity, axis=0)).max())
 
 
-def test_rivers_that_have_the_hand_in_turns_change_the_clip_once_in_a_blend_time(clips_of_rivers) -> None:
+def test_alternating_rivers_change_the_clip_once_per_blend_time(clips_of_rivers) -> None:
     # The first change comes in the middle of a kick.
     assert _jerk(_in_turns(clips_of_rivers, 0.06, BLEND)) < 20.0
     assert _jerk(_in_turns(clips_of_rivers, 0.06, 0.0)) > 60.0
 
 
-def test_a_river_that_has_the_hand_for_a_moment_changes_no_clip(clips_of_rivers) -> None:
+def test_momentary_river_changes_no_clip(clips_of_rivers) -> None:
     alone = _in_turns(clips_of_rivers, 1e3, BLEND)
     np.testing.assert_array_equal(_in_turns(clips_of_rivers, 0.03, BLEND), alone)
     assert np.abs(_in_turns(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
 
 
 @pytest.mark.parametrize("clips", [("squat_dance", "walk", "angry"), ("walk", "run", "squat_dance")])
-def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]) -> None:
+def test_feet_in_contact_do_not_slide_into_a_walk_or_run(clips: tuple[str, ...]) -> None:
     rivers = rivers_that_play(clips)
     for change in drawn_changes(rivers, 18, np.random.default_rng(3 if clips[0] == "squat_dance" else 2), False):
         # Where a kick went over into a walk that changes feet within the change it was 22 cm.
@@ -187,7 +187,7 @@ def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]
 
 
 @pytest.mark.parametrize(("first", "second"), [("jump", "angry"), ("angry", "jump")])
-def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, second: str) -> None:
+def test_change_waits_for_landing_or_takeoff(first: str, second: str) -> None:
     names = (first, second, "run")
     rivers = rivers_that_play(names)
     changed = 0
@@ -203,7 +203,7 @@ def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, seco
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(stops: bool) -> None:
+def test_stance_foot_neither_slides_nor_penetrates_during_changes_and_stops(stops: bool) -> None:
     clips = rivers_that_play(("squat_dance", "cheer", "angry"))
     for change in drawn_changes(clips, 12, np.random.default_rng(3), stops):
         # Without a foot that stands and phases of rest it was 6 cm, and 50 cm below the floor.
@@ -212,7 +212,7 @@ def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_t
         assert change.slide < 0.03
 
 
-def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
+def test_stopped_figure_is_in_balance_only_with_rest_phases(clips_of_rivers) -> None:
     data, feet = mujoco.MjData(FIGURE), [FIGURE.geom(name).id for name in FOOT_CONTACTS]
     for clips, balanced in ((with_rests(clips_of_rivers, FIGURE), True), (clips_of_rivers, False)):
         missing = []
@@ -240,7 +240,7 @@ def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
         (("walk", "run", "squat_dance"), 1, 2, 4.134903),
     ],
 )
-def test_no_velocity_leaps_in_a_change(clips: tuple[str, ...], first: int, second: int, moment: float) -> None:
+def test_velocity_is_continuous_in_difficult_changes(clips: tuple[str, ...], first: int, second: int, moment: float) -> None:
     rivers = rivers_that_play(clips)
     change = measured_change(played_change(rivers, first, second, moment))
     finer = measured_change(played_change(rivers, first, second, moment, PERIOD / 8.0), PERIOD / 8.0)
@@ -253,7 +253,7 @@ def test_no_velocity_leaps_in_a_change(clips: tuple[str, ...], first: int, secon
 
 
 @pytest.mark.parametrize(("first", "moment"), [(0, 3.984633), (0, 2.025926), (1, 4.134903), (1, 4.142741)])
-def test_a_hand_that_is_thrown_off_does_not_throw_the_figure(first: int, moment: float) -> None:
+def test_figure_stops_smoothly_when_the_hand_is_thrown_off_the_river(first: int, moment: float) -> None:
     rivers = rivers_that_play(("run", "jump", "walk"))
     stop = measured_change(played_change(rivers, first, None, moment))
     # Followed until it raced the clip twice over the root leapt by up to 3.7 m/s, and joints by 114 rad/s.
@@ -262,7 +262,7 @@ def test_a_hand_that_is_thrown_off_does_not_throw_the_figure(first: int, moment:
     assert stop.joint < 32.0
 
 
-def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
+def test_transitions_match_golden_poses(clips_of_rivers) -> None:
     poses = _played(clips_of_rivers, BLEND)[::15]
     np.testing.assert_allclose(poses, np.loadtxt(GOLDEN, delimiter=","), atol=1e-7)
 

@@ -44,7 +44,7 @@ def _lowest(poses: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["jump", "run"])
-def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str) -> None:
+def test_flight_poses_are_lowered_to_the_floor_and_stances_unchanged(name: str) -> None:
     poses = _poses(name)
     before, lowered = _lowest(poses), poses.copy()
     for pose in lowered:
@@ -62,7 +62,7 @@ def test_a_flight_that_is_let_down_is_on_the_floor_and_a_stance_stays(name: str)
     np.testing.assert_array_equal(lowered, poses)
 
 
-def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
+def test_upside_down_figure_is_not_lowered() -> None:
     poses = _poses("backflip")
     over = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
     lowered = over.copy()
@@ -72,7 +72,7 @@ def test_a_figure_that_is_upside_down_is_not_put_on_its_feet() -> None:
     np.testing.assert_array_equal(lowered, over)
 
 
-def test_a_hand_is_slow_until_it_has_the_pace_of_the_clips() -> None:
+def test_lowering_share_falls_to_zero_as_the_hand_reaches_the_clip_pace() -> None:
     p = np.array([0.05, 0.0, 0.02])
     along = 0.05 * 2.0 * np.pi / LAP * np.array([0.0, 1.0, 0.0])
     shares = [lowering_goal(p, pace * along, LAP) for pace in np.linspace(0.0, 1.2, 49)]
@@ -86,7 +86,7 @@ def test_a_hand_is_slow_until_it_has_the_pace_of_the_clips() -> None:
     assert lowering_goal(np.zeros(3), along, LAP) == 1.0
 
 
-def test_the_share_goes_over_without_a_jump_or_an_overshoot() -> None:
+def test_share_approaches_its_goal_without_jump_or_overshoot() -> None:
     state, rows = np.zeros(3), []
     for _ in range(125):
         approach(state, 1.0, PERIOD)
@@ -114,7 +114,7 @@ def _held_in_flight(clip_seconds: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_a_jump_that_is_held_comes_down_and_without_it_hovers() -> None:
+def test_held_jump_comes_down_and_hovers_without_settling() -> None:
     shown, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
     assert _lowest(hovering)[-1] > 0.2
     assert _lowest(shown)[-1] < 0.006
@@ -125,7 +125,7 @@ def test_a_jump_that_is_held_comes_down_and_without_it_hovers() -> None:
     assert np.abs(np.diff(velocity)).max() < 0.5
 
 
-def test_what_nobody_can_do_is_said_beforehand() -> None:
+def test_remarks_name_clips_whose_flights_cannot_be_held() -> None:
     assert flight_remarks(load_clips(("walk", "cheer"))[0], "physical") == ()
     (remark,) = flight_remarks(load_clips(("jump", "run", "walk"))[0], "physical")
     assert "jump, run" in remark
@@ -133,7 +133,7 @@ def test_what_nobody_can_do_is_said_beforehand() -> None:
     assert "upside down" in flight_remarks(load_clips(("backflip",))[0], "physical")[-1]
 
 
-def test_only_a_physical_figure_is_said_to_fall() -> None:
+def test_only_a_physical_figure_is_remarked_to_fall() -> None:
     flying = load_clips(("backflip", "jump"))[0]
     (remark,) = flight_remarks(flying, "kinematic")
     assert remark.endswith("the flights of backflip, jump are lowered to the floor")
@@ -142,7 +142,7 @@ def test_only_a_physical_figure_is_said_to_fall() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("clips", [("jump",), ("walk", "run", "jump", "angry")])
-def test_a_figure_whose_flights_are_held_and_carried_stands(clips: tuple[str, ...]) -> None:
+def test_physical_figure_stands_through_held_and_carried_flights(clips: tuple[str, ...]) -> None:
     config = run_config(clips=clips, mode="stretch-then-follow", seconds=18.0)
     session = wire(config, load_clips(clips)[0])
     root = int(session.world.model.joint(FIGURE + "root").qposadr[0])

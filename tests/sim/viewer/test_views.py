@@ -30,7 +30,7 @@ def seen(view: View, width: float, height: float) -> np.ndarray:
     "size", [(1400, 850), (900, 520), (1920, 1080), (390, 780), (1170, 2340), (700, 900), (600, 1200)]
 )
 @pytest.mark.parametrize("name", VIEWS)
-def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int]) -> None:
+def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int]) -> None:
     width, height = size
     free = (width, (1.0 - SHEET) * height) if is_phone(width, height) else (width - PANEL, height)
     pixels = seen(VIEWS[name], *size)
@@ -58,7 +58,7 @@ def resize(camera: Any, width: int, height: int) -> None:
     camera.image_width, camera.aspect = width, width / height
 
 
-def test_a_view_is_fitted_to_a_window_that_is_resized_until_somebody_turns_it() -> None:
+def test_view_is_fitted_to_resized_windows_until_somebody_turns_it() -> None:
     _, camera, update = opened()
     for size in ((1300, 850), (800, 600), (600, 1200), (390, 780)):
         resize(camera, *size)
@@ -79,7 +79,7 @@ def test_a_view_is_fitted_to_a_window_that_is_resized_until_somebody_turns_it() 
     np.testing.assert_array_equal(camera.position, turned)
 
 
-def test_a_browser_that_applies_the_initial_camera_late_is_shown_its_view_again() -> None:
+def test_late_initial_camera_is_replaced_by_the_fitted_view() -> None:
     server, camera, update = opened()
     fitted = camera_of(VIEWS["both"], 900, 520)
     np.testing.assert_allclose(camera.position, fitted.position)

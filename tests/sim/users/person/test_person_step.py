@@ -59,7 +59,7 @@ class Clamped:
         self.ticks += ticks
 
 
-def test_at_rest_arm_and_fingers_are_springs_in_series() -> None:
+def test_arm_and_fingers_at_rest_are_springs_in_series() -> None:
     hand = Clamped(QUIET, Wishes(following(np.zeros((2, 3)))))
     hand.hold(np.zeros(3), 0.3)
     moved = np.array([0.002, -0.001, 0.0015])
@@ -69,7 +69,7 @@ def test_at_rest_arm_and_fingers_are_springs_in_series() -> None:
     np.testing.assert_allclose(hand.force, -series @ moved, rtol=2e-3, atol=1e-4)
 
 
-def test_no_reflex_and_no_belief_comes_before_its_delay() -> None:
+def test_reflex_and_belief_change_only_after_their_delays() -> None:
     hand = Clamped(QUIET, Wishes(following(np.zeros((2, 3)))))
     hand.hold(np.zeros(3), 0.5)
     hand.hold(np.array([0.003, 0.0, 0.0]), QUIET.reflex_delay - 2e-3)
@@ -80,7 +80,7 @@ def test_no_reflex_and_no_belief_comes_before_its_delay() -> None:
     assert hand.state.vectors[FELT_FORCE, 0] < -0.1
 
 
-def test_a_force_is_felt_with_noise_in_proportion_to_it() -> None:
+def test_felt_force_has_noise_proportional_to_it() -> None:
     rows, felt = resting(2), list[np.ndarray]()
     rows[0, ENGAGED] = 1.0
     hand = Clamped(QUIET, Wishes(rows, OWN))
@@ -99,7 +99,7 @@ def _led_astray(person: PersonState, ways: np.ndarray) -> None:
         ways[k] = person.vectors[ASTRAY]
 
 
-def test_a_movement_is_felt_in_a_wrong_direction_by_what_filtered_noise_has() -> None:
+def test_direction_error_has_the_variance_of_filtered_noise() -> None:
     person = Participant(Person(), Wishes(resting(2)), 1).holding(PERIOD, STEP)
     speed, ways = 0.2, np.empty((2_000_000, 3))
     person.vectors[HAND_V] = 0.0, speed, 0.0
@@ -110,21 +110,21 @@ def test_a_movement_is_felt_in_a_wrong_direction_by_what_filtered_noise_has() ->
     assert abs(np.mean(ways[:, 0] * ways[:, 2])) < 0.1 * variance
 
 
-def test_a_relaxed_person_takes_the_place_where_she_is_put() -> None:
+def test_relaxed_person_exerts_no_lasting_force() -> None:
     hand = Clamped(QUIET, Wishes(resting(2)))
     hand.hold(np.zeros(3), 0.3)
     hand.hold(np.array([0.01, 0.0, 0.0]), 3.0)
     assert np.abs(hand.force).max() < 0.02
 
 
-def test_nobody_pulls_harder_than_she_can() -> None:
+def test_force_is_limited_by_strength() -> None:
     hand = Clamped(replace(QUIET, strength=3.0), Wishes(following(np.zeros((2, 3)))))
     hand.hold(np.zeros(3), 0.1)
     hand.hold(np.array([0.08, 0.0, 0.0]), 1.0)
     assert np.linalg.norm(hand.force) <= 3.0 + 1e-9
 
 
-def test_a_force_that_is_held_tires_her_by_the_three_compartment_model() -> None:
+def test_held_force_tires_by_the_three_compartment_model() -> None:
     """While she holds a share f of strength, (1 − C)(t) = (F f/R)(1 − exp(−R t)); see `sim.users.person.muscles`."""
     person = replace(QUIET, strength=20.0, fatigue=4.0)
     hand = Clamped(person, Wishes(following(np.zeros((2, 3)))))
@@ -137,7 +137,7 @@ def test_a_force_that_is_held_tires_her_by_the_three_compartment_model() -> None
     assert began - hand.state.memory[CAPACITY] == pytest.approx(lost, rel=0.02)
 
 
-def test_a_tired_person_loses_strength_and_a_rested_one_keeps_it() -> None:
+def test_strength_is_lost_only_with_fatigue() -> None:
     for fatigue, least, most in ((0.0, 1.0, 1.0), (4.0, 0.3, 0.95)):
         hand = Clamped(replace(QUIET, strength=3.0, fatigue=fatigue), Wishes(following(np.zeros((2, 3)))))
         hand.hold(np.zeros(3), 0.1)
@@ -162,14 +162,14 @@ def eye_of(effect: np.ndarray, p: np.ndarray, trust: float) -> Eye:
     return Eye(pose(p), np.array([pose(q) for q in PLACES]), PLACES, inverses, unseens, np.full(n, trust))
 
 
-def test_an_eye_finds_the_place_that_a_pose_tells() -> None:
+def test_eye_finds_the_place_of_a_pose() -> None:
     effect, place = 3.0 * np.random.default_rng(2).normal(size=(3, 3)), np.zeros(3)
     for p in (np.array([0.03, 0.02, 0.01]), np.array([-0.04, 0.001, -0.01])):
         seen_place(eye_of(effect, p, 0.0), p + 0.002, np.empty(57), place)
         np.testing.assert_allclose(place, p, atol=1e-12)
 
 
-def test_what_the_figure_does_not_show_is_felt() -> None:
+def test_unseen_directions_are_taken_from_the_felt_place() -> None:
     """The most likely place of a picture without noise is that of the linear Gaussian problem, in closed form."""
     effect, p, felt, place = (
         np.diag([50.0, 50.0, 0.0]),
@@ -199,7 +199,7 @@ def path_of(participant: Participant, seconds: float, block: float, **asking) ->
     return np.concatenate(rows)
 
 
-def test_a_run_is_of_its_seed_and_not_of_the_blocks_it_is_run_in() -> None:
+def test_run_depends_on_its_seed_and_not_on_its_blocks() -> None:
     curve = Trajectory.circle(float(np.hypot(*START[:2])), 4.0)
     wishes = Trace().wishes(curve, 1.0, 1)
     first = path_of(Participant(Person(), wishes, 3), 0.6, 0.2)
@@ -207,7 +207,7 @@ def test_a_run_is_of_its_seed_and_not_of_the_blocks_it_is_run_in() -> None:
     assert np.abs(first - path_of(Participant(Person(), wishes, 4), 0.6, 0.2)).max() > 1e-6
 
 
-def test_an_intent_of_one_s_own_moves_the_hand_in_python_and_compiled() -> None:
+def test_own_intent_moves_the_hand_in_python_and_compiled() -> None:
     goal = START + np.array([0.01, 0.0, 0.0])
 
     def mine(t, place, force):
@@ -233,6 +233,6 @@ def test_an_intent_of_one_s_own_moves_the_hand_in_python_and_compiled() -> None:
     np.testing.assert_allclose(asked, 0.1 * np.arange(10), atol=1e-9)
 
 
-def test_a_servo_without_a_person_needs_no_person_s_code() -> None:
+def test_servo_without_a_person_needs_no_person_unit() -> None:
     assert simulated(device_world()).units() == ()
     assert len(servo_of(Participant())[0].device.units()) == 1  # pyright: ignore[reportAttributeAccessIssue]

@@ -61,7 +61,7 @@ def _played(clips: RiverClips, rivers: tuple[tuple[float, int], ...], seconds: f
     return poses, memory
 
 
-def test_a_known_change_begins_at_its_gate_ends_in_the_other_clip_and_nothing_jumps(known: RiverClips) -> None:
+def test_change_begins_at_its_gate_ends_in_the_other_clip_without_jumps(known: RiverClips) -> None:
     (change,) = known.changes
     gate, begins = change.gates[0], 0.3
     poses, memory = _played(known, ((begins, 1),), 2.0 * LAP)
@@ -83,7 +83,7 @@ def test_a_known_change_begins_at_its_gate_ends_in_the_other_clip_and_nothing_ju
     assert np.abs(pose_difference(alone, poses[after : after + 1])[0, 6:]).max() < 0.02
 
 
-def test_a_hand_that_comes_back_before_the_gate_never_changes(known: RiverClips) -> None:
+def test_hand_that_returns_before_the_gate_causes_no_change(known: RiverClips) -> None:
     gate = known.changes[0].gates[0]
     leaves = (gate + 0.3) % LAP
     poses, memory = _played(known, ((LAP + leaves, 1), (LAP + leaves + 0.6, 0)), 2.6 * LAP)
@@ -94,12 +94,12 @@ def test_a_hand_that_comes_back_before_the_gate_never_changes(known: RiverClips)
     assert np.abs(np.diff(rate, axis=0))[round(0.5 / PERIOD) :, 6:].max() < 1.5
 
 
-def test_changes_that_are_not_known_go_by_offsets_as_they_did(plain: RiverClips, known: RiverClips) -> None:
+def test_change_without_precomputed_passage_goes_by_offsets(plain: RiverClips, known: RiverClips) -> None:
     rivers = ((1.4, 2), (4.3, 0))
     np.testing.assert_array_equal(_played(known, rivers, 6.0)[0], _played(plain, rivers, 6.0)[0])
 
 
-def test_where_no_change_is_found_the_map_is_as_it_was(
+def test_map_is_unchanged_where_no_change_is_found(
     plain: RiverClips, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
@@ -112,7 +112,7 @@ def test_where_no_change_is_found_the_map_is_as_it_was(
         np.testing.assert_array_equal(made.compiled().params, plain.compiled().params)
 
 
-def test_a_change_found_in_a_round_of_two_laps_is_that_of_a_lap_twice_as_long(
+def test_change_found_in_a_two_lap_round_equals_that_of_a_doubled_lap(
     plain: RiverClips, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(river_changes, "feasible", lambda clip, *rest, **more: SimpleNamespace(clip=clip, costs=(0.0,)))
@@ -130,7 +130,7 @@ def test_a_change_found_in_a_round_of_two_laps_is_that_of_a_lap_twice_as_long(
         np.testing.assert_allclose(again, once, atol=0.02)
 
 
-def test_strides_of_two_clips_are_told(plain: RiverClips) -> None:
+def test_common_stride_count_of_two_clips_is_found(plain: RiverClips) -> None:
     walk, run = (load_clips((name,))[0][0] for name in ("walk", "run"))
     clips = RiverClips(CURVES[:2], [(clip.poses, clip.fps) for clip in (walk, run)], 0.015, figure_legs(FIGURE), 4.4)
     alike = clips.on_one_river()
@@ -155,7 +155,7 @@ def test_strides_of_two_clips_are_told(plain: RiverClips) -> None:
         (Verdict(0.2, 2.0), ("from river to river the physical figure falls at 2.0 s, before any river changes",)),
     ],
 )
-def test_what_is_not_followed_is_said_with_the_change_before(
+def test_remark_names_the_change_before_a_fall_or_the_missing_support(
     plain: RiverClips, monkeypatch: pytest.MonkeyPatch, verdict: Verdict, said: tuple[str, ...]
 ) -> None:
     from experiments.config.run_config import Figure
@@ -172,14 +172,14 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> CompletedProcess[str]:
 
 
 @pytest.mark.slow
-def test_a_run_over_changes_compiles_nothing_in_its_own_process(ran: CompletedProcess[str]) -> None:
+def test_run_with_changes_compiles_nothing_in_its_own_process(ran: CompletedProcess[str]) -> None:
     assert "The stylus ran" in ran.stdout
     assert compiled(ran) == []
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("ran")
-def test_the_figure_follows_over_all_changes_of_three_clips_that_it_loses_by_offsets() -> None:
+def test_figure_follows_all_changes_between_three_clips_better_than_offsets() -> None:
     from experiments.config.run_config import Figure
     from experiments.preparation.followed import followed
 

@@ -102,7 +102,7 @@ def assert_comes_back(line: Line) -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("joint", range(6))
-def test_an_angle_that_is_no_number_switches_the_motors_off_in_that_tick(joint: int, bad: float) -> None:
+def test_angle_that_is_not_finite_switches_motors_off_in_that_tick(joint: int, bad: float) -> None:
     line = Line()
     line.run(300)
     assert line.sizes[-1] > ACTS
@@ -121,7 +121,7 @@ def test_an_angle_that_is_no_number_switches_the_motors_off_in_that_tick(joint: 
     assert_comes_back(line)
 
 
-def test_an_angle_of_the_simulated_linkage_that_is_no_number_does_the_same() -> None:
+def test_simulated_angle_that_is_not_finite_switches_motors_off_in_that_tick() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     ticks, frames = make_logs(servo, 300)
@@ -138,7 +138,7 @@ def test_an_angle_of_the_simulated_linkage_that_is_no_number_does_the_same() -> 
 
 @pytest.mark.parametrize("joint", range(3))
 @pytest.mark.parametrize("jump", [0.3, -0.3, 0.13])
-def test_an_encoder_that_jumps_is_an_impossible_rate(joint: int, jump: float) -> None:
+def test_encoder_jump_is_an_impossible_rate(joint: int, jump: float) -> None:
     line = Line()
     line.run(300)
 
@@ -156,7 +156,7 @@ def test_an_encoder_that_jumps_is_an_impossible_rate(joint: int, jump: float) ->
 
 
 @pytest.mark.parametrize("silent", [SILENT_PERIODS, 40])
-def test_readings_that_stop_are_stale_by_their_number(silent: int) -> None:
+def test_readings_that_stop_are_stale_after_the_silent_periods(silent: int) -> None:
     """The hand lets go before it is pushed anywhere: the driver's motors are off a silence later."""
     line = Line(silent=silent)
     line.run(300)
@@ -199,7 +199,7 @@ def test_encoders_that_stand_under_a_force_are_frozen() -> None:
     assert_let_go(line, since)
 
 
-def test_frozen_encoders_of_the_simulated_linkage_are_found_too() -> None:
+def test_frozen_encoders_of_the_simulated_linkage_are_detected() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     ticks, frames = make_logs(servo, 1000)
@@ -222,7 +222,7 @@ def test_frozen_encoders_of_the_simulated_linkage_are_found_too() -> None:
     assert not np.any(force[first:])
 
 
-def test_a_servo_that_was_away_is_counted_and_its_force_ramped_in() -> None:
+def test_servo_gap_is_counted_and_force_ramps_in_again() -> None:
     line = Line()
     line.run(300)
     before = line.sizes[-1]
@@ -242,7 +242,7 @@ def test_a_servo_that_was_away_is_counted_and_its_force_ramped_in() -> None:
     assert line.sizes[-1] > ACTS
 
 
-def test_a_servo_that_was_away_from_the_simulated_linkage_likewise() -> None:
+def test_servo_gap_on_the_simulated_linkage_is_counted_and_force_ramps_in_again() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     ticks, frames = make_logs(servo, 400)
@@ -264,7 +264,7 @@ def test_a_servo_that_was_away_from_the_simulated_linkage_likewise() -> None:
 
 @pytest.mark.parametrize("place", range(5))
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_limiter_that_lost_its_memory_is_a_fault(place: int, bad: float) -> None:
+def test_limiter_memory_that_is_not_finite_is_a_fault(place: int, bad: float) -> None:
     line = Line()
     line.run(300)
     line.servo.field.limiter[place] = bad
@@ -275,7 +275,7 @@ def test_a_limiter_that_lost_its_memory_is_a_fault(place: int, bad: float) -> No
 
 
 @pytest.mark.parametrize("place", [0, 2, 3, 4, 5, 6, 7])
-def test_a_tank_that_lost_its_memory_is_a_fault(place: int) -> None:
+def test_tank_memory_that_is_not_finite_is_a_fault(place: int) -> None:
     line = Line()
     line.run(300)
     line.servo.field.tank[place] = np.nan
@@ -286,7 +286,7 @@ def test_a_tank_that_lost_its_memory_is_a_fault(place: int) -> None:
     assert_comes_back(line)
 
 
-def test_a_tank_that_cuts_a_force_is_held_to_the_slew_limit_and_books_what_the_hand_got() -> None:
+def test_force_cut_by_the_tank_obeys_the_slew_limit_and_its_work_is_booked() -> None:
     """8 N that a tank without energy forbids go down by the slew a tick, and the work of these ticks is booked."""
     limiter, tank = ForceLimiter(1e-3), EnergyTank(1e-3, power=1e-9, capacity=1.0)
     memory, store, faults = limiter.fresh_memory(), tank.fresh_memory(), plausible().fresh()
@@ -313,7 +313,7 @@ def plausible() -> Plausibility:
 # What is no fault
 
 
-def test_no_fault_of_a_hand_that_holds_still() -> None:
+def test_motionless_hand_is_no_fault() -> None:
     """At rest without force, firmly against a small force, and, with the switch pressed, against a large one."""
     path = np.tile(START, (2, 1))
     cases = (
@@ -332,7 +332,7 @@ def test_no_fault_of_a_hand_that_holds_still() -> None:
     assert all(still)  # so the rule had its chance
 
 
-def test_no_fault_of_a_trembling_hand_that_holds_firmly_against_a_force() -> None:
+def test_trembling_firm_hand_under_force_is_no_fault() -> None:
     t = np.arange(3000) * 1e-3
     tremor = 0.05e-3 * np.sin(2.0 * np.pi * 9.0 * t)[:, None] * np.array([0.6, 0.64, 0.48])
     line = Line(Arm(1000.0, 10.0, START + tremor, 1e-3))
@@ -341,7 +341,7 @@ def test_no_fault_of_a_trembling_hand_that_holds_firmly_against_a_force() -> Non
     assert not any(line.fault)
 
 
-def test_the_linkage_never_turns_as_fast_as_a_rate_that_is_impossible() -> None:
+def test_linkage_at_peak_torque_stays_below_the_impossible_rate() -> None:
     """Every motor at its peak torque from stop to stop, friction and all: below what counts as impossible."""
     world = World(kind="none")
     model, fastest = world.model, np.zeros(3)
@@ -400,7 +400,7 @@ def spoilers(rng: np.random.Generator, line: Line) -> tuple[str, Callable[[], No
 
 
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
-def test_whatever_is_injected_the_force_is_zero_within_two_ticks_of_its_detection(seed: int) -> None:
+def test_random_fault_zeroes_the_force_in_the_tick_of_its_detection(seed: int) -> None:
     rng, seen = np.random.default_rng(seed), []
     for _ in range(25):
         line = Line(damping=float(rng.uniform(2.0, 6.0)))

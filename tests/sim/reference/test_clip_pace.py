@@ -57,7 +57,7 @@ def _bumped(seconds: float) -> np.ndarray:
     return t + LEAD * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-def test_a_push_along_the_river_does_not_make_the_clip_race_and_it_catches_up(walk: RiverClips) -> None:
+def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: RiverClips) -> None:
     played = _played(walk, _bumped(5.0))
     after = slice(round(0.8 / PERIOD), None)
     rates = [np.diff(phases[after]) / PERIOD for phases in (played.hand, played.clip)]
@@ -68,7 +68,7 @@ def test_a_push_along_the_river_does_not_make_the_clip_race_and_it_catches_up(wa
     assert lag[-1] == pytest.approx(0.0, abs=2e-3)
 
 
-def test_velocity_and_acceleration_are_those_of_the_motion_that_is_shown(walk: RiverClips) -> None:
+def test_velocity_and_acceleration_are_those_of_the_shown_motion(walk: RiverClips) -> None:
     played = _played(walk, _bumped(1.6))
     # While all of the excess is taken up; later the stylus filter's prediction of a pushed hand is off by itself.
     pushed = slice(round((PUSHED + 0.04) / PERIOD), round((PUSHED + 0.1) / PERIOD))
@@ -78,7 +78,7 @@ def test_velocity_and_acceleration_are_those_of_the_motion_that_is_shown(walk: R
 
 
 @pytest.mark.slow
-def test_a_hand_that_goes_on_faster_is_followed_with_a_lag_and_one_that_stops_at_once(walk: RiverClips) -> None:
+def test_clip_follows_a_faster_hand_with_a_lag_and_stops_with_it(walk: RiverClips) -> None:
     t = np.arange(round(6.0 / PERIOD)) * PERIOD
     fast = _played(walk, np.where(t < 1.0, t, 1.0 + 1.3 * (t - 1.0)))
     assert np.diff(fast.clip)[-500:].mean() / PERIOD == pytest.approx(1.3, abs=0.02)

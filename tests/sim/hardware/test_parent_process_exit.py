@@ -18,7 +18,7 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.gated_servo import ROW_SIZE
 from sim.hardware.recorder_process import RECORDER_SIZE, record_rows
 from sim.hardware.shared import Ring, SharedNumbers
-from tests.sim.hardware.hosted import PERIOD
+from tests.sim.hardware.process_factories import PERIOD
 from tests.sim.hardware.test_processes import job
 
 GONE = 2**22 + 1  # no process has such an id
@@ -30,7 +30,7 @@ def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=GONE))
 
 
-def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, monkeypatch) -> None:
+def test_emulated_device_ends_if_its_parent_died_while_it_started(orphan, monkeypatch) -> None:
     class Device:
         writes, torque, clock = 0, np.zeros(3), 0.0
 
@@ -48,7 +48,7 @@ def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, mon
     shown.close()
 
 
-def test_an_empty_recording_of_a_killed_run_is_taken_away(orphan, monkeypatch, tmp_path) -> None:
+def test_empty_recording_of_a_killed_run_is_removed(orphan, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     rows, orders, report = Ring(10, ROW_SIZE), SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
     record_rows(job(tmp_path / "run.h5"), rows, orders, report)
@@ -57,7 +57,7 @@ def test_an_empty_recording_of_a_killed_run_is_taken_away(orphan, monkeypatch, t
         shared.close()
 
 
-def test_a_worker_whose_page_went_while_it_worked_ends(orphan) -> None:
+def test_worker_ends_if_its_page_died_while_it_worked(orphan) -> None:
     class Asked:
         times = 0
 
@@ -73,7 +73,7 @@ SCRIPT = """
 import multiprocessing, os, signal, socket, time
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.shared import SharedNumbers
-from tests.sim.hardware.hosted import PERIOD, device
+from tests.sim.hardware.process_factories import PERIOD, device
 
 
 def late():
@@ -92,7 +92,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_a_killed_parent_leaves_no_device(tmp_path) -> None:
+def test_killed_parent_leaves_no_device_process(tmp_path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(SCRIPT)
     # Its output ends when the last process that has it is gone.

@@ -42,7 +42,7 @@ INTENTS = [
 ]  # fmt: skip
 
 
-def test_a_submovement_meets_both_its_ends_and_has_least_jerk() -> None:
+def test_submovement_meets_both_ends_with_least_jerk() -> None:
     rng = np.random.default_rng(1)
     start, goal, plan, seconds = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), np.zeros((6, 3)), 0.37
     set_submovement(plan, start, goal, seconds)
@@ -59,7 +59,7 @@ def test_a_submovement_meets_both_its_ends_and_has_least_jerk() -> None:
     assert abs(np.trapezoid(jerk * change, s)) < 1e-5 * np.sqrt(np.trapezoid(jerk**2, s) * np.trapezoid(change**2, s))
 
 
-def test_a_target_is_reached_in_as_many_submovements_as_are_soonest() -> None:
+def test_submovement_count_minimises_the_total_time() -> None:
     def total(n: int, x: float, scatter: float) -> float:
         return n * (0.2 + max(0.16, scatter * x ** (1.0 / n)))
 
@@ -68,7 +68,7 @@ def test_a_target_is_reached_in_as_many_submovements_as_are_soonest() -> None:
         assert aimed_seconds(x, scatter, 0.2, 0.16) == pytest.approx(total(best, x, scatter) / best - 0.2)
 
 
-def test_the_smoothest_pace_of_an_ellipse_is_harmonic() -> None:
+def test_natural_pace_of_an_ellipse_is_harmonic() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 257)
     ellipse = np.stack([0.04 * np.cos(angle), 0.02 * np.sin(angle)], axis=1)
     # Points evenly in arc length, so that nothing is told of the pace.
@@ -78,7 +78,7 @@ def test_the_smoothest_pace_of_an_ellipse_is_harmonic() -> None:
     np.testing.assert_allclose(natural_times(points, 2.0 * np.pi), even, atol=0.06)
 
 
-def test_a_wanted_motion_runs_through_its_rows_and_rests_at_its_end() -> None:
+def test_wanted_motion_interpolates_its_rows_and_rests_at_its_end() -> None:
     t = np.arange(0.0, 1.0, 0.02)
     rows, motion = following(np.stack([np.sin(3.0 * t), t, 0.0 * t], axis=1)), np.zeros((3, 3))
     wanted_motion(rows, 0.02, 0.413, motion)
@@ -90,7 +90,7 @@ def test_a_wanted_motion_runs_through_its_rows_and_rests_at_its_end() -> None:
 
 
 @pytest.mark.parametrize("intent", INTENTS, ids=lambda intent: type(intent).__name__)
-def test_every_intent_is_a_table_of_its_run_and_of_its_seed(intent) -> None:
+def test_every_intent_covers_its_run_and_is_reproducible(intent) -> None:
     wishes = intent.wishes(CIRCLE, 8.0, 3)
     assert len(wishes.rows) * wishes.period >= 8.0
     np.testing.assert_array_equal(wishes.rows, intent.wishes(CIRCLE, 8.0, 3).rows)
@@ -100,34 +100,34 @@ def at(wishes: Wishes, t: float) -> np.ndarray:
     return wishes.rows[round(t / wishes.period)]
 
 
-def test_exaggerating_is_further_out_here_and_further_in_there() -> None:
+def test_exaggerate_goes_outwards_then_inwards() -> None:
     wishes = Exaggerate(larger=1.5, calmer=0.5).wishes(CIRCLE, 8.0, 1)
     assert np.hypot(*at(wishes, 1.0)[:2]) == pytest.approx(0.06, rel=1e-3)
     assert np.hypot(*at(wishes, 3.0)[:2]) == pytest.approx(0.02, rel=1e-3)
     assert np.hypot(*at(wishes, 4.0)[:2]) == pytest.approx(0.04, rel=1e-3)
 
 
-def test_a_cut_corner_is_straight() -> None:
+def test_cut_corner_is_straight() -> None:
     wishes = CutCorner(0.25, 0.5).wishes(CIRCLE, 4.0, 1)
     first, middle, last = (at(wishes, t)[:3] for t in (1.02, 1.5, 1.98))
     np.testing.assert_allclose(middle, 0.5 * (first + last), atol=1e-9)
     assert np.hypot(*middle[:2]) < 0.04 * np.cos(np.pi / 4.0) + 1e-4
 
 
-def test_changing_over_ends_on_the_other_curve() -> None:
+def test_change_over_ends_on_the_other_curve() -> None:
     wishes = ChangeOver(Trajectory.circle(0.06, 4.0), at=3.0).wishes(CIRCLE, 8.0, 1)
     assert np.hypot(*at(wishes, 2.5)[:2]) == pytest.approx(0.04, rel=1e-3)
     assert np.hypot(*at(wishes, 6.0)[:2]) == pytest.approx(0.06, rel=1e-3)
 
 
-def test_resisting_stays_with_a_firm_grip_and_goes_on_from_there() -> None:
+def test_resist_holds_its_place_with_a_firm_grip_then_continues() -> None:
     wishes = Resist(at=1.0, seconds=2.0, grip=9.0).wishes(CIRCLE, 8.0, 1)
     np.testing.assert_allclose(at(wishes, 1.2)[:3], at(wishes, 2.8)[:3])
     assert at(wishes, 2.0)[GRIP] == 9.0
     np.testing.assert_allclose(at(wishes, 3.2)[:3], CIRCLE.point(CIRCLE.start + 1.2), atol=1e-9)
 
 
-def test_getting_lost_leaves_the_curve_lets_go_and_comes_back() -> None:
+def test_get_lost_leaves_the_curve_lets_go_and_comes_back() -> None:
     wishes = GetLost(at=1.0, seconds=4.0).wishes(CIRCLE, 8.0, 5)
     away = np.linalg.norm(wishes.rows[:, :3] - CIRCLE.point(CIRCLE.start + 0.02 * np.arange(len(wishes.rows))), axis=1)
     assert away.max() > 0.005
@@ -137,14 +137,14 @@ def test_getting_lost_leaves_the_curve_lets_go_and_comes_back() -> None:
     assert at(wishes, 6.0)[ENGAGED] == 1.0
 
 
-def test_bending_presses_the_switch_while_it_carries() -> None:
+def test_bend_presses_the_switch_while_it_carries() -> None:
     grab = Grab(1.0, (0.02, 0.0, 0.0), seconds=1.0, hold=0.5, place=(0.04, 0.0, 0.0), reach=0.8)
     wishes = Bend([grab]).wishes(CIRCLE, 6.0, 1)
     assert [at(wishes, t)[SWITCH] for t in (0.5, 1.5, 2.0, 3.2, 4.0)] == [0.0, 0.0, 1.0, 1.0, 0.0]
     np.testing.assert_allclose(at(wishes, 3.1)[PLACE : PLACE + 3], [0.06, 0.0, 0.0], atol=1e-9)
 
 
-def test_pressing_is_a_force_away_from_the_middle() -> None:
+def test_press_is_a_force_away_from_the_middle() -> None:
     wishes = Press([Push(1.0, 1.0, 2.0)]).wishes(CIRCLE, 4.0, 1)
     outward = CIRCLE.point(CIRCLE.start + 1.5) / 0.04
     np.testing.assert_allclose(at(wishes, 1.5)[FORCE : FORCE + 3], 2.0 * outward, atol=1e-3)
@@ -165,12 +165,12 @@ def test_pressing_is_a_force_away_from_the_middle() -> None:
         lambda: Lead(np.zeros((3, 3)), np.nan),
     ],
 )  # fmt: skip
-def test_an_intent_that_makes_no_sense_is_refused(make) -> None:
+def test_invalid_intent_is_refused(make) -> None:
     with pytest.raises(SimError, match=r"expected|needs"):
         make()
 
 
-def test_an_intent_of_other_values_or_arguments_is_refused_by_name() -> None:
+def test_intent_with_wrong_values_or_arguments_is_refused_by_name() -> None:
     for make, said in (
         (lambda: Lead("x", 0.1), "points is 'x'; expected numbers"),  # pyright: ignore
         (lambda: Lead(np.zeros((3, 3)), "x"), "period is 'x'; expected a number"),  # pyright: ignore
@@ -188,7 +188,7 @@ def test_an_intent_of_other_values_or_arguments_is_refused_by_name() -> None:
     assert rows[-1, PLACE + 2] == 0.1
 
 
-def test_an_intent_of_one_s_own_says_what_is_wrong_with_it() -> None:
+def test_error_of_an_own_intent_names_its_cause() -> None:
     def nothing(t, place, force):
         return "up"
 

@@ -71,7 +71,7 @@ def driven(torque: Wiring, reading: Wiring, late: int = 0) -> tuple[Ticker, Misw
 
 @pytest.mark.slow
 @pytest.mark.parametrize("torque", [flipped(0), flipped(1), flipped(2), flipped(0, 1, 2)])
-def test_motors_that_turn_the_wrong_way_are_let_go(torque: Wiring) -> None:
+def test_reversed_motors_are_released_with_a_fault(torque: Wiring) -> None:
     ticker, device = driven(torque, as_it_is)
     assert ticker.fault is not None
     assert ticker.fault.fault in (Fault.TOO_FAST, Fault.LEFT_WORKSPACE, Fault.OSCILLATION)
@@ -86,6 +86,6 @@ def test_motors_that_turn_the_wrong_way_are_let_go(torque: Wiring) -> None:
      (as_it_is, swapped, 0), (lambda torque: 3.0 * torque, as_it_is, 0), (as_it_is, as_it_is, 20)],
     ids=["encoder 1", "encoder 2", "encoder 3", "motors swapped", "encoders swapped", "torque constant", "20 ms late"],
 )  # fmt: skip
-def test_whatever_is_mixed_up_the_stylus_is_never_fast(torque: Wiring, reading: Wiring, late: int) -> None:
+def test_tip_stays_slow_under_any_miswiring(torque: Wiring, reading: Wiring, late: int) -> None:
     _, device = driven(torque, reading, late)
     assert device.top_speed() < (FASTEST_UNSEEN if reading is swapped else FASTEST)
