@@ -30,7 +30,7 @@ settings.register_profile("the same", derandomize=True, deadline=None)
 settings.load_profile("the same")
 
 
-class _BesideUnits(UnitCache):
+class _TestKernelCache(UnitCache):
     """In a folder of its own, for tests count the files of units."""
 
     def path(self, signature: Any) -> Path:
@@ -38,7 +38,7 @@ class _BesideUnits(UnitCache):
         return path.parent / "kernels" / path.name
 
 
-class _Kept(NullCache):
+class _KernelCache(NullCache):
     """Keeps a kernel where a key can be made of it; no `UnitCache` itself, so nobody takes the kernel for a unit.
 
     One that a run has compiled as a unit is loaded as such.
@@ -46,7 +46,7 @@ class _Kept(NullCache):
 
     def __init__(self, kernel: Dispatcher):
         self._units = UnitCache(kernel.py_func, kernel.targetoptions)
-        self._kernels = _BesideUnits(kernel.py_func, kernel.targetoptions)
+        self._kernels = _TestKernelCache(kernel.py_func, kernel.targetoptions)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -69,7 +69,7 @@ _compile = Dispatcher.compile
 
 def _compile_or_load(self: Any, signature: Any) -> Any:
     if type(self._cache) is NullCache and not is_nested() and self.py_func.__module__ != kept_call.__name__:
-        self._cache = _Kept(self)
+        self._cache = _KernelCache(self)
     return _compile(self, signature)
 
 

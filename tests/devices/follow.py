@@ -11,7 +11,7 @@ from sim.loop.channels import tick_channels
 from sim.loop.loop import Loop
 from tests.devices.rig import Rig
 from tests.sim.bare_servos import CUTOFF, bare_servo, device_world, run, simulated
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo
 from tests.sim.hardware.emulation import run as run_ticks
 
 LAP = 4.0  # s
@@ -33,16 +33,16 @@ def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
     rig = make_rig(device)
     blocks = []
 
-    def keep(ticks, frames, n):
+    def append_block(ticks, frames, n):
         blocks.append(tick_channels(ticks, n)["p"].copy())
 
-    Loop(bare_servo(world, device), world, keep, before_tick=rig).run(LAP)
+    Loop(bare_servo(world, device), world, append_block, before_tick=rig).run(LAP)
     return np.concatenate(blocks), rig
 
 
 def gated_follow(driver: Driver) -> dict[str, np.ndarray]:
     """Rows of a gated servo that leads a device which goes on by a period with each command."""
-    rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **AT_ONCE)), round(LAP * 1e3), request=ARM)
+    rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **UNRAMPED_GATE)), round(LAP * 1e3), request=ARM)
     assert not rows["fault"].any()
     return rows
 

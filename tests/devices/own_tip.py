@@ -5,7 +5,7 @@ import numpy as np
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import joint_torques
 from sim.devices.own_device import TipDevice, TipPose
-from tests.devices.mocks import R_HP_, pose_of
+from tests.devices.mocks import R_HP_MATRIX, stylus_pose
 from tests.devices.rig import Linkage
 
 
@@ -15,22 +15,22 @@ class LinkageTip(TipDevice):
     watchdog = True
 
     def __init__(self, linkage: Linkage):
-        self.linkage, self.force, self.told = linkage, np.zeros(3), True
+        self.linkage, self.force, self.reported = linkage, np.zeros(3), True
 
-    def tell(self) -> None:
-        self.told = False
+    def publish_reading(self) -> None:
+        self.reported = False
 
-    def move(self) -> None:
+    def advance(self) -> None:
         theta = tuple(self.linkage.angles()[:3])
-        force_P = R_HP_.T @ self.force
-        self.linkage.turn(np.add(joint_torques(theta, tuple(force_P)), gravity_torques(theta)))
+        force_P = R_HP_MATRIX.T @ self.force
+        self.linkage.step(np.add(joint_torques(theta, tuple(force_P)), gravity_torques(theta)))
 
     def read(self) -> TipPose | None:
-        if self.told:
+        if self.reported:
             return None
-        self.told = True
-        p_P, r_HS = pose_of(self.linkage.angles())
-        return TipPose(R_HP_ @ p_P, r_HS)
+        self.reported = True
+        p_P, r_HS = stylus_pose(self.linkage.angles())
+        return TipPose(R_HP_MATRIX @ p_P, r_HS)
 
     def write(self, force: np.ndarray) -> None:
         self.force = force

@@ -12,7 +12,7 @@ from models.phantom.kinematics import forward_kinematics, joint_torques, stylus_
 from sim.devices.dhd import DHD, LARGEST, DhdDevice
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
-from tests.devices.mocks import mock_dhd, three
+from tests.devices.mocks import mock_dhd, motor_force
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +60,13 @@ def test_forces_are_in_newtons_in_device_axes_and_limited(dhd) -> None:
         torque = np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta))
         device.write(torque, True)
         wanted = f_H * min(1.0, LARGEST / np.linalg.norm(f_H))
-        np.testing.assert_allclose(three(dhd), wanted * [-1.0, -1.0, 1.0], atol=1e-12)
+        np.testing.assert_allclose(motor_force(dhd), wanted * [-1.0, -1.0, 1.0], atol=1e-12)
     device.write(torque, False)
-    assert not three(dhd).any()
+    assert not motor_force(dhd).any()
     device.write(torque, True)
     with pytest.raises(DriverFault):
         device.write(np.array([np.nan, 0.0, 0.0]), True)
-    assert not three(dhd).any()
+    assert not motor_force(dhd).any()
     device.write(torque, True)
     device.close()
     assert not dhd.mock_opened()
@@ -79,8 +79,8 @@ def test_rotation_matrix_is_read_row_by_row(dhd) -> None:
         turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3))
         pose(dhd, np.zeros(3), turn.as_matrix())
         assert device.read(reading, 0.0)
-        told = Rotation.from_quat(stylus_orientation(tuple(reading[3:6]), tuple(reading[6:9])), scalar_first=True)
-        assert (told.inv() * half * turn * half.inv()).magnitude() < 1e-12
+        measured = Rotation.from_quat(stylus_orientation(tuple(reading[3:6]), tuple(reading[6:9])), scalar_first=True)
+        assert (measured.inv() * half * turn * half.inv()).magnitude() < 1e-12
 
 
 def test_unreachable_or_invalid_pose_is_a_fault_without_reading(dhd) -> None:
@@ -111,9 +111,9 @@ def test_release_switches_off_motors_that_others_switched_on(dhd) -> None:
 def test_library_error_is_a_fault_with_its_message_on_read_and_write(dhd, code, fault) -> None:
     device = DhdDevice(dhd)
     dhd.mock_error(code)
-    for do in (lambda: device.read(np.zeros(9), 0.0), lambda: device.write(np.zeros(3), True)):
+    for action in (lambda: device.read(np.zeros(9), 0.0), lambda: device.write(np.zeros(3), True)):
         with pytest.raises(DriverFault, match="mock error") as refused:
-            do()
+            action()
         assert refused.value.fault is fault
     device.let_go()
 

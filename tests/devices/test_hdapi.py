@@ -15,7 +15,7 @@ from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, s
 from sim.devices.driver import DriverFault
 from sim.devices.hdapi import ERRORS, HDAPI, HdapiDevice
 from sim.errors import SimError
-from tests.devices.mocks import mock_hd, three
+from tests.devices.mocks import mock_hd, motor_force
 from tests.devices.test_hid import Clock
 
 
@@ -43,7 +43,7 @@ def pose(hd, p_mm, rotation=None) -> None:
     hd.mock_pose((ctypes.c_double * 16)(*transform.T.ravel()))
 
 
-def told(device) -> np.ndarray:
+def read_sample(device) -> np.ndarray:
     reading = np.zeros(9)
     assert device.read(reading, 0.0)
     return reading
@@ -65,7 +65,7 @@ def test_position_is_in_metres_and_first_button_is_the_switch(hd, clock) -> None
     hd.mock_buttons(3)
     assert not device.read(np.zeros(9), 0.0)
     hd.mock_tick()
-    reading = told(device)
+    reading = read_sample(device)
     np.testing.assert_allclose(forward_kinematics(reading[3:6]), [0.03, -0.02, 0.01], atol=1e-12)
     np.testing.assert_array_equal(reading[:3], [1.0, 100.0, 1.0])
     assert not device.read(reading, 0.0)
@@ -74,24 +74,24 @@ def test_position_is_in_metres_and_first_button_is_the_switch(hd, clock) -> None
 def test_motor_force_is_that_of_the_torques_until_commands_time_out(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     hd.mock_tick()
-    theta, force = tuple(told(device)[3:6]), (0.5, -1.0, 0.3)
+    theta, force = tuple(read_sample(device)[3:6]), (0.5, -1.0, 0.3)
     torque = np.add(joint_torques(theta, force), gravity_torques(theta))
     device.write(torque, True)
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
     hd.mock_tick()
-    np.testing.assert_allclose(three(hd), force, atol=1e-12)
+    np.testing.assert_allclose(motor_force(hd), force, atol=1e-12)
     clock.now += 4.9e-3
     hd.mock_tick()
-    np.testing.assert_allclose(three(hd), force, atol=1e-12)
+    np.testing.assert_allclose(motor_force(hd), force, atol=1e-12)
     clock.now += 0.2e-3
     hd.mock_tick()
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
     device.write(torque, True)
     hd.mock_tick()
-    assert three(hd).any()
+    assert motor_force(hd).any()
     device.write(torque, False)
     hd.mock_tick()
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
 
 
 def test_force_stays_within_nominal_force_without_library_errors(hd, clock) -> None:
@@ -100,13 +100,13 @@ def test_force_stays_within_nominal_force_without_library_errors(hd, clock) -> N
         torque = rng.normal(0.0, 3.0, 3) * rng.choice([1.0, 1e3, 1e9])
         device.write(torque, True)
         hd.mock_tick()
-        assert np.linalg.norm(three(hd)) <= 8.5 * (1.0 + 1e-12)
-        told(device)  # raises for an error
+        assert np.linalg.norm(motor_force(hd)) <= 8.5 * (1.0 + 1e-12)
+        read_sample(device)  # raises for an error
     with pytest.raises(DriverFault) as refused:
         device.write(np.array([0.0, np.inf, 0.0]), True)
     assert refused.value.fault is Fault.FORCE_NOT_FINITE
     hd.mock_tick()
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
 
 
 @pytest.mark.parametrize("code", ERRORS)
@@ -123,7 +123,7 @@ def test_library_error_is_a_fault_with_its_name(hd, clock, code) -> None:
         device.read(np.zeros(9), 0.0)
     assert (refused.value.fault, refused.value.value) == expected.get(code, (Fault.DEVICE_REPORTED, code))
     hd.mock_tick()
-    told(device)  # once
+    read_sample(device)  # once
 
 
 def test_transform_columns_are_the_stylus_axes(hd, clock) -> None:
@@ -132,7 +132,7 @@ def test_transform_columns_are_the_stylus_axes(hd, clock) -> None:
         turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3))
         pose(hd, np.zeros(3), turn.as_matrix())
         hd.mock_tick()
-        reading = told(device)
+        reading = read_sample(device)
         q = stylus_orientation(tuple(reading[3:6]), tuple(reading[6:9]))
         assert (Rotation.from_quat(q, scalar_first=True).inv() * r_HP * turn * r_HP.inv()).magnitude() < 1e-12
 
@@ -155,9 +155,9 @@ def test_closed_device_gives_no_force_and_opens_again(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     device.write(np.ones(3), True)
     hd.mock_tick()
-    assert three(hd).any()
+    assert motor_force(hd).any()
     device.close()
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
     assert not hd.mock_opened()
     HdapiDevice(hd).close()
 
@@ -186,7 +186,7 @@ def test_vendor_thread_runs_without_the_gil_and_stops_force_without_commands(hd)
     frames = hd.mock_frames()
     libc.usleep(200_000)
     assert hd.mock_frames() - frames > 50
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
     device.close()
 
 
@@ -207,25 +207,25 @@ def test_reading_carries_its_sampling_time(hd) -> None:
     hd.mock_tick()
     after = time.perf_counter()
     time.sleep(0.01)
-    assert before <= told(device)[1] <= after
+    assert before <= read_sample(device)[1] <= after
 
 
 def test_half_written_command_is_ignored_and_the_last_one_times_out(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
     hd.mock_tick()
-    told(device)
+    read_sample(device)
     device.write(np.ones(3), True)
     hd.mock_tick()
-    force = three(hd)
+    force = motor_force(hd)
     command = device._memory.command
     command.changes[0] += 1  # a writer was stopped here
     command.shared[:3] = 100.0
     clock.now += 4e-3
     hd.mock_tick()
-    np.testing.assert_array_equal(three(hd), force)
+    np.testing.assert_array_equal(motor_force(hd), force)
     clock.now += 2e-3
     hd.mock_tick()
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
 
 
 def test_half_written_sample_is_not_read(hd, clock) -> None:
@@ -234,7 +234,7 @@ def test_half_written_sample_is_not_read(hd, clock) -> None:
     device._memory.sample.changes[0] += 1
     assert not device.read(np.zeros(9), 0.0)
     device._memory.sample.changes[0] += 1
-    told(device)
+    read_sample(device)
 
 
 @pytest.mark.parametrize("clock", [time.perf_counter, lambda: time.perf_counter()])
@@ -247,18 +247,18 @@ def test_unclosed_driver_keeps_alive_what_the_vendor_thread_uses(hd, clock) -> N
     frames = hd.mock_frames()
     while hd.mock_frames() < frames + 20:
         time.sleep(1e-3)
-    assert not three(hd).any()
+    assert not motor_force(hd).any()
     hd.hdStopScheduler()
 
 
 @pytest.mark.parametrize(
-    ("order", "says"),
+    ("failure", "message"),
     [("mock_missing", "HD_DEVICE_FAULT; expected a name"),
      ("mock_no_scheduler", "scheduler at 1000 Hz: HD_TIMER_ERROR")],
 )  # fmt: skip
-def test_missing_device_or_scheduler_is_reported_in_one_line(hd, order, says) -> None:
-    getattr(hd, order)(1)
-    with pytest.raises(SimError, match=says):
+def test_missing_device_or_scheduler_is_reported_in_one_line(hd, failure, message) -> None:
+    getattr(hd, failure)(1)
+    with pytest.raises(SimError, match=message):
         HdapiDevice(hd)
 
 

@@ -25,7 +25,7 @@ from sim.devices.hid_reports import (
     make_command,
 )
 from sim.errors import SimError
-from tests.devices.firmware import ROOT, Firmware, compiled, output_report
+from tests.devices.firmware import ROOT, Firmware, compile_c, output_report
 from tests.devices.rig import Linkage
 
 STRUCTS = {
@@ -34,24 +34,24 @@ STRUCTS = {
 }  # fmt: skip
 
 
-def printed(folder: Path, lines: list[str]) -> str:
+def c_output(folder: Path, lines: list[str]) -> str:
     """What C prints that knows the header."""
     source = folder / "printed.c"
     body = "\n".join(lines)
     head = f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\n'
     source.write_text(head + f"int main(void) {{\n{body}\nreturn 0;\n}}\n")
-    return subprocess.run([compiled(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
+    return subprocess.run([compile_c(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
 
 
 def output(
     firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other
 ):
-    made = protocol.blank(protocol.OUTPUT)
-    made["flags"], made["boot"], made["sequence"] = int(enable), firmware.boot, sequence
-    made["watchdog_us"], made["torque"] = watchdog_us, torque
+    report = protocol.blank(protocol.OUTPUT)
+    report["flags"], report["boot"], report["sequence"] = int(enable), firmware.boot, sequence
+    report["watchdog_us"], report["torque"] = watchdog_us, torque
     for name, value in other.items():
-        made[name] = value
-    return protocol.sealed(made)
+        report[name] = value
+    return protocol.sealed(report)
 
 
 def test_c_and_python_field_offsets_and_sizes_agree(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_c_and_python_field_offsets_and_sizes_agree(tmp_path: Path) -> None:
         for struct, layout in STRUCTS.items()
         for name in layout.names
     ]
-    io = printed(tmp_path, lines)
+    io = c_output(tmp_path, lines)
     expected = [
         f"{struct} {name} {layout.fields[name][1]} {layout.fields[name][0].itemsize}"
         for struct, layout in STRUCTS.items()
@@ -90,10 +90,10 @@ def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
         hid.torque[:], hid.io[IO_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
         hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
         make_command(hid)
-        made = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
-        assert made["torque"].tolist() == torque.tolist()
+        report = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
+        assert report["torque"].tolist() == torque.tolist()
         fields = ("flags", "boot", "sequence", "watchdog_us", "answers")
-        assert [int(made[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
+        assert [int(report[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
 
 
 def test_constants_equal_those_of_the_c_header(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_constants_equal_those_of_the_c_header(tmp_path: Path) -> None:
         "HVF_CALIBRATION": protocol.CALIBRATION, "HVF_SWITCH": protocol.SWITCH, "HVF_ENABLE": protocol.ENABLE,
         "HVF_CALIBRATED": protocol.CALIBRATED,
     }  # fmt: skip
-    io = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
+    io = c_output(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
     assert [int(line) for line in io.split()] == list(pairs.values())
 
 
@@ -156,7 +156,7 @@ size_t board_receive(uint8_t *b, size_t n) {{ (void)b; (void)n; return 0; }}
 void board_send(const hvf_input *r) {{ last = *r; if (now == 1000000) fwrite(&last, 1, sizeof last, stdout); }}
 void board_feed_hardware_watchdog(void) {{}}
 """)
-    program = compiled(
+    program = compile_c(
         tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True
     )
     raw = subprocess.run([program], capture_output=True, check=True).stdout
@@ -186,7 +186,7 @@ def test_firmware_watchdog_switches_off_until_disabled_and_enabled_again(firmwar
 
 
 @pytest.mark.parametrize(
-    "spoiled",
+    "corrupted",
     [
         lambda f: output(f, 1)[:-1],
         lambda f: output(f, 1) + b"\0",
@@ -197,8 +197,8 @@ def test_firmware_watchdog_switches_off_until_disabled_and_enabled_again(firmwar
     ],
     ids=["short", "long", "bit", "of another power-up", "no watchdog", "too slow a watchdog"],
 )
-def test_firmware_refuses_unsound_commands_and_counts_them(firmware, spoiled) -> None:
-    assert not firmware.take(spoiled(firmware))
+def test_firmware_refuses_unsound_commands_and_counts_them(firmware, corrupted) -> None:
+    assert not firmware.take(corrupted(firmware))
     report = np.frombuffer(firmware.tick(), protocol.INPUT_REPORT)[0]
     assert not firmware.motors.on
     assert report["refused"] == 1
@@ -239,7 +239,7 @@ def test_hot_motor_has_to_cool_by_five_degrees_before_it_is_driven(firmware: Fir
     ]  # fmt: skip
 
 
-def of_the_page(report: int) -> bytes:
+def documented_bytes(report: int) -> bytes:
     """The example of a report in the protocol's page."""
     page = (ROOT / "docs" / "reference" / "hid-protocol.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.splitlines() if line.startswith(f"{report:02x} ") and set(line) <= set(HEX)]
@@ -251,14 +251,14 @@ HEX = "0123456789abcdef "
 
 def test_documented_bytes_equal_those_of_firmware_and_driver(firmware: Firmware) -> None:
     """Units and signs, number by number: 1, −2, 3 mN m; 1000, −2000, 3000, 0, 100, −100 counts; 30 and 31 °C."""
-    command = of_the_page(protocol.OUTPUT)
+    command = documented_bytes(protocol.OUTPUT)
     assert command == output_report(True, 1, 7, 10_000, [1000, -2000, 3000], 42)
     assert firmware.take(command)
     np.testing.assert_allclose(firmware.joint_torque, np.array([1e-3, -2e-3, 3e-3]) * PREMIUM_1_5.capstan, rtol=1e-12)
     firmware.sensors.encoder[:] = [1000, -2000, 3000, 0, 100, -100]
     firmware.sensors.pressed = 1
     io = firmware.tick()
-    assert io == of_the_page(protocol.INPUT)
+    assert io == documented_bytes(protocol.INPUT)
     report = np.frombuffer(io, protocol.INPUT_REPORT)[0]
     fields = ("flags", "status", "sequence", "time_us", "boot", "answered", "held_us", "refused")
     assert [int(report[name]) for name in fields] == [1, 3, 1, 1000, 1, 7, 1000, 0]
@@ -274,7 +274,7 @@ def test_positive_torque_makes_its_encoder_count_up(firmware, joint: int) -> Non
         for k in range(30):
             shafts = [torque * (i == joint) for i in range(3)]
             assert firmware.take(output_report(True, firmware.boot, k + 1, 10_000, shafts, 0))
-            linkage.turn(firmware.joint_torque)
+            linkage.step(firmware.joint_torque)
             firmware.turn_to(linkage.angles())
             firmware.tick()
         return np.array(firmware.sensors.encoder[:3])

@@ -17,14 +17,14 @@ from tests.devices.own_tip import LinkageTip
 from tests.devices.rig import Linkage, Rig
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "own_device.py"
-HERE = np.array([0.01, -0.02, 0.03])
+POSITION = np.array([0.01, -0.02, 0.03])
 
 
 class Scripted(TipDevice):
     """Reads what it is told, and keeps what it is given; None is a release."""
 
     def __init__(self, pose=None):
-        self.pose, self.given = pose, []
+        self.pose, self.written = pose, []
 
     def read(self):
         if isinstance(self.pose, Exception):
@@ -32,16 +32,18 @@ class Scripted(TipDevice):
         return self.pose
 
     def write(self, force):
-        self.given.append(force)
+        self.written.append(force)
 
     def release(self):
-        self.given.append(None)
+        self.written.append(None)
 
 
 def test_tip_is_read_in_the_hand_frame_with_switch_and_sequence_number() -> None:
-    driver, reading = TipDriver(Scripted(TipPose(HERE, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
+    driver, reading = TipDriver(Scripted(TipPose(POSITION, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
     assert driver.read(reading, 0.0)
-    np.testing.assert_allclose(forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(HERE)), atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(POSITION)), atol=1e-12
+    )
     np.testing.assert_array_equal(reading[:3], [1.0, 5.0, 1.0])
     assert driver.telemetry[READ] == 1.0
     driver = TipDriver(Scripted(), "here")
@@ -49,7 +51,7 @@ def test_tip_is_read_in_the_hand_frame_with_switch_and_sequence_number() -> None
 
 
 def test_written_force_is_the_field_force_up_to_the_device_limit() -> None:
-    device, rng = Scripted(TipPose(HERE)), np.random.default_rng(3)
+    device, rng = Scripted(TipPose(POSITION)), np.random.default_rng(3)
     driver, reading = TipDriver(device, "here"), np.zeros(9)
     driver.read(reading, 0.0)
     theta = tuple(reading[3:6])
@@ -59,18 +61,18 @@ def test_written_force_is_the_field_force_up_to_the_device_limit() -> None:
             np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta)), enable=True
         )
         wanted = f_H * min(1.0, device.largest_force / np.linalg.norm(f_H))
-        np.testing.assert_allclose(device.given[-1], wanted, atol=1e-12)
+        np.testing.assert_allclose(device.written[-1], wanted, atol=1e-12)
     driver.write(np.zeros(3), enable=False)
-    assert device.given[-1] is None
+    assert device.written[-1] is None
 
 
 def test_torque_that_is_not_finite_releases_the_device() -> None:
-    device = Scripted(TipPose(HERE))
+    device = Scripted(TipPose(POSITION))
     driver = TipDriver(device, "here")
     with pytest.raises(DriverFault) as refused:
         driver.write(np.array([0.0, np.nan, 0.0]), enable=True)
     assert refused.value.fault is Fault.FORCE_NOT_FINITE
-    assert device.given == [None]
+    assert device.written == [None]
 
 
 @pytest.mark.parametrize(
@@ -122,9 +124,9 @@ def test_follow_matches_simulation_within_1_mm() -> None:
         tip = LinkageTip(Linkage())
         return Rig(device, TipDriver(tip, "here", clock=lambda: tip.linkage.ticks * 1e-3), tip)
 
-    there, made = device_follow(rig)
-    assert made.fault == 0
-    assert rms(there, simulated_follow()) < 1e-3
+    positions, driven_rig = device_follow(rig)
+    assert driven_rig.fault == 0
+    assert rms(positions, simulated_follow()) < 1e-3
 
 
 def test_example_device_opens_by_file_and_class() -> None:

@@ -59,7 +59,7 @@ def mouse(cap: Cap, clock: Clock) -> SpaceMouse:
     return SpaceMouse(cap, "SpaceNavigator", "test", clock)
 
 
-def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, np.ndarray]:
+def read_tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, np.ndarray]:
     reading = np.zeros(9)
     for _ in range(ticks):
         clock.now += 1e-3
@@ -68,32 +68,32 @@ def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, 
 
 
 @pytest.mark.parametrize(
-    ("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
+    ("push", "direction"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
 )
-def test_full_push_moves_the_tip_at_top_speed_in_its_direction(mouse, cap, clock, push, way) -> None:
-    tip(mouse, clock, 1)
+def test_full_push_moves_the_tip_at_top_speed_in_its_direction(mouse, cap, clock, push, direction) -> None:
+    read_tip(mouse, clock, 1)
     cap.push(*push)
-    p, _ = tip(mouse, clock, 100)
-    np.testing.assert_allclose(p, np.array(way) * TOP_SPEED * 0.1, atol=1e-9)
+    p, _ = read_tip(mouse, clock, 100)
+    np.testing.assert_allclose(p, np.array(direction) * TOP_SPEED * 0.1, atol=1e-9)
     cap.push(0, 0, 0)
-    q, _ = tip(mouse, clock, 50)
+    q, _ = read_tip(mouse, clock, 50)
     np.testing.assert_array_equal(p, q)
 
 
 def test_twist_turns_the_stylus_about_the_same_axis(mouse, cap, clock) -> None:
-    tip(mouse, clock, 1)
+    read_tip(mouse, clock, 1)
     cap.turn(0, 0, -350)
-    _, reading = tip(mouse, clock, 100)
+    _, reading = read_tip(mouse, clock, 100)
     q = np.array(stylus_orientation(reading[3:6], reading[6:9]))
     half = 0.5 * TOP_TURN * 0.1
     np.testing.assert_allclose(q, [np.cos(half), 0.0, 0.0, np.sin(half)], atol=1e-9)
 
 
 def test_six_axes_in_one_report_and_buttons_are_read(mouse, cap, clock) -> None:
-    tip(mouse, clock, 1)
+    read_tip(mouse, clock, 1)
     cap.queue.append(b"\x01" + np.array([350, 0, 0, 0, 0, -350], "<i2").tobytes())
     cap.queue.append(b"\x03\x01\x00")
-    p, reading = tip(mouse, clock, 10)
+    p, reading = read_tip(mouse, clock, 10)
     assert p[1] < 0.0
     assert reading[2] == 1.0
     assert stylus_orientation(reading[3:6], reading[6:9])[3] > 0.0
@@ -121,7 +121,7 @@ def test_untouched_cap_does_not_drift_and_other_reports_are_ignored(mouse, cap, 
     cap.push(5, -5, 8)
     cap.queue.append(b"\x17\x64")  # a battery's
     cap.queue.append(b"\x01\x00")  # too short
-    p, _ = tip(mouse, clock, 100)
+    p, _ = read_tip(mouse, clock, 100)
     assert not p.any()
     assert mouse.telemetry[BAD] == 1.0
     assert mouse.telemetry[READ] == 1.0

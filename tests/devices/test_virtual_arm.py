@@ -45,13 +45,13 @@ def test_tip_force_inverts_joint_torques_and_is_limited() -> None:
         theta = tuple(reading[3:6])
         torque = tuple(np.add(joint_torques(theta, tuple(force)), gravity_torques(theta)))
         np.testing.assert_allclose(tip_force(theta, torque, 100.0), force, atol=1e-12)
-        cut = tip_force(theta, torque, 1.0)
-        assert np.linalg.norm(cut) <= 1.0 + 1e-12
-        np.testing.assert_allclose(np.cross(cut, force), 0.0, atol=1e-12)
+        limited = tip_force(theta, torque, 1.0)
+        assert np.linalg.norm(limited) <= 1.0 + 1e-12
+        np.testing.assert_allclose(np.cross(limited, force), 0.0, atol=1e-12)
 
 
 def test_closed_form_force_and_gain_equal_linear_algebra_over_the_workspace() -> None:
-    rng, weak = np.random.default_rng(4), 0
+    rng, singular = np.random.default_rng(4), 0
     for _ in range(2000):
         theta, torque = tuple(rng.uniform(-1.6, 1.6, 3)), rng.normal(size=3)
         j = np.array(jacobian(theta))
@@ -59,8 +59,8 @@ def test_closed_form_force_and_gain_equal_linear_algebra_over_the_workspace() ->
         assert least_gain(theta) == pytest.approx(least, abs=1e-15)
         expected = np.linalg.solve(j.T, torque - gravity_torques(theta)) if least >= WEAKEST else np.zeros(3)
         np.testing.assert_allclose(tip_force(theta, tuple(torque), 1e9), expected, rtol=1e-12, atol=1e-12)
-        weak += least < WEAKEST
-    assert 100 < weak < 1900
+        singular += least < WEAKEST
+    assert 100 < singular < 1900
 
 
 def test_force_is_zero_on_the_turret_axis() -> None:

@@ -54,8 +54,8 @@ CASES = {
 
 def command(case: str, folder: Path) -> list[str]:
     """What runs a case in a tree, and writes into the case's own folder."""
-    places = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
-    first, *others = (places.get(word, word) for word in CASES[case].split())
+    substitutes = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
+    first, *others = (substitutes.get(word, word) for word in CASES[case].split())
     out = str(folder / case)
     if first == _SCRIPT:
         script, *arguments = others
@@ -107,22 +107,22 @@ def gate(commit: str, cases: list[str]) -> int:
             for case in cases:
                 runs = [start(case, place, folder) for place, folder in zip((tree, ROOT), folders, strict=True)]
                 codes = [run.wait() for run in runs]
-                said = [
+                messages = [
                     f"exit code {code} {side}" for code, side in zip(codes, ("before", "after"), strict=True) if code
                 ]
-                if said:
-                    said += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
+                if messages:
+                    messages += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
                 elif case == "reproduce":
-                    said = (
+                    messages = (
                         [] if len({(folder / f"{case}.log").read_text() for folder in folders}) == 1 else ["the text"]
                     )
                 elif case == "lift":
                     with np.load(folders[0] / "map.npz") as was, np.load(folders[1] / "map.npz") as now:
-                        said = [name for name in was.files if was[name].tobytes() != now[name].tobytes()]
+                        messages = [name for name in was.files if was[name].tobytes() != now[name].tobytes()]
                 else:
-                    said = list(differences(*(folder / case / "run.h5" for folder in folders)))
-                print(f"{case}: {'; '.join(said) or 'the same'}", flush=True)
-                failed += [case] if said else []
+                    messages = list(differences(*(folder / case / "run.h5" for folder in folders)))
+                print(f"{case}: {'; '.join(messages) or 'the same'}", flush=True)
+                failed += [case] if messages else []
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", str(tree)], cwd=ROOT, check=True)
     print(f"{len(cases) - len(failed)} of {len(cases)} cases are the same, bit for bit, as on {commit}")

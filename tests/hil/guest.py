@@ -56,9 +56,9 @@ def main(library: str) -> None:
     driver.write(torque, False)
     time.sleep(0.05)
 
-    live = device.live(4.0, 4e-3)
+    run_realtime = device.run_realtime(4.0, 4e-3)
     link = measured_link(driver, 3.0)
-    live.join()
+    run_realtime.join()
     print("link:", *link.lines(), sep="\n  ", flush=True)
     check("readings are lost", link.lost, 0)
     check("readings are refused", link.refused, 0)
@@ -70,15 +70,15 @@ def main(library: str) -> None:
     genuine = firmware.tick()
     for size in (40, 63, 70):
         device.send((genuine + bytes(6))[:size])
-        came: list[bool] = []
-        fault = fault_of(lambda came=came: came.append(driver.read(reading, 0.5)))
+        readings: list[bool] = []
+        fault = fault_of(lambda readings=readings: readings.append(driver.read(reading, 0.5)))
         # Linux passes a report of another size on, or keeps back one that is short, or cuts one that is long.
-        cut = size > len(genuine) and came == [True]
+        cut = size > len(genuine) and readings == [True]
         taken = fault == (Fault.REPORT_MALFORMED, float(min(size, len(genuine) + 1)))  # as much as is asked for
         print(
             f"    {'a fault' if taken else 'cut to 64 by the kernel' if cut else 'kept back by the kernel'}", flush=True
         )
-        check(f"{size} bytes are no other reading", taken or cut or came == [False], True)
+        check(f"{size} bytes are no other reading", taken or cut or readings == [False], True)
     for _ in range(3):
         device.send(genuine[:20] + bytes([genuine[20] ^ 1]) + genuine[21:])
     time.sleep(0.05)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.devices.firmware import COMPILER, ROOT, compiled
+from tests.devices.firmware import COMPILER, ROOT, compile_c
 
 FOLDER = ROOT / "runs" / "hil-vm"
 MODULES = ("virtio_pci", "9pnet_virtio", "9p", "hid-generic", "uhid")
@@ -112,7 +112,10 @@ def main() -> int:
         print(f"hil-vm: skipped: {missing}", file=sys.stderr)
         return 0
     firmware = ROOT / "firmware" / "hvf_hid.c"
-    library, mock = compiled(FOLDER, firmware), compiled(FOLDER, ROOT / "tests" / "devices" / "mock_hidapi.c", firmware)
+    library, mock = (
+        compile_c(FOLDER, firmware),
+        compile_c(FOLDER, ROOT / "tests" / "devices" / "mock_hidapi.c", firmware),
+    )
     subprocess.run(
         [sys.executable, "-m", "tests.hil.rehearsal", mock], cwd=ROOT, env=os.environ | ANY_PROCESSOR, check=True
     )
@@ -122,17 +125,17 @@ def main() -> int:
         "-append", "console=ttyS0 quiet panic=-1",
         "-virtfs", "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap",
     ]  # fmt: skip
-    said = FOLDER / "said.txt"
-    with said.open("wb") as out:
+    log = FOLDER / "said.txt"
+    with log.open("wb") as out:
         try:
             subprocess.run(
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, timeout=SECONDS, check=False
             )
         except subprocess.TimeoutExpired:
             print(f"hil-vm: the guest had not ended after {SECONDS} s; what it said until then:", file=sys.stderr)
-    told = said.read_text(errors="replace")
-    print(told[-6000:])
-    return 0 if "hil-vm: passed" in told else 1
+    text = log.read_text(errors="replace")
+    print(text[-6000:])
+    return 0 if "hil-vm: passed" in text else 1
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def pass_period(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: 
     advance(plant, port, user, t, False, applied)
 
 
-class Stepped:
+class SteppedPhantom:
     """A simulated Phantom called from Python: read, then write, once a period."""
 
     def __init__(self, world: World, arm: Arm | None = None, cutoff: float = CUTOFF):
@@ -92,7 +92,7 @@ class Stepped:
         self.ticks += 1
 
 
-class Driver:
+class SimulatedDriver:
     """What stands behind an `Exchange` here: a second simulated Phantom, whose encoders and motors it is wired to.
 
     Its clock runs on whether the servo does or not, and its motors go off when a command gets too old.

@@ -12,14 +12,14 @@ from sim.compilation.c_function import address_for_c, address_of, call_int, call
 from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import number_at
 from sim.compilation.python_clock import clock_for_c, seconds
-from tests.devices.firmware import compiled
+from tests.devices.firmware import compile_c
 
 head, hidden_head = struct_heads(False), struct_heads(True)
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory) -> ctypes.CDLL:
-    return ctypes.CDLL(str(compiled(tmp_path_factory.mktemp("c"), Path(__file__).parent / "c_functions.c")))
+    return ctypes.CDLL(str(compile_c(tmp_path_factory.mktemp("c"), Path(__file__).parent / "c_functions.c")))
 
 
 @njit

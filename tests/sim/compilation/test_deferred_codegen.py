@@ -21,7 +21,7 @@ VECTOR = types.Array(types.float64, 1, "C")
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
 
 
@@ -43,7 +43,7 @@ def _factorial(n):
 
 
 @njit
-def _all_of_it(x, out):
+def _combined(x, out):
     work = np.empty(3)
     work[:] = x[:3]
     out[0] = _twice_halved(work.sum()) + math.sin(x[0]) + _factorial(5)
@@ -59,13 +59,13 @@ def test_install_succeeds_for_the_pinned_numba_version():
 
 def test_flags_compare_and_hash_as_in_numba():
     install()
-    kinds = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
-    for a, b in itertools.product([kind() for kind in kinds], repeat=2):
+    constructors = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
+    for a, b in itertools.product([kind() for kind in constructors], repeat=2):
         # What numba's own `values` would give: every option's property.
-        told, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
-        assert list(a.values().items()) == list(told.items())
-        assert (a == b) == (told == others)
-        assert hash(a) == hash(tuple(sorted(told)))
+        options, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
+        assert list(a.values().items()) == list(options.items())
+        assert (a == b) == (options == others)
+        assert hash(a) == hash(tuple(sorted(options)))
     assert _with("fastmath", True) != Flags()
     assert Flags() != "flags"
 
@@ -92,7 +92,7 @@ def test_untested_numba_version_is_left_unpatched(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.slow
 def test_unit_has_no_undefined_symbols_and_its_parts_are_deferred():
-    result = njit(_all_of_it.py_func).get_compile_result(types.void(VECTOR, VECTOR))
+    result = njit(_combined.py_func).get_compile_result(types.void(VECTOR, VECTOR))
     assert isinstance(result.library, UnitLibrary)
     assert not result.library.deferred
     assert not undefined_symbols(result.library._final_module)
@@ -103,7 +103,7 @@ def test_unit_has_no_undefined_symbols_and_its_parts_are_deferred():
 
 def test_results_equal_those_of_python():
     out, x = np.empty(2), np.array([0.3, 0.2, 0.5])
-    njit(_all_of_it.py_func)(x, out)
+    njit(_combined.py_func)(x, out)
     np.testing.assert_allclose(out, [0.25 + math.sin(0.3) + 120.0, 0.2**3], rtol=1e-15)
 
 
@@ -153,9 +153,9 @@ for t in np.linspace(0.0, 25.0, 200):
 @pytest.mark.slow
 def test_law_equals_plain_numba_bit_for_bit():
     root = Path(deferred_codegen.__file__).parent.parent
-    told = [
+    options = [
         subprocess.run([sys.executable, "-c", _PLAIN, way], check=True, capture_output=True, text=True, cwd=root).stdout
         for way in ("plain", "deferred")
     ]
-    assert len(told[0]) > 10_000
-    assert told[0] == told[1]
+    assert len(options[0]) > 10_000
+    assert options[0] == options[1]

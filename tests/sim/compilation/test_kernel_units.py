@@ -46,8 +46,8 @@ def test_maps_and_laws_are_linked_by_kernel_address():
 
 def test_unpickled_map_has_the_same_kernels():
     walk = embedded("walk")
-    made = expressive_figure(Cylindrical([(walk.poses, walk.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
-    copied = pickle.loads(pickle.dumps(made))
+    haptic_map = expressive_figure(Cylindrical([(walk.poses, walk.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
+    copied = pickle.loads(pickle.dumps(haptic_map))
     assert kernels_of(copied.compiled().stages) == (cylindrical_map, express)
 
 
@@ -111,12 +111,12 @@ def test_next_process_loads_the_unit_also_from_a_copy_of_the_sources(tmp_path):
     here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
     for package in ("models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
-    told = [
+    outputs = [
         subprocess.run(
             [sys.executable, "-c", _PROCESS], check=True, capture_output=True, text=True, cwd=sources,
             env=os.environ | {"HVF_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(sources)},
         ).stdout.split()
         for sources in (here, here, copy)
     ]  # fmt: skip
-    assert [row[:2] for row in told] == [["0", "1"], ["1", "0"], ["1", "0"]]
-    assert [Path(row[2]).parents[2] for row in told] == [here, here, copy]
+    assert [row[:2] for row in outputs] == [["0", "1"], ["1", "0"], ["1", "0"]]
+    assert [Path(row[2]).parents[2] for row in outputs] == [here, here, copy]

@@ -65,9 +65,9 @@ def test_damaged_file_is_recompiled(folder: Path, damage: bytes | None):
     content = path.read_bytes()
     path.write_bytes(content[:-7] + b"changed" if damage is None else damage)
     assert not is_sound(path)
-    again = _kernel(2.0)
-    assert again(4.0) == 8.0
-    assert _compiled(again) == 1
+    reloaded = _kernel(2.0)
+    assert reloaded(4.0) == 8.0
+    assert _compiled(reloaded) == 1
     assert is_sound(path)
 
 
@@ -167,9 +167,9 @@ def test_loaded_unit_equals_the_compiled_one_bit_for_bit(folder: Path):
     def root(x, y):
         y[0] = np.sqrt(x[0] + x[1] * x[1]) if x[0] > 0.0 else np.nan
 
-    x, made, loaded = np.array([0.3, 0.7]), np.empty(1), np.empty(1)
-    entry_point(root)(x, made)
-    again = entry_point(root)
-    again(x, loaded)
-    assert _compiled(again) == 0
-    assert made.tobytes() == loaded.tobytes()
+    x, compiled, loaded = np.array([0.3, 0.7]), np.empty(1), np.empty(1)
+    entry_point(root)(x, compiled)
+    reloaded = entry_point(root)
+    reloaded(x, loaded)
+    assert _compiled(reloaded) == 0
+    assert compiled.tobytes() == loaded.tobytes()

@@ -138,7 +138,7 @@ def test_unknown_types_and_names_are_errors():
 
 
 def test_order_of_called_functions_is_part_of_the_key():
-    def made(first, second):
+    def difference(first, second):
         @njit
         def kernel(x):
             return first(x) - second(x)
@@ -146,7 +146,7 @@ def test_order_of_called_functions_is_part_of_the_key():
         return kernel
 
     one, two = _scaled(1.0), _scaled(2.0)
-    assert unit_key(made(one, two).py_func, (), {}) != unit_key(made(two, one).py_func, (), {})
+    assert unit_key(difference(one, two).py_func, (), {}) != unit_key(difference(two, one).py_func, (), {})
 
 
 def test_numba_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):

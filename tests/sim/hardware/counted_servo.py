@@ -35,7 +35,7 @@ from sim.hardware.servo_process import (
 )
 from sim.hardware.shared import Ring, SharedNumbers
 from tests.devices.firmware import calibration, identity
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo
 
 WARM, TICKS = 500.0, 2000.0
 
@@ -118,7 +118,7 @@ class CountedServo(ServoProcess):
         self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
         _, reports = multiprocessing.get_context("spawn").Pipe(duplex=False)
         self.device, self.order = device, np.zeros(ORDER_SIZE)
-        self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **AT_ONCE))
+        self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **UNRAMPED_GATE))
         self.order[[ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST]] = 1.0, 1.0, ARM
         self.orders.write(self.order)
         self.heap = ctypes.CDLL(None)

@@ -13,16 +13,16 @@ from sim.world.linkage import Linkage
 from tests.sim.bare_servos import bare_servo, device_world, follow_program, simulated
 from tests.sim.bare_servos import run as run_bare
 from tests.sim.hardware.emulation import (
-    AT_ONCE,
     DRIVER_FAULTS,
     PERIOD,
-    PLACES,
-    Broken,
-    active,
+    READING_INDICES,
+    UNRAMPED_GATE,
+    FaultyDriver,
+    activate,
     clock_back,
     gated_servo,
-    jump,
-    nan_in,
+    jump_joint,
+    overwrite,
     run,
 )
 
@@ -31,11 +31,11 @@ def test_follow_through_a_driver_matches_simulation_within_1_mm() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     servo.device.faults[FAULT_RAMP] = 0.0
-    pure, _ = run_bare(servo, 6000)
-    driven = run(Ticker(gated_servo(**AT_ONCE)), 6000, request=ARM)
+    simulated_ticks, _ = run_bare(servo, 6000)
+    driven = run(Ticker(gated_servo(**UNRAMPED_GATE)), 6000, request=ARM)
     assert not driven["fault"].any()
-    apart = np.linalg.norm(driven["p"] - pure.hand[:, 1:4], axis=1)
-    travelled = np.linalg.norm(np.diff(pure.hand[:, 1:4], axis=0), axis=1).sum()
+    apart = np.linalg.norm(driven["p"] - simulated_ticks.hand[:, 1:4], axis=1)
+    travelled = np.linalg.norm(np.diff(simulated_ticks.hand[:, 1:4], axis=0), axis=1).sum()
     assert travelled > 0.3
     assert np.sqrt(np.mean(apart**2)) < 1e-3
 
@@ -62,45 +62,45 @@ def test_disarmed_motors_are_off() -> None:
 
 
 def test_disarming_switches_off_in_the_same_tick() -> None:
-    ticker = Ticker(gated_servo(**AT_ONCE))
-    first = active(ticker)
+    ticker = Ticker(gated_servo(**UNRAMPED_GATE))
+    first = activate(ticker)
     assert columns(ticker.row[None])["torque"].any()
     rows = run(ticker, 20, first, DISARM)
     assert not rows["torque"].any()
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("index", READING_INDICES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_reading_that_is_not_finite_is_a_fault(place: int, bad: float) -> None:
-    assert_lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
+def test_reading_that_is_not_finite_is_a_fault(index: int, bad: float) -> None:
+    assert_fault_releases("tamper", overwrite(index, bad), Fault.READING_NOT_FINITE)
 
 
 @pytest.mark.parametrize("axis", range(3))
 def test_joint_jump_is_a_fault(axis: int) -> None:
-    assert_lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
+    assert_fault_releases("tamper", jump_joint(axis), Fault.RATE_IMPOSSIBLE)
 
 
 def test_clock_that_goes_back_is_a_fault() -> None:
-    assert_lets_go("spoil", clock_back, Fault.CLOCK_BACK)
+    assert_fault_releases("tamper", clock_back, Fault.CLOCK_BACK)
 
 
 @pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
-@pytest.mark.parametrize("where", ["read_fault", "write_fault"])
-def test_driver_fault_is_latched(fault: Fault, value: float, where: str) -> None:
-    assert_lets_go(where, (fault, value), fault)
+@pytest.mark.parametrize("operation", ["read_fault", "write_fault"])
+def test_driver_fault_is_latched(fault: Fault, value: float, operation: str) -> None:
+    assert_fault_releases(operation, (fault, value), fault)
 
 
-@pytest.mark.parametrize("stalled", [5, 50, 500])
-def test_stall_of_five_periods_or_more_is_a_fault(stalled: int) -> None:
-    assert_lets_go("silent", stalled, Fault.READING_STALE, within=8)
+@pytest.mark.parametrize("periods", [5, 50, 500])
+def test_stall_of_five_periods_or_more_is_a_fault(periods: int) -> None:
+    assert_fault_releases("silent", periods, Fault.READING_STALE, within=8)
 
 
-@pytest.mark.parametrize("stalled", [1, 3, 4])
-def test_stall_of_less_than_five_periods_is_no_fault(stalled: int) -> None:
-    broken = Broken(gated_servo(**AT_ONCE).driver)
-    ticker = Ticker(gated_servo(broken, **AT_ONCE))
-    first = active(ticker)
-    broken.silent = stalled
+@pytest.mark.parametrize("periods", [1, 3, 4])
+def test_stall_of_less_than_five_periods_is_no_fault(periods: int) -> None:
+    faulty = FaultyDriver(gated_servo(**UNRAMPED_GATE).driver)
+    ticker = Ticker(gated_servo(faulty, **UNRAMPED_GATE))
+    first = activate(ticker)
+    faulty.silent = periods
     rows = run(ticker, 100, first)
     assert not rows["fault"].any()
     assert rows["force"][-1].any()
@@ -110,28 +110,28 @@ def test_stall_of_less_than_five_periods_is_no_fault(stalled: int) -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_memory_or_parameters_that_are_not_finite_are_a_fault(part: str, bad: float) -> None:
     faults = {"limiter": Fault.LIMITER_NOT_FINITE, "tank": Fault.TANK_NOT_FINITE, "params": Fault.FORCE_NOT_FINITE}
-    parts = gated_servo(program=follow_program(), **AT_ONCE)
+    parts = gated_servo(program=follow_program(), **UNRAMPED_GATE)
     ticker = Ticker(parts)
-    first = active(ticker)
+    first = activate(ticker)
     getattr(parts.servo.field, part)[0 if part != "params" else slice(None)] = bad
     assert_faulted(ticker, first, faults[part])
 
 
-def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
+def assert_fault_releases(attribute: str, failure, fault: Fault, within: int = 2) -> None:
     """Order a fault of the driver: the motors go off within so many ticks, and the fault stays until it is cleared."""
-    driver = gated_servo(**AT_ONCE).driver
+    driver = gated_servo(**UNRAMPED_GATE).driver
     assert isinstance(driver, EmulatedPhantom)
-    broken = Broken(driver)
-    ticker = Ticker(gated_servo(broken, **AT_ONCE))
-    first = active(ticker)
+    faulty = FaultyDriver(driver)
+    ticker = Ticker(gated_servo(faulty, **UNRAMPED_GATE))
+    first = activate(ticker)
     assert ticker.state is State.ACTIVE
-    setattr(broken, attribute, order)
+    setattr(faulty, attribute, failure)
     assert_faulted(ticker, first, fault, within)
-    assert not broken.last.any() or attribute == "write_fault"
-    assert broken.let_go_calls > 0
+    assert not faulty.last.any() or attribute == "write_fault"
+    assert faulty.let_go_calls > 0
     if attribute in ("read_fault", "write_fault"):
-        setattr(broken, attribute, None)
-    broken.spoil, broken.silent = (lambda reading: None), 0
+        setattr(faulty, attribute, None)
+    faulty.tamper, faulty.silent = (lambda reading: None), 0
     rows = run(ticker, 30, first + 30, ARM)
     assert not rows["torque"].any()
     assert ticker.fault is not None
@@ -156,16 +156,16 @@ def assert_faulted(ticker: Ticker, first: int, fault: Fault, within: int = 2) ->
 
 def test_encoder_offsets_are_subtracted_once_also_without_new_readings() -> None:
     offset = (0.01, -0.02, 0.005)
-    parts = gated_servo(linkage=Linkage(offset=offset), **AT_ONCE)
+    parts = gated_servo(linkage=Linkage(offset=offset), **UNRAMPED_GATE)
     ticker = Ticker(GatedServo(*parts[:4], np.array(offset)))
-    plain = Ticker(gated_servo(**AT_ONCE))
+    plain = Ticker(gated_servo(**UNRAMPED_GATE))
     a, b = run(ticker, 300, request=ARM), run(plain, 300, request=ARM)
     np.testing.assert_allclose(a["theta"], b["theta"], atol=3e-4)
-    broken = Broken(parts.driver)
-    again = Ticker(GatedServo(parts.servo, parts.world, broken, parts.gate, np.array(offset)))
+    faulty = FaultyDriver(parts.driver)
+    again = Ticker(GatedServo(parts.servo, parts.world, faulty, parts.gate, np.array(offset)))
     run(again, 2)
     before = again.row.copy()
-    broken.silent = 3
+    faulty.silent = 3
     run(again, 3, 2)
     np.testing.assert_array_equal(columns(before[None])["theta"], columns(again.row[None])["theta"])
 

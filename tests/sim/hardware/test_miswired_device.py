@@ -11,26 +11,30 @@ from models.phantom.kinematics import forward_kinematics
 from sim.devices.exchange import READING_THETA
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import Ticker
-from tests.sim.hardware.emulation import PERIOD, Broken, gated_servo
+from tests.sim.hardware.emulation import PERIOD, FaultyDriver, gated_servo
 
-FASTEST = 2.0
+SPEED_LIMIT = 2.0
 """Speed of the tip that nothing may pass [m/s]: the fault's 1.5, and what 4 N add to 75 g in the filter's few ms."""
-FASTEST_UNSEEN = 4.0
+SPEED_LIMIT_ENCODERS_SWAPPED = 4.0
 """With encoders in each other's sockets the gate sees another linkage than there is, and a third of its speed [m/s]."""
 Wiring = Callable[[np.ndarray], np.ndarray]
 
 
-class Miswired(Broken):
+class Miswired(FaultyDriver):
     """A driver between which and its device the torques, or the readings, are mixed up; keeps the tip's true place."""
 
-    def __init__(self, driver: EmulatedPhantom, torque: Wiring, reading: Wiring, late: int = 0):
+    def __init__(self, driver: EmulatedPhantom, torque: Wiring, reading: Wiring, delay_ticks: int = 0):
         super().__init__(driver)
-        self.torque, self.spoil, self.tips = torque, lambda told: _rewrite(told, reading), list[np.ndarray]()
-        self._under_way = [(np.zeros(3), False)] * late
+        self.torque, self.tamper, self.tips = (
+            torque,
+            lambda reading_row: _rewire(reading_row, reading),
+            list[np.ndarray](),
+        )
+        self._delayed = [(np.zeros(3), False)] * delay_ticks
 
     def write(self, torque: np.ndarray, enable: bool) -> None:
-        self._under_way.append((self.torque(torque.copy()), enable))
-        super().write(*self._under_way.pop(0))
+        self._delayed.append((self.torque(torque.copy()), enable))
+        super().write(*self._delayed.pop(0))
         a, b, c = (float(self.driver.port.qpos[place]) for place in self.driver.port.arm_q)
         self.tips.append(np.array(forward_kinematics((a, b, c))))
 
@@ -38,54 +42,54 @@ class Miswired(Broken):
         return float(np.linalg.norm(np.diff(self.tips, axis=0), axis=1).max()) / PERIOD
 
 
-def _rewrite(told: np.ndarray, wiring: Wiring) -> None:
-    told[READING_THETA : READING_THETA + 3] = wiring(told[READING_THETA : READING_THETA + 3].copy())
+def _rewire(reading_row: np.ndarray, wiring: Wiring) -> None:
+    reading_row[READING_THETA : READING_THETA + 3] = wiring(reading_row[READING_THETA : READING_THETA + 3].copy())
 
 
-def as_it_is(values: np.ndarray) -> np.ndarray:
+def unchanged(values: np.ndarray) -> np.ndarray:
     return values
 
 
-def flipped(*joints: int) -> Wiring:
+def signs_flipped(*joints: int) -> Wiring:
     signs = np.ones(3)
     signs[list(joints)] = -1.0
     return lambda values: signs * values
 
 
-def swapped(values: np.ndarray) -> np.ndarray:
+def second_and_third_swapped(values: np.ndarray) -> np.ndarray:
     return values[[0, 2, 1]]
 
 
-def driven(torque: Wiring, reading: Wiring, late: int = 0) -> tuple[Ticker, Miswired]:
+def run_miswired(torque: Wiring, reading: Wiring, delay_ticks: int = 0) -> tuple[Ticker, Miswired]:
     """Four seconds from arming, with the default limits and a hand that lets go once the force is in."""
     driver = gated_servo(holds=1.5).driver
     assert isinstance(driver, EmulatedPhantom)
-    wrong = Miswired(driver, torque, reading, late)
-    ticker = Ticker(gated_servo(wrong, dead_man=False, small=2.0))
+    miswired = Miswired(driver, torque, reading, delay_ticks)
+    ticker = Ticker(gated_servo(miswired, dead_man=False, small=2.0))
     for k in range(4000):
         ticker.tick(k, ARM if k == 0 else -1)
         assert np.linalg.norm(ticker.gated.force) <= 4.0 + 1e-9
         assert not (ticker.fault and ticker.gated.torque.any())
-    return ticker, wrong
+    return ticker, miswired
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("torque", [flipped(0), flipped(1), flipped(2), flipped(0, 1, 2)])
+@pytest.mark.parametrize("torque", [signs_flipped(0), signs_flipped(1), signs_flipped(2), signs_flipped(0, 1, 2)])
 def test_reversed_motors_are_released_with_a_fault(torque: Wiring) -> None:
-    ticker, device = driven(torque, as_it_is)
+    ticker, device = run_miswired(torque, unchanged)
     assert ticker.fault is not None
     assert ticker.fault.fault in (Fault.TOO_FAST, Fault.LEFT_WORKSPACE, Fault.OSCILLATION)
     assert ticker.state is State.FAULT
-    assert device.top_speed() < FASTEST
+    assert device.top_speed() < SPEED_LIMIT
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("torque", "reading", "late"),
-    [(as_it_is, flipped(0), 0), (as_it_is, flipped(1), 0), (as_it_is, flipped(2), 0), (swapped, as_it_is, 0),
-     (as_it_is, swapped, 0), (lambda torque: 3.0 * torque, as_it_is, 0), (as_it_is, as_it_is, 20)],
+    ("torque", "reading", "delay_ticks"),
+    [(unchanged, signs_flipped(0), 0), (unchanged, signs_flipped(1), 0), (unchanged, signs_flipped(2), 0), (second_and_third_swapped, unchanged, 0),
+     (unchanged, second_and_third_swapped, 0), (lambda torque: 3.0 * torque, unchanged, 0), (unchanged, unchanged, 20)],
     ids=["encoder 1", "encoder 2", "encoder 3", "motors swapped", "encoders swapped", "torque constant", "20 ms late"],
 )  # fmt: skip
-def test_tip_stays_slow_under_any_miswiring(torque: Wiring, reading: Wiring, late: int) -> None:
-    _, device = driven(torque, reading, late)
-    assert device.top_speed() < (FASTEST_UNSEEN if reading is swapped else FASTEST)
+def test_tip_stays_slow_under_any_miswiring(torque: Wiring, reading: Wiring, delay_ticks: int) -> None:
+    _, device = run_miswired(torque, reading, delay_ticks)
+    assert device.top_speed() < (SPEED_LIMIT_ENCODERS_SWAPPED if reading is second_and_third_swapped else SPEED_LIMIT)

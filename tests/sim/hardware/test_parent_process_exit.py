@@ -21,13 +21,13 @@ from sim.hardware.shared import Ring, SharedNumbers
 from tests.sim.hardware.process_factories import PERIOD
 from tests.sim.hardware.test_processes import job
 
-GONE = 2**22 + 1  # no process has such an id
+UNUSED_PID = 2**22 + 1  # no process has such an id
 
 
 @pytest.fixture
 def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
     """This process is one whose parent is gone."""
-    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=GONE))
+    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=UNUSED_PID))
 
 
 def test_emulated_device_ends_if_its_parent_died_while_it_started(orphan, monkeypatch) -> None:
@@ -58,7 +58,7 @@ def test_empty_recording_of_a_killed_run_is_removed(orphan, monkeypatch, tmp_pat
 
 
 def test_worker_ends_if_its_page_died_while_it_worked(orphan) -> None:
-    class Asked:
+    class EmptyQueue:
         times = 0
 
         def get(self, timeout: float) -> None:
@@ -66,20 +66,20 @@ def test_worker_ends_if_its_page_died_while_it_worked(orphan) -> None:
             assert self.times < 3, "it goes on"
             raise queue.Empty
 
-    assert newest(Asked()) is None
+    assert newest(EmptyQueue()) is None
 
 
 SCRIPT = """
 import multiprocessing, os, signal, socket, time
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.shared import SharedNumbers
-from tests.sim.hardware.process_factories import PERIOD, device
+from tests.sim.hardware.process_factories import PERIOD, emulated_device
 
 
 def late():
     os.kill(os.getppid(), signal.SIGKILL)
     time.sleep(0.2)
-    return device()
+    return emulated_device()
 
 
 if __name__ == "__main__":

@@ -13,16 +13,16 @@ from sim.hardware.shared import Ring, SharedNumbers
 
 @pytest.fixture
 def numbers() -> Iterator[SharedNumbers]:
-    made = SharedNumbers(64)
-    yield made
-    made.close()
+    shared = SharedNumbers(64)
+    yield shared
+    shared.close()
 
 
 @pytest.fixture
 def ring() -> Iterator[Ring]:
-    made = Ring(8, 2)
-    yield made
-    made.close()
+    shared = Ring(8, 2)
+    yield shared
+    shared.close()
 
 
 def test_reader_never_sees_a_partial_write(numbers: SharedNumbers) -> None:

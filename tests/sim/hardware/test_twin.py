@@ -12,14 +12,14 @@ from sim.hardware.gated_servo import Ticker
 from sim.hardware.twin import Twin, tip_force
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo, run
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo, run
 
 PUSH = Push(2.0, 1.0, 1.5, (0.3, -0.5, 0.81))
 
 
 @pytest.fixture(scope="module")
 def pushed() -> tuple[dict, dict]:
-    rows = run(Ticker(gated_servo(arm=Arm(pushes=(PUSH,)), **AT_ONCE)), 4000, request=ARM)
+    rows = run(Ticker(gated_servo(arm=Arm(pushes=(PUSH,)), **UNRAMPED_GATE)), 4000, request=ARM)
     return rows, Twin(SceneConfig()).follow(rows)
 
 
@@ -36,8 +36,8 @@ def test_hand_force_is_the_filtered_push_and_otherwise_zero(pushed) -> None:
         PUSH.direction
     )
     true /= max(1.0, np.linalg.norm(PUSH.direction))
-    late = np.array([np.convolve(x, np.exp(-np.arange(200) * 1e-3 * 62.8) * 0.0609)[:4000] for x in true.T]).T
-    error = np.linalg.norm(twin["hand_force"] - late, axis=1)
+    filtered = np.array([np.convolve(x, np.exp(-np.arange(200) * 1e-3 * 62.8) * 0.0609)[:4000] for x in true.T]).T
+    error = np.linalg.norm(twin["hand_force"] - filtered, axis=1)
     assert np.abs(twin["hand_force"]).max() > 1.0
     assert np.sqrt(np.mean(error[500:] ** 2)) < 0.08
 
@@ -52,8 +52,8 @@ def test_block_sizes_do_not_change_the_result(pushed) -> None:
 
 def test_observer_restarts_where_ticks_are_missing(pushed) -> None:
     rows, _ = pushed
-    kept = np.r_[0:1000, 1500:2500]
-    twin = Twin(SceneConfig()).follow({k: v[kept] for k, v in rows.items()})
+    indices = np.r_[0:1000, 1500:2500]
+    twin = Twin(SceneConfig()).follow({k: v[indices] for k, v in rows.items()})
     assert twin["apart"][1000] == 0.0
     assert np.isfinite(twin["hand_force"]).all()
     assert np.sqrt(np.mean(twin["apart"][1300:] ** 2)) < 5e-5

@@ -26,7 +26,7 @@ from sim.users.hand.arm import Arm
 from sim.world.encoders import PEAK_TORQUE
 from sim.world.phantom_port import actuate, phantom_port, sense, sense_in_motion, true_motion
 from sim.world.world import World, phantom_angles
-from tests.sim.bare_servos import Stepped, bare_servo, device_world, simulated
+from tests.sim.bare_servos import SteppedPhantom, bare_servo, device_world, simulated
 
 CLIPS = ("cheer", "angry")
 CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
@@ -42,8 +42,8 @@ def session_of(clips: tuple, config: RunConfig = CONFIG) -> Session:
 
 
 def run_logged(session: Session, n: int, replay: bool = False, ticks=None):
-    made, frames = make_logs(session.servo, n)
-    ticks = made if ticks is None else ticks
+    fresh, frames = make_logs(session.servo, n)
+    ticks = fresh if ticks is None else ticks
     run_block(session.servo, 0, n, replay, ticks, frames)
     return ticks, frames
 
@@ -99,7 +99,7 @@ def test_stylus_without_force_floats() -> None:
     world = World()
     start = np.array([0.03, 0.02, 0.02])
     world.reset(start, rest_pose())
-    phantom = Stepped(world)
+    phantom = SteppedPhantom(world)
     for _ in range(500):
         state = phantom.read()
         phantom.write(np.zeros(3))
@@ -143,7 +143,7 @@ def test_device_called_from_python_matches_the_compiled_loop(clips: tuple) -> No
     ticks, _ = run_logged(compiled, 300)
     arm = Arm(pushes=CONFIG.user.pushes)
     field = stepped.servo.field
-    phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
+    phantom, path = SteppedPhantom(stepped.world, arm, CONFIG.device.cutoff), []
     sense_in_motion(phantom.device.port)
     for _ in range(300):
         hand = phantom.read().vector()
@@ -183,7 +183,7 @@ def test_ctrl_c_swallowed_by_a_c_callback_ends_the_run(monkeypatch: pytest.Monke
     world, before = device_world(), sys.unraisablehook
     loop = Loop(bare_servo(world, simulated(world)), world)
     monkeypatch.setattr("sim.loop.loop.run_block", block)
-    for go_on in (lambda: loop.run(0.1), loop.step):
+    for advance in (lambda: loop.run(0.1), loop.step):
         with pytest.raises(KeyboardInterrupt):
-            go_on()
+            advance()
     assert sys.unraisablehook is before

@@ -44,7 +44,7 @@ def block(start: int, n: int) -> dict[str, np.ndarray]:
     return {name: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (n, *s)) for name, s in CHANNELS.items()}
 
 
-def numbered(channel) -> bool:
+def holds_row_numbers(channel) -> bool:
     rows = channel[:]
     return bool(np.all(rows == np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1))))
 
@@ -85,11 +85,11 @@ def test_killed_run_opens_and_has_lost_less_than_a_second(tmp_path, seed):
         writer.stdout.readline()
         time.sleep(random.Random(seed).uniform(0.0, 0.3))
         writer.kill()
-        said = [20, *map(int, writer.stdout.read().split(b"\n")[:-1])][-1]
+        message = [20, *map(int, writer.stdout.read().split(b"\n")[:-1])][-1]
     with Recording(path) as recording:
         ticks = recording.groups["ticks"]
-        assert said - len(ticks["t"]) <= CHUNK_SECONDS * 1000 <= 1000
-        assert all(numbered(channel) for channel in ticks.values())
+        assert message - len(ticks["t"]) <= CHUNK_SECONDS * 1000 <= 1000
+        assert all(holds_row_numbers(channel) for channel in ticks.values())
         assert not recording.complete
 
 
@@ -201,7 +201,7 @@ def test_running_recording_is_readable(tmp_path):
         recorder.append("ticks", block(0, 600))
         with Recording(tmp_path / "run.h5") as recording:
             assert len(recording.groups["ticks"]["p"]) == 500
-            assert numbered(recording.groups["ticks"]["p"])
+            assert holds_row_numbers(recording.groups["ticks"]["p"])
 
 
 def test_rows_can_be_flushed_at_any_moment(tmp_path):
@@ -214,7 +214,7 @@ def test_rows_can_be_flushed_at_any_moment(tmp_path):
             with Recording(tmp_path / "run.h5") as recording:
                 ticks = recording.groups["ticks"]
                 assert len(ticks["t"]) == start
-                assert all(numbered(channel) for channel in ticks.values())
+                assert all(holds_row_numbers(channel) for channel in ticks.values())
 
 
 def test_memory_does_not_grow_with_the_run(tmp_path):
@@ -299,7 +299,7 @@ def test_error_for_a_missing_channel_names_the_recorded_ones(tmp_path):
             recording.groups["ticks"]["q"]
 
 
-def recorded(path, closed=True):
+def recording_bytes(path, closed=True):
     """A recording of a second, closed or as a kill leaves it."""
     script = WRITER if closed else WRITER.replace("recorder.close", "import os; os._exit")
     subprocess.run([sys.executable, "-c", script, str(path), "1000"], stdout=subprocess.PIPE, check=False, timeout=60)
@@ -320,7 +320,7 @@ def damaged(content):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_truncated_or_corrupt_file_is_read_or_refused_without_hanging(tmp_path, closed):
-    content = recorded(tmp_path / "whole.h5", closed)
+    content = recording_bytes(tmp_path / "whole.h5", closed)
     refused, began = list[str](), time.perf_counter()
     for k, bytes_of in enumerate(damaged(content)):
         path = tmp_path / f"{k}.h5"
@@ -332,12 +332,12 @@ def test_truncated_or_corrupt_file_is_read_or_refused_without_hanging(tmp_path, 
         except RecordingError as error:
             refused.append(str(error))
     assert len(refused) > 30
-    assert not [said for said in refused if "\n" in said]
+    assert not [message for message in refused if "\n" in message]
     assert time.perf_counter() - began < 30.0  # HDF5 alone would wait for ever
 
 
 def test_error_for_a_truncated_file_names_both_sizes(tmp_path):
-    content = recorded(tmp_path / "run.h5")
+    content = recording_bytes(tmp_path / "run.h5")
     (tmp_path / "run.h5").write_bytes(content[:20000])
     with pytest.raises(RecordingError, match=rf"run\.h5: .*cut short: 20000 bytes of {len(content)}; expected"):
         Recording(tmp_path / "run.h5")
@@ -349,17 +349,17 @@ def test_lookup3_hash_equals_published_values():
 
 
 def test_full_disk_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path, monkeypatch):
-    room = [10e6]
+    free_bytes = [10e6]
 
     def usage(path):
-        return shutil._ntuple_diskusage(int(10e6), 0, int(room[0]))
+        return shutil._ntuple_diskusage(int(10e6), 0, int(free_bytes[0]))
 
     monkeypatch.setattr(shutil, "disk_usage", usage)
 
     def run():
         with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
             for start in range(0, 4000, 500):
-                room[0] = 10e6 - 2e6 * (start // 500)
+                free_bytes[0] = 10e6 - 2e6 * (start // 500)
                 recorder.append("ticks", block(start, 500))
 
     with pytest.raises(
@@ -368,7 +368,7 @@ def test_full_disk_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path, 
         run()
     with Recording(tmp_path / "run.h5") as recording:
         assert len(recording.channel("ticks", "t")) == 1500
-        assert all(numbered(channel) for channel in recording.groups["ticks"].values())
+        assert all(holds_row_numbers(channel) for channel in recording.groups["ticks"].values())
 
 
 QUOTA = """
@@ -396,7 +396,7 @@ def test_file_size_limit_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_
     with Recording(tmp_path / "run.h5") as recording:
         rows = recording.channel("ticks", "x")
         assert len(rows) >= 500
-        assert numbered(rows)
+        assert holds_row_numbers(rows)
 
 
 def test_file_that_is_no_recording_is_refused_in_one_line(tmp_path):

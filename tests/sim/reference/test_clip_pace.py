@@ -47,18 +47,18 @@ def _played(clips: RiverClips, phases: np.ndarray) -> Played:
         memory = reference.memory
         rows.append((memory[PHASE], memory[SHOWN], reference.velocity.copy(), reference.acceleration.copy()))
     hand, clip, velocity, acceleration = zip(*rows, strict=True)
-    hand, clip = (np.unwrap(np.array(told), period=LAP) for told in (hand, clip))
+    hand, clip = (np.unwrap(np.array(values), period=LAP) for values in (hand, clip))
     return Played(hand, clip, np.array(velocity), np.array(acceleration))
 
 
-def _bumped(seconds: float) -> np.ndarray:
+def _bumped_phases(seconds: float) -> np.ndarray:
     t = np.arange(round(seconds / PERIOD)) * PERIOD
     s = np.clip((t - PUSHED) / BUMP, 0.0, 1.0)
     return t + LEAD * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: RiverClips) -> None:
-    played = _played(walk, _bumped(5.0))
+    played = _played(walk, _bumped_phases(5.0))
     after = slice(round(0.8 / PERIOD), None)
     rates = [np.diff(phases[after]) / PERIOD for phases in (played.hand, played.clip)]
     assert rates[0].max() > 1.4
@@ -69,12 +69,12 @@ def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: 
 
 
 def test_velocity_and_acceleration_are_those_of_the_shown_motion(walk: RiverClips) -> None:
-    played = _played(walk, _bumped(1.6))
+    played = _played(walk, _bumped_phases(1.6))
     # While all of the excess is taken up; later the stylus filter's prediction of a pushed hand is off by itself.
     pushed = slice(round((PUSHED + 0.04) / PERIOD), round((PUSHED + 0.1) / PERIOD))
     assert (np.diff(played.hand)[pushed] / PERIOD).max() > 1.5
-    away = np.gradient(played.velocity[:, :3], PERIOD, axis=0) - played.acceleration[:, :3]
-    assert np.abs(away[pushed]).max() < 0.3  # [m/s²]
+    difference = np.gradient(played.velocity[:, :3], PERIOD, axis=0) - played.acceleration[:, :3]
+    assert np.abs(difference[pushed]).max() < 0.3  # [m/s²]
 
 
 @pytest.mark.slow

@@ -43,11 +43,11 @@ def clips_of_rivers() -> RiverClips:
     return RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE))
 
 
-def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.ndarray:
+def _played(clips: RiverClips, blend: float, without_river_between: bool = False) -> np.ndarray:
     """Poses of a hand that glides from river to river, every 8 ms for 7.2 s."""
     t = np.arange(900) * PERIOD
     stylus, traces = gliding_hand(CURVES, LAP, CHANGES, t)
-    for moment, _ in CHANGES if none_between else ():
+    for moment, _ in CHANGES if without_river_between else ():
         traces[(t >= moment - 0.1) & (t < moment), TRACE_RIVER] = -1.0
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, blend, packed_legs(FIGURE))
     poses = np.empty((len(t), 75))
@@ -117,7 +117,7 @@ def test_last_clip_plays_while_no_river_has_the_hand(clips_of_rivers) -> None:
     np.testing.assert_array_equal(_played(clips_of_rivers, BLEND, True), _played(clips_of_rivers, BLEND))
 
 
-def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
+def _played_thrown_out(clips: RiverClips, let_go: bool) -> np.ndarray:
     """Poses of a hand that is thrown far out of its river at 1.4 s, swings about, comes back, and is taken at 4.5 s."""
     t = np.arange(700) * PERIOD
     away = np.clip((t - 1.4) / 0.3, 0.0, 1.0) * np.clip((4.2 - t) / 0.3, 0.0, 1.0)
@@ -134,7 +134,7 @@ def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
 
 
 def test_figure_stands_while_the_hand_is_outside_all_rivers(clips_of_rivers) -> None:
-    poses = _thrown(clips_of_rivers, True)
+    poses = _played_thrown_out(clips_of_rivers, True)
     joint, root = _rates(poses)
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
     # It comes to rest, stands still however the hand swings, and goes on: without a jump of pose or velocity.
@@ -145,10 +145,10 @@ def test_figure_stands_while_the_hand_is_outside_all_rivers(clips_of_rivers) -> 
     assert joint[round(4.8 / PERIOD) :].max() > 0.5
     assert joint[: round(1.4 / PERIOD)].max() > 0.5
     # A river that keeps such a hand has the figure thrown about: the control.
-    assert _rates(_thrown(clips_of_rivers, False))[0][still].max() > 20.0
+    assert _rates(_played_thrown_out(clips_of_rivers, False))[0][still].max() > 20.0
 
 
-def _in_turns(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
+def _played_alternating(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
     """Poses while rivers have the hand in turns, for so long each, from 0.5 s on."""
     t = np.arange(300) * PERIOD
     traces = np.zeros((len(t), TRACE_SIZE))
@@ -160,21 +160,21 @@ def _in_turns(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
     return poses
 
 
-def _jerk(poses: np.ndarray) -> float:
+def _largest_velocity_step(poses: np.ndarray) -> float:
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
     return float(np.abs(np.diff(velocity, axis=0)).max())
 
 
 def test_alternating_rivers_change_the_clip_once_per_blend_time(clips_of_rivers) -> None:
     # The first change comes in the middle of a kick.
-    assert _jerk(_in_turns(clips_of_rivers, 0.06, BLEND)) < 20.0
-    assert _jerk(_in_turns(clips_of_rivers, 0.06, 0.0)) > 60.0
+    assert _largest_velocity_step(_played_alternating(clips_of_rivers, 0.06, BLEND)) < 20.0
+    assert _largest_velocity_step(_played_alternating(clips_of_rivers, 0.06, 0.0)) > 60.0
 
 
 def test_momentary_river_changes_no_clip(clips_of_rivers) -> None:
-    alone = _in_turns(clips_of_rivers, 1e3, BLEND)
-    np.testing.assert_array_equal(_in_turns(clips_of_rivers, 0.03, BLEND), alone)
-    assert np.abs(_in_turns(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
+    alone = _played_alternating(clips_of_rivers, 1e3, BLEND)
+    np.testing.assert_array_equal(_played_alternating(clips_of_rivers, 0.03, BLEND), alone)
+    assert np.abs(_played_alternating(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
 
 
 @pytest.mark.parametrize("clips", [("squat_dance", "walk", "angry"), ("walk", "run", "squat_dance")])
@@ -240,7 +240,9 @@ def test_stopped_figure_is_in_balance_only_with_rest_phases(clips_of_rivers) -> 
         (("walk", "run", "squat_dance"), 1, 2, 4.134903),
     ],
 )
-def test_velocity_is_continuous_in_difficult_changes(clips: tuple[str, ...], first: int, second: int, moment: float) -> None:
+def test_velocity_is_continuous_in_difficult_changes(
+    clips: tuple[str, ...], first: int, second: int, moment: float
+) -> None:
     rivers = rivers_that_play(clips)
     change = measured_change(played_change(rivers, first, second, moment))
     finer = measured_change(played_change(rivers, first, second, moment, PERIOD / 8.0), PERIOD / 8.0)
@@ -268,7 +270,7 @@ def test_transitions_match_golden_poses(clips_of_rivers) -> None:
 
 
 if __name__ == "__main__":
-    made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
+    clips = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
     np.savetxt(
-        GOLDEN, _played(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), BLEND)[::15], fmt="%.10g", delimiter=","
+        GOLDEN, _played(RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE)), BLEND)[::15], fmt="%.10g", delimiter=","
     )

@@ -64,12 +64,12 @@ def test_flight_poses_are_lowered_to_the_floor_and_stances_unchanged(name: str) 
 
 def test_upside_down_figure_is_not_lowered() -> None:
     poses = _poses("backflip")
-    over = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
-    lowered = over.copy()
+    upside_down = poses[1.0 - 2.0 * (poses[:, 4] ** 2 + poses[:, 5] ** 2) < 0.0]
+    lowered = upside_down.copy()
     for pose in lowered:
         lower_to_floor(LEGS, ENDS, 1.0, pose, 1.0)
-    assert len(over) > 5
-    np.testing.assert_array_equal(lowered, over)
+    assert len(upside_down) > 5
+    np.testing.assert_array_equal(lowered, upside_down)
 
 
 def test_lowering_share_falls_to_zero_as_the_hand_reaches_the_clip_pace() -> None:
@@ -108,19 +108,19 @@ def _held_in_flight(clip_seconds: float) -> np.ndarray:
     reference = make_reference(
         FIGURE_MODEL, jumps.compiled(), PERIOD, 6.0, limbs=packed_legs(FIGURE_MODEL), clip_seconds=clip_seconds
     )
-    shown = np.empty((len(t), 75))
-    reference_along(reference, stylus_path(curve.point(t)), np.zeros((len(t), TRACE_SIZE)), shown)
-    return shown
+    settled = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(curve.point(t)), np.zeros((len(t), TRACE_SIZE)), settled)
+    return settled
 
 
 @pytest.mark.slow
 def test_held_jump_comes_down_and_hovers_without_settling() -> None:
-    shown, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
+    settled, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
     assert _lowest(hovering)[-1] > 0.2
-    assert _lowest(shown)[-1] < 0.006
+    assert _lowest(settled)[-1] < 0.006
     # At its own pace it flies, and it comes down no faster than a body that falls.
-    velocity = pose_difference(shown[:-1], shown[1:])[:, 2] / PERIOD
-    assert _lowest(shown).max() > 0.15
+    velocity = pose_difference(settled[:-1], settled[1:])[:, 2] / PERIOD
+    assert _lowest(settled).max() > 0.15
     assert velocity.min() > -2.5
     assert np.abs(np.diff(velocity)).max() < 0.5
 
@@ -148,11 +148,11 @@ def test_physical_figure_stands_through_held_and_carried_flights(clips: tuple[st
     root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
     errors: list[float] = []
 
-    def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
+    def append_errors(ticks: TickLog, frames: FrameLog, n: int) -> None:
         m = -(-n // session.servo.figure_ticks)
         errors.append(float(pose_errors(frames.qpos[:m, root : root + 75], frames.reference[:m])[1].max()))
 
-    Loop(session.servo, session.world, keep).run(config.seconds)
+    Loop(session.servo, session.world, append_errors).run(config.seconds)
     assert config.seconds > edited_until(session.config.user.grabs) + 3.0
     # It fell at 11.7 s with the jump and at 6.2 s with the four.
     assert max(errors) < 0.3

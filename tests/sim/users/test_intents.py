@@ -96,82 +96,82 @@ def test_every_intent_covers_its_run_and_is_reproducible(intent) -> None:
     np.testing.assert_array_equal(wishes.rows, intent.wishes(CIRCLE, 8.0, 3).rows)
 
 
-def at(wishes: Wishes, t: float) -> np.ndarray:
+def row_at(wishes: Wishes, t: float) -> np.ndarray:
     return wishes.rows[round(t / wishes.period)]
 
 
 def test_exaggerate_goes_outwards_then_inwards() -> None:
     wishes = Exaggerate(larger=1.5, calmer=0.5).wishes(CIRCLE, 8.0, 1)
-    assert np.hypot(*at(wishes, 1.0)[:2]) == pytest.approx(0.06, rel=1e-3)
-    assert np.hypot(*at(wishes, 3.0)[:2]) == pytest.approx(0.02, rel=1e-3)
-    assert np.hypot(*at(wishes, 4.0)[:2]) == pytest.approx(0.04, rel=1e-3)
+    assert np.hypot(*row_at(wishes, 1.0)[:2]) == pytest.approx(0.06, rel=1e-3)
+    assert np.hypot(*row_at(wishes, 3.0)[:2]) == pytest.approx(0.02, rel=1e-3)
+    assert np.hypot(*row_at(wishes, 4.0)[:2]) == pytest.approx(0.04, rel=1e-3)
 
 
 def test_cut_corner_is_straight() -> None:
     wishes = CutCorner(0.25, 0.5).wishes(CIRCLE, 4.0, 1)
-    first, middle, last = (at(wishes, t)[:3] for t in (1.02, 1.5, 1.98))
+    first, middle, last = (row_at(wishes, t)[:3] for t in (1.02, 1.5, 1.98))
     np.testing.assert_allclose(middle, 0.5 * (first + last), atol=1e-9)
     assert np.hypot(*middle[:2]) < 0.04 * np.cos(np.pi / 4.0) + 1e-4
 
 
 def test_change_over_ends_on_the_other_curve() -> None:
-    wishes = ChangeOver(Trajectory.circle(0.06, 4.0), at=3.0).wishes(CIRCLE, 8.0, 1)
-    assert np.hypot(*at(wishes, 2.5)[:2]) == pytest.approx(0.04, rel=1e-3)
-    assert np.hypot(*at(wishes, 6.0)[:2]) == pytest.approx(0.06, rel=1e-3)
+    wishes = ChangeOver(Trajectory.circle(0.06, 4.0), row_at=3.0).wishes(CIRCLE, 8.0, 1)
+    assert np.hypot(*row_at(wishes, 2.5)[:2]) == pytest.approx(0.04, rel=1e-3)
+    assert np.hypot(*row_at(wishes, 6.0)[:2]) == pytest.approx(0.06, rel=1e-3)
 
 
 def test_resist_holds_its_place_with_a_firm_grip_then_continues() -> None:
-    wishes = Resist(at=1.0, seconds=2.0, grip=9.0).wishes(CIRCLE, 8.0, 1)
-    np.testing.assert_allclose(at(wishes, 1.2)[:3], at(wishes, 2.8)[:3])
-    assert at(wishes, 2.0)[GRIP] == 9.0
-    np.testing.assert_allclose(at(wishes, 3.2)[:3], CIRCLE.point(CIRCLE.start + 1.2), atol=1e-9)
+    wishes = Resist(row_at=1.0, seconds=2.0, grip=9.0).wishes(CIRCLE, 8.0, 1)
+    np.testing.assert_allclose(row_at(wishes, 1.2)[:3], row_at(wishes, 2.8)[:3])
+    assert row_at(wishes, 2.0)[GRIP] == 9.0
+    np.testing.assert_allclose(row_at(wishes, 3.2)[:3], CIRCLE.point(CIRCLE.start + 1.2), atol=1e-9)
 
 
 def test_get_lost_leaves_the_curve_lets_go_and_comes_back() -> None:
-    wishes = GetLost(at=1.0, seconds=4.0).wishes(CIRCLE, 8.0, 5)
+    wishes = GetLost(row_at=1.0, seconds=4.0).wishes(CIRCLE, 8.0, 5)
     away = np.linalg.norm(wishes.rows[:, :3] - CIRCLE.point(CIRCLE.start + 0.02 * np.arange(len(wishes.rows))), axis=1)
     assert away.max() > 0.005
     assert away[:50].max() < 1e-9
     assert away[260:].max() < 1e-9
-    assert at(wishes, 3.0)[ENGAGED] == 0.0
-    assert at(wishes, 6.0)[ENGAGED] == 1.0
+    assert row_at(wishes, 3.0)[ENGAGED] == 0.0
+    assert row_at(wishes, 6.0)[ENGAGED] == 1.0
 
 
 def test_bend_presses_the_switch_while_it_carries() -> None:
     grab = Grab(1.0, (0.02, 0.0, 0.0), seconds=1.0, hold=0.5, place=(0.04, 0.0, 0.0), reach=0.8)
     wishes = Bend([grab]).wishes(CIRCLE, 6.0, 1)
-    assert [at(wishes, t)[SWITCH] for t in (0.5, 1.5, 2.0, 3.2, 4.0)] == [0.0, 0.0, 1.0, 1.0, 0.0]
-    np.testing.assert_allclose(at(wishes, 3.1)[PLACE : PLACE + 3], [0.06, 0.0, 0.0], atol=1e-9)
+    assert [row_at(wishes, t)[SWITCH] for t in (0.5, 1.5, 2.0, 3.2, 4.0)] == [0.0, 0.0, 1.0, 1.0, 0.0]
+    np.testing.assert_allclose(row_at(wishes, 3.1)[PLACE : PLACE + 3], [0.06, 0.0, 0.0], atol=1e-9)
 
 
 def test_press_is_a_force_away_from_the_middle() -> None:
     wishes = Press([Push(1.0, 1.0, 2.0)]).wishes(CIRCLE, 4.0, 1)
     outward = CIRCLE.point(CIRCLE.start + 1.5) / 0.04
-    np.testing.assert_allclose(at(wishes, 1.5)[FORCE : FORCE + 3], 2.0 * outward, atol=1e-3)
+    np.testing.assert_allclose(row_at(wishes, 1.5)[FORCE : FORCE + 3], 2.0 * outward, atol=1e-3)
 
 
 @pytest.mark.parametrize(
-    "make",
+    "make_intent",
     [
         lambda: Exaggerate(larger=9.0), lambda: CutCorner(0.6, 0.5), lambda: Resist(grip=99.0), lambda: Trace(0.0),
         lambda: GetLost(away=1.0), lambda: ChangeOver(seconds=0.0), lambda: Own(print, every=0.0),
         lambda: Press([Push(0.0, 1.0, 1.0, place=(0.0, 0.0, 0.0))]), lambda: Bend([Grab(0.0, (0.0, 0.0, 0.0))]),
         lambda: Wishes(np.zeros((3, 4))), lambda: Wishes(np.full((3, 10), np.nan)),
         lambda: targets(np.zeros((2, 3)), 0.0),
-        lambda: Press([]), lambda: Bend([]), lambda: ChangeOver(at=np.inf), lambda: Resist(at=np.inf),
-        lambda: GetLost(at=np.inf), lambda: GetLost(seconds=np.inf), lambda: GetLost(seconds=np.nan),
+        lambda: Press([]), lambda: Bend([]), lambda: ChangeOver(row_at=np.inf), lambda: Resist(row_at=np.inf),
+        lambda: GetLost(row_at=np.inf), lambda: GetLost(seconds=np.inf), lambda: GetLost(seconds=np.nan),
         lambda: Lead([], 0.1), lambda: Lead(np.zeros((3, 2)), 0.1), lambda: Lead(np.full((3, 3), np.nan), 0.1),
         lambda: Lead(np.zeros((3, 3)), 0.0), lambda: Lead(np.zeros((3, 3)), -1.0),
         lambda: Lead(np.zeros((3, 3)), np.nan),
     ],
 )  # fmt: skip
-def test_invalid_intent_is_refused(make) -> None:
+def test_invalid_intent_is_refused(make_intent) -> None:
     with pytest.raises(SimError, match=r"expected|needs"):
-        make()
+        make_intent()
 
 
 def test_intent_with_wrong_values_or_arguments_is_refused_by_name() -> None:
-    for make, said in (
+    for make_intent, message in (
         (lambda: Lead("x", 0.1), "points is 'x'; expected numbers"),  # pyright: ignore
         (lambda: Lead(np.zeros((3, 3)), "x"), "period is 'x'; expected a number"),  # pyright: ignore
         (lambda: Own(lambda t: t), "function is <lambda>(t); expected a function of t, place, force"),
@@ -182,8 +182,8 @@ def test_intent_with_wrong_values_or_arguments_is_refused_by_name() -> None:
         (lambda: Own(3), "function is 3; expected a function of t, place, force"),  # pyright: ignore
     ):
         with pytest.raises(ParameterError) as error:
-            make()
-        assert said in str(error.value)
+            make_intent()
+        assert message in str(error.value)
     rows = Lead([(0, 0, 0), (0, 0, 0.1)], 1.0).wishes(CIRCLE, 4.0, 1).rows  # pyright: ignore
     assert rows[-1, PLACE + 2] == 0.1
 

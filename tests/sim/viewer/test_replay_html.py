@@ -214,8 +214,8 @@ def test_river_colours_differ_from_each_other_and_from_hand_and_field():
     for n in (len(RIVERS), 8, 30):
         colors = [*river_colors(n), FIELD, USER, CURVE]
         seen = np.array([rgb(color) for color in colors], dtype=float)
-        apart = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
-        assert apart.min() > 25.0
+        distances = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
+        assert distances.min() > 25.0
         # Seen on white, in the page and in figures.
         assert (np.linalg.norm(seen - 255.0, axis=1) > 100.0).all()
 
@@ -246,14 +246,14 @@ def test_browser_plays_the_page_from_disk_without_network(tmp_path, model):
         pytest.skip("no chromium")
     with record(tmp_path / "run.h5", model) as recording:
         (tmp_path / "replay.html").write_text(replay_html(recording, model), encoding="utf-8")
-    asked: list[str] = []
-    failed: list[str] = []
+    requested_urls: list[str] = []
+    page_errors: list[str] = []
     options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with playwright.sync_playwright() as play:
         browser = play.chromium.launch(executable_path=chromium, args=options)
         page = browser.new_page(viewport={"width": 640, "height": 400})
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("pageerror", lambda error: failed.append(str(error)))
+        page.on("request", lambda request: requested_urls.append(request.url))
+        page.on("pageerror", lambda error: page_errors.append(str(error)))
         page.set_default_timeout(240_000)  # a processor that draws in software may be busy with other tests
         page.goto((tmp_path / "replay.html").as_uri())
         clock = page.locator("input").first
@@ -261,8 +261,8 @@ def test_browser_plays_the_page_from_disk_without_network(tmp_path, model):
         page.wait_for_function(f"document.querySelector('input').value != '{clock.input_value()}'")
         picture = page.screenshot()
         browser.close()
-    assert failed == []
-    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+    assert page_errors == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in requested_urls)
     assert len(picture) > 20_000  # a blank page compresses to a few kilobytes
 
 

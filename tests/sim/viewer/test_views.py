@@ -11,7 +11,7 @@ import pytest
 from sim.viewer.views import FIELD_OF_VIEW, PANEL, SHEET, VIEWS, View, camera_of, is_phone, look, open_with, screen_axes
 
 
-def seen(view: View, width: float, height: float) -> np.ndarray:
+def projected_points(view: View, width: float, height: float) -> np.ndarray:
     """Pixels of the centre and of the corners of a view's plane, shape (5, 2), from the picture's top left."""
     camera = camera_of(view, width, height)
     forward = camera.look_at - camera.position
@@ -33,7 +33,7 @@ def seen(view: View, width: float, height: float) -> np.ndarray:
 def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int]) -> None:
     width, height = size
     free = (width, (1.0 - SHEET) * height) if is_phone(width, height) else (width - PANEL, height)
-    pixels = seen(VIEWS[name], *size)
+    pixels = projected_points(VIEWS[name], *size)
     np.testing.assert_allclose(pixels[0], [0.5 * free[0], 0.5 * free[1]], atol=1e-6)
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)
     assert inside.all()
@@ -41,7 +41,7 @@ def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int])
     assert spread.max() == pytest.approx(1.0)  # no smaller than it has to be
 
 
-def opened() -> tuple[Any, Any, Callable[[], None]]:
+def opened_page() -> tuple[Any, Any, Callable[[], None]]:
     """A server, the camera of its browser of 900×520, and what tells it that the camera has changed."""
     calls: dict[str, Callable[..., Any]] = {}
     server: Any = SimpleNamespace(
@@ -59,7 +59,7 @@ def resize(camera: Any, width: int, height: int) -> None:
 
 
 def test_view_is_fitted_to_resized_windows_until_somebody_turns_it() -> None:
-    _, camera, update = opened()
+    _, camera, update = opened_page()
     for size in ((1300, 850), (800, 600), (600, 1200), (390, 780)):
         resize(camera, *size)
         update()
@@ -80,7 +80,7 @@ def test_view_is_fitted_to_resized_windows_until_somebody_turns_it() -> None:
 
 
 def test_late_initial_camera_is_replaced_by_the_fitted_view() -> None:
-    server, camera, update = opened()
+    server, camera, update = opened_page()
     fitted = camera_of(VIEWS["both"], 900, 520)
     np.testing.assert_allclose(camera.position, fitted.position)
     camera.position = server.initial_camera.position.astype(np.float32)

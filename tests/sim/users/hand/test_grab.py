@@ -9,7 +9,7 @@ from sim.errors import SimError
 from sim.users.hand.actions import Grab
 from sim.users.hand.arm import Arm, hand_force
 from sim.world.world import World
-from tests.sim.bare_servos import Stepped
+from tests.sim.bare_servos import SteppedPhantom
 
 GRAB = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
 
@@ -79,7 +79,7 @@ def test_device_reports_the_switch() -> None:
     world = World()
     world.reset(np.array([0.03, 0.02, 0.02]), rest_pose())
     arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), seconds=0.03, hold=0.0),))
-    phantom, switches = Stepped(world, arm), []
+    phantom, switches = SteppedPhantom(world, arm), []
     for _ in range(80):
         switches.append(phantom.read().switch)
         phantom.write(np.zeros(3))

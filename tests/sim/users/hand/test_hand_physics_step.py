@@ -29,9 +29,7 @@ def growth(k: float, b: float, m: float, h: float) -> float:
         (TRACING, 300.0, 5.0, LEAST_TIP, 9.3675e-3),
     ],
 )
-def test_step_is_refused_from_where_the_impedance_diverges(
-    arm: Arm, k: float, b: float, m: float, most: float
-) -> None:
+def test_step_is_refused_from_where_the_impedance_diverges(arm: Arm, k: float, b: float, m: float, most: float) -> None:
     arm.check_step(0.999 * most)
     assert growth(k, b, m, 0.999 * most) < 1.0
     assert growth(k, b, m, 1.001 * most) > 1.0

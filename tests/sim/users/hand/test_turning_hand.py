@@ -19,7 +19,7 @@ from sim.users.hand.arm import Arm
 from sim.users.hand.fingers import turning_moment, wanted_turn
 from sim.world.phantom_port import phantom_port, true_turn
 from sim.world.world import World
-from tests.sim.bare_servos import Stepped
+from tests.sim.bare_servos import SteppedPhantom
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 START = np.array([0.03, 0.02, 0.04])
@@ -80,7 +80,7 @@ def test_stylus_starts_in_the_given_orientation():
     world = World()
     q = np.roll(Rotation.from_rotvec([0.3, -0.8, 1.1]).as_quat(), 1)
     world.reset(START, rest_pose(), tuple(q))
-    state = Stepped(world).read()
+    state = SteppedPhantom(world).read()
     assert abs(state.q @ q) == pytest.approx(1.0, abs=1e-5)
     np.testing.assert_allclose(state.p, START, atol=5e-5)
 
@@ -89,7 +89,7 @@ def test_stylus_follows_the_wanted_turn_while_its_tip_stays():
     world = World()
     world.reset(START, rest_pose(), UPRIGHT)
     errors, largest = [], 0.0
-    phantom = Stepped(world, Arm(turns=TURNS))
+    phantom = SteppedPhantom(world, Arm(turns=TURNS))
     for k in range(700):
         state = phantom.read()
         target = Rotation.from_rotvec(wanted(TURNS, 1e-3 * k)[0])
