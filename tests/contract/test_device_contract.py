@@ -1,4 +1,4 @@
-"""What every device promises the loop, on what the loop runs."""
+"""The contract between every device and the servo loop."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +29,7 @@ ARM = Arm(pushes=(Push(0.05, 0.2, 1.5, (0.0, 0.0, 1.0)),))
 
 
 class ServoUnderTest(NamedTuple):
-    """A servo with a device, and what has to be called before each of its ticks."""
+    """A servo with a device, and the hook that has to be called before each of its ticks."""
 
     servo: Servo
     world: World
@@ -108,7 +108,7 @@ def test_reading_twice_in_one_tick_returns_the_same_state(make_subject) -> None:
 
 
 def test_velocity_is_the_rate_of_position(make_subject) -> None:
-    """The filter lags by a few milliseconds; over 0.3 s of motion it has to agree with the distance covered."""
+    """The velocity filter lags by a few milliseconds; over 0.3 s its integral has to equal the distance covered."""
     ticks = make_subject().ticks(TICKS)
     covered = ticks["p"][-1] - ticks["p"][100]
     integrated = np.sum(ticks["v"][100:-1], axis=0) * 1e-3

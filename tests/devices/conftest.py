@@ -1,4 +1,4 @@
-"""Devices that are real to the software: the reference firmware, and vendor libraries built from C."""
+"""Fixtures with the reference firmware, compiled from C."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Every driver with what is real behind it, for the loop: what the contract of a device is tested on."""
+"""Every driver with a simulated device behind it, for the contract tests and the loop."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,11 +21,11 @@ from tests.devices.rig import DeviceBackend, FirmwareBackend, Linkage, Rig
 from tests.devices.test_spacemouse import Cap
 
 PUSHES = {20: (0, -250, 120), 220: (0, 40, -40), 300: (0, 0, 0)}
-"""What a hand does on the cap, by tick: 350 is all the way."""
+"""Push of the hand on the cap from a tick on; 350 is full deflection."""
 
 
 class CapBackend:
-    """A hand on a SpaceMouse, which sends a report when the push changes."""
+    """A hand on a SpaceMouse, which sends a report whenever the push changes."""
 
     def __init__(self, send: Callable[[bytes], None]):
         self._send, self.ticks = send, 0
@@ -69,11 +69,11 @@ def _own(device: Exchange, arm: Arm, folder: Path) -> tuple[Driver, DeviceBacken
 _MAKERS = {"hid": _hid, "hdapi": _hdapi, "dhd": _dhd, "own": _own}
 KINDS = (*_MAKERS, "spacemouse")
 NODE_KINDS = ("hid node", "spacemouse node")
-"""Through /dev/hidraw0, the kernel's or umockdev's, and hidapi as it comes."""
+"""Through a /dev/hidraw0 of the kernel or of umockdev, and an unmodified hidapi."""
 
 
 def make_rig(kind: str, device: Exchange, arm: Arm, folder: Path) -> Rig:
-    """The driver of a kind in the loop of an exchange."""
+    """A rig with the driver of a kind and the device behind it."""
     if kind == "spacemouse":
         cap = Cap()
         return spacemouse_rig(device, cap, cap.queue.append, "in memory")

@@ -1,6 +1,6 @@
 """`make fault-table`: measures every injected fault and writes the table of the documentation.
 
-Faults on the wire are injected here. Faults of processes are tests in real time: each row tells whether its test passes.
+Faults on the wire are injected here. Faults of processes are tests in real time: a row tells whether its test passes.
 """
 
 import subprocess
@@ -38,28 +38,28 @@ _RECORDER = "test_recorder_frozen_and_killed"
 _PAGE = "test_servo_does_not_wait_for_a_frozen_or_killed_page"
 PROCESS_FAULTS = (
     ProcessFault("duplicated, lost, late and singly spoiled reports, a third of all", 5, "at once", "not", "not",
-            "nothing: they are counted", "whole", _BUS_ERRORS),
+                 "nothing: they are counted", "whole", _BUS_ERRORS),
     ProcessFault("host away for 5, 50, 500 ms", 3, "its next tick", "not", "10 (firmware's watchdog)",
-            "nothing: a gap, ramped in again", "whole", "test_late_host_trips_the_watchdog"),
+                 "nothing: a gap, ramped in again", "whole", "test_late_host_trips_the_watchdog"),
     ProcessFault("servo SIGSTOP, 50 ms", 1, "when it goes on", "not", "not", "nothing: missed deadlines are counted",
-            "whole", _SERVO_STOPPED),
+                 "whole", _SERVO_STOPPED),
     ProcessFault("servo SIGSTOP, 500 ms", 1, "when it goes on", "0", "0", "SERVO_LATE", "whole", _SERVO_STOPPED),
     ProcessFault("servo SIGSTOP, device on packets", 1, "20 ms (device's watchdog)", "it is stopped", "at once",
-            "SERVO_LATE or CONTROL_LOST when it goes on", "whole", _WATCHDOG),
+                 "SERVO_LATE or CONTROL_LOST when it goes on", "whole", _WATCHDOG),
     ProcessFault("servo SIGKILL, device on packets", 1, "20 ms (device's watchdog)", "it is dead", "at once",
-            "none: the controls say that it is gone", "up to then", _WATCHDOG),
+                 "none: the controls say that it is gone", "up to then", _WATCHDOG),
     ProcessFault("device's process killed", 1, "next tick", "0", "it is dead",
-            "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_killed_device"),
+                 "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_killed_device"),
     ProcessFault("controls frozen", 1, "the heartbeat's time", "0", "0", "CONTROL_LOST", "whole",
-            "test_frozen_controls"),
+                 "test_frozen_controls"),
     ProcessFault("page SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
     ProcessFault("page SIGKILL", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
-    ProcessFault("recorder SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole after 5 s or less",
-            _RECORDER),
+    ProcessFault("recorder SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it",
+                 "whole after 5 s or less", _RECORDER),
     ProcessFault("recorder SIGKILL", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
-            _RECORDER),
+                 _RECORDER),
     ProcessFault("disk full", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
-            "test_full_disk_ends_the_recording"),
+                 "test_full_disk_ends_the_recording"),
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The reference firmware as a shared library, and a HID handle with it behind: what hidapi is to a real device."""
+"""The reference firmware as a shared library, and a HID handle that takes hidapi's place in front of it."""
 
 import ctypes
 import shutil
@@ -19,7 +19,7 @@ NO_SENSOR = protocol.NO_TEMPERATURE
 
 
 def compile_c(folder: Path, *sources: Path, program: bool = False) -> Path:
-    """A library, or a program, of C files; the test is skipped where there is no compiler."""
+    """Compile C files to a library or a program; the test is skipped where there is no compiler."""
     if COMPILER is None:
         pytest.skip("no C compiler (cc, gcc or clang)")
     target = folder / (sources[0].stem if program else f"lib{sources[0].stem}.so")
@@ -85,7 +85,7 @@ class Firmware:
         self.power_up()
 
     def power_up(self, calibrated: bool = True) -> None:
-        """Power goes off and on; encoders that count from where they wake up are not calibrated then."""
+        """Switch power off and on; incremental encoders then have lost their zero (`calibrated` false)."""
         self.boot += 1
         self.sensors.time_us = 0
         stored = calibration()
@@ -110,7 +110,7 @@ class Firmware:
         return buffer.raw[:size]
 
     def tick(self, period: float = 1e-3) -> bytes:
-        """A period passes; the input report."""
+        """Advance by a period; returns the input report."""
         self.sensors.time_us += round(period * 1e6)
         buffer = ctypes.create_string_buffer(64)
         self.c.hvf_tick(self.device, ctypes.byref(self.sensors), buffer)
@@ -118,25 +118,25 @@ class Firmware:
         return buffer.raw
 
     def turn_to(self, angles: np.ndarray) -> None:
-        """Joint and gimbal angles (6,) [rad], as its encoders count them."""
+        """Set the encoder counts to joint and gimbal angles [rad], shape (6,)."""
         self.sensors.encoder[:] = (np.rint(angles / self.angle).astype(int) + self.zero).tolist()
 
     @property
     def joint_torque(self) -> np.ndarray:
-        """What the motors give, at the joints [N m]; zero while they are off."""
+        """Motor torques at the joints [N m]; zero while the motors are off."""
         shaft = np.array(self.motors.torque[:]) * protocol.TORQUE_UNIT if self.motors.on else np.zeros(3)
         return shaft * PREMIUM_1_5.capstan
 
 
 class FirmwareHandle:
-    """hidapi's handle, with the firmware behind it and faults to order; no time passes in it."""
+    """A handle like hidapi's with the firmware behind it; `tamper` alters its reports. No time passes in it."""
 
     def __init__(self, firmware: Firmware):
         self.firmware, self.queue, self.plugged = firmware, deque[bytes](), True
         self.tamper: Callable[[bytes], list[bytes]] = lambda report: [report]
 
     def tick(self) -> None:
-        """The device goes on by a period, and its report is under way."""
+        """Advance the device by a period and queue its report."""
         self.queue.extend(self.tamper(self.firmware.tick()))
 
     def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:

@@ -18,7 +18,7 @@ LAP = 4.0  # s
 
 
 def simulated_follow() -> np.ndarray:
-    """Places of the stylus of the pure simulation [m], a row a tick; its force is ramped in, as a real device's is."""
+    """Stylus positions of the pure simulation [m], one row per tick; the force is ramped in as on a real device."""
     world = device_world()
     device = simulated(world)
     device.faults[FAULT_RAMP] = 0.0
@@ -27,7 +27,7 @@ def simulated_follow() -> np.ndarray:
 
 
 def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
-    """Places of the stylus of a device, whose rig is made for an exchange, and the rig."""
+    """Stylus positions of a device, and its rig, which `make_rig` makes for an exchange."""
     world = device_world()
     device = exchange(world, CUTOFF)
     rig = make_rig(device)
@@ -41,7 +41,7 @@ def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
 
 
 def gated_follow(driver: Driver) -> dict[str, np.ndarray]:
-    """Rows of a gated servo that leads a device which goes on by a period with each command."""
+    """Rows of a gated servo that guides a device in lock-step."""
     rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **UNRAMPED_GATE)), round(LAP * 1e3), request=ARM)
     assert not rows["fault"].any()
     return rows

@@ -1,4 +1,4 @@
-"""Devices behind a /dev/hidraw0 that hidapi opens as it comes: the test's side of `node_server.py`."""
+"""Devices behind a /dev/hidraw0 that an unmodified hidapi opens: the test's side of `node_server.py`."""
 
 import functools
 import json
@@ -32,7 +32,7 @@ def umockdev_missing() -> str:
 
 
 def missing_reason() -> str:
-    """Why nodes cannot be had in this process; empty where they can."""
+    """Why this process cannot create nodes; empty where it can."""
     if PRELOAD not in os.environ.get("LD_PRELOAD", ""):
         return umockdev_missing() or "run by tests/devices/test_hidraw_nodes.py, which loads umockdev before"
     return ""
@@ -64,7 +64,7 @@ class HidrawNode:
         self._socket.sendall(json.dumps(message).encode() + b"\n")
 
     def _receive(self, key: str):
-        """The next answer with a key; what was written meanwhile is kept."""
+        """Wait for the next answer with a key; reports that were written meanwhile are collected."""
         while True:
             while b"\n" not in self._buffer:
                 chunk = self._socket.recv(65536)
@@ -78,12 +78,12 @@ class HidrawNode:
                 return message[key]
 
     def post(self, packet: bytes) -> None:
-        """An input report, which is there to be read when this returns."""
+        """Send an input report, which can be read once this returns."""
         self._send(packet=packet.hex())
         self._receive("done")
 
     def feature(self, number: int, report: bytes) -> None:
-        """What a feature report is answered with."""
+        """Set the answer to requests of a feature report."""
         self._send(feature=[number, report.hex()])
         self._receive("done")
 
@@ -93,7 +93,7 @@ class HidrawNode:
 
     def written(self) -> list[bytes]:
         """Output and feature reports since the last call."""
-        self._send(feature=[255, ""])  # whose answer comes behind all of them
+        self._send(feature=[255, ""])  # answered after all of them
         self._receive("done")
         taken, self._written = self._written, []
         return taken
@@ -108,7 +108,7 @@ class HidrawNode:
 
 
 class NodeFirmware:
-    """The reference firmware on the linkage, behind a node."""
+    """The reference firmware on the simulated linkage, behind a node."""
 
     def __init__(self, folder: Path, arm: Arm | None = None, period: float = 1e-3):
         self.firmware, self.period = Firmware(compile_c(folder, ROOT / "firmware" / "hvf_hid.c")), period
@@ -125,7 +125,7 @@ class NodeFirmware:
         self.node.post(self.firmware.tick(self.period))
 
     def receive_commands(self) -> bool:
-        """Take what was written; whether there was anything."""
+        """Pass written reports to the firmware; returns whether there were any."""
         reports = self.node.written()
         for report in reports:
             self.firmware.take(report)
@@ -141,7 +141,7 @@ class NodeFirmware:
 
 
 class NodeRig(Rig):
-    """A rig whose node goes when the driver is closed."""
+    """A rig whose node is removed when the driver is closed."""
 
     def __init__(self, device: Exchange, driver, backend, node: HidrawNode):
         super().__init__(device, driver, backend)

@@ -1,4 +1,4 @@
-"""Run by `test_hidraw_nodes.py`, with umockdev loaded: hidapi as it comes, on a /dev/hidraw0."""
+"""Tests of an unmodified hidapi on a /dev/hidraw0: run by `test_hidraw_nodes.py`, which preloads umockdev."""
 
 import contextlib
 import json
@@ -184,7 +184,7 @@ RATES = "--servo-period", "0.004", "--physics-step", "0.0005"
 
 @pytest.fixture
 def held_device(tmp_path):
-    """A device in a hand that holds it on the run's curve, lets go once the motors are on, and presses the switch."""
+    """A device whose stylus a hand holds on the run's curve until the motors are on, with the switch pressed."""
     node_firmware = NodeFirmware(tmp_path, period=PERIOD)
     node_firmware.linkage = HeldLinkage(np.array(Trajectory.circle(0.0477, 4.0).point(0.0)), PERIOD)
     node_firmware.firmware.sensors.pressed = 1
@@ -194,9 +194,9 @@ def held_device(tmp_path):
 
 @contextlib.contextmanager
 def running(device: NodeFirmware) -> Iterator[None]:
-    """The device goes on by a period with each command, and by itself while none comes."""
+    """Advance the device by a period with each command, and by itself while none arrives."""
     done = threading.Event()
-    device.linkage.step(np.zeros(3))  # compiled before anybody waits for a reading
+    device.linkage.step(np.zeros(3))  # compile before anybody waits for a reading
 
     def serve() -> None:
         last = 0.0
@@ -222,7 +222,7 @@ def hardware(*arguments: str) -> int:
 
 
 def test_device_is_calibrated_certified_run_and_reported_from_the_command_line(held_device, tmp_path, capsys) -> None:
-    """With a real certificate, through hidapi and its node, in processes of its own."""
+    """With a real certificate, through hidapi and the node, in separate processes."""
     field = ("--mode", "follow", *RATES)
     assert main(["certify", *field, "--out", str(tmp_path / "certificate")]) == 0
     run = ("run", "--device", "hid", "--arm", "--late", "5", "--seconds", "4", "--out", str(tmp_path / "run"))
@@ -232,7 +232,7 @@ def test_device_is_calibrated_certified_run_and_reported_from_the_command_line(h
     assert hardware(*armed, *field, "--stiffness", "400") == 2
     assert "stiffness 300.0 (here 400.0)" in capsys.readouterr().err
     with running(held_device):
-        for _ in range(3):  # a machine that is too busy for the device is no failure of ours
+        for _ in range(3):  # a busy machine may be too slow for the device
             code = hardware(*armed, *field, "--overwrite")
             output = capsys.readouterr().out
             if "no new reading" not in output:

@@ -1,4 +1,4 @@
-"""Vendor libraries built from C, and what stands behind them."""
+"""Mocks of vendor libraries built from C, and simulated devices behind them."""
 
 import abc
 import ctypes
@@ -48,7 +48,7 @@ def stylus_pose(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class VendorBackend(abc.ABC):
-    """A linkage whose pose a library tells, and that its force pulls; such a device carries its own weight."""
+    """A linkage whose pose a library reports and which its force moves; such a device balances its own weight."""
 
     def __init__(self, library: ctypes.CDLL, linkage: Linkage):
         self.library, self.linkage = library, linkage
@@ -59,7 +59,7 @@ class VendorBackend(abc.ABC):
 
     @abc.abstractmethod
     def force_P(self) -> np.ndarray:
-        """What the library was told to pull with [N], in P."""
+        """Force that was commanded through the library [N], in P."""
 
     def advance(self) -> None:
         theta = tuple(self.linkage.angles()[:3])

@@ -1,4 +1,4 @@
-"""A /dev/hidraw0 of umockdev's, for whoever has libumockdev-preload loaded: run by the system's Python, which has gi.
+"""A /dev/hidraw0 of umockdev for processes with libumockdev-preload: run by the system's Python, which has gi.
 
 The node is a pty, so that poll() works; ioctl, read and write come here, so that packets keep their boundaries and an
 unplugged device answers as the kernel does. Lines of JSON on the socket whose file descriptor is the only argument:
@@ -26,7 +26,7 @@ SET_FEATURE, GET_FEATURE = 0x06, 0x07
 
 
 class Node(UMockdev.IoctlBase):
-    """What the kernel's hidraw does for a process that has it open."""
+    """Stands in for the kernel's hidraw towards a process that has the node open."""
 
     def __init__(self, line, descriptor: bytes, slave: int):
         super().__init__()

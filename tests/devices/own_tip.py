@@ -1,4 +1,4 @@
-"""A device of one's own over the linkage in MuJoCo."""
+"""A user-defined device on the simulated linkage."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from tests.devices.rig import Linkage
 
 
 class LinkageTip(TipDevice):
-    """Reports the linkage's tip and pulls at it."""
+    """Reports the linkage's tip and applies the force to it."""
 
     watchdog = True
 

@@ -1,4 +1,4 @@
-"""A device's driver in the loop: what stands behind its arrays is the linkage in MuJoCo, in lock-step."""
+"""A device's driver in the loop, in lock-step with a simulated linkage behind it."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -17,7 +17,7 @@ from tests.sim.bare_servos import START, device_world, pass_period, simulated
 
 
 class Linkage:
-    """The Phantom in MuJoCo with a hand on it: true angles, and torques that somebody sets."""
+    """The Phantom in MuJoCo with a hand on it: gives true angles, takes joint torques."""
 
     def __init__(self, arm: Arm | None = None, start: np.ndarray = START):
         self.world = device_world(start=start)
@@ -31,7 +31,7 @@ class Linkage:
         return port.qpos[[*port.arm_q, *port.gimbal_q]]
 
     def step(self, torque: np.ndarray) -> None:
-        """A period passes under these torques of the joints."""
+        """Advance by a period under these joint torques."""
         self.plant.ctrl[list(self.phantom.port.motor)] = torque
         pass_period(self.plant, self.phantom.port, self.phantom.user, self.ticks * self.plant.period, self._applied)
         self.ticks += 1
@@ -53,19 +53,19 @@ class HeldLinkage:
 
 
 class DeviceBackend(Protocol):
-    """The real side of a device."""
+    """The simulated hardware behind a driver."""
 
     def publish_reading(self) -> None:
-        """A period begins: a reading is under way."""
+        """Begin a period: send a reading."""
         ...
 
     def advance(self) -> None:
-        """The period passes under whatever was commanded."""
+        """End the period: move under the last command."""
         ...
 
 
 class LockStep:
-    """A driver whose device goes on by a period with each command, for a servo without a clock."""
+    """A driver whose device advances by a period with each command, for a servo without a clock."""
 
     def __init__(self, driver: Driver, backend: DeviceBackend):
         self.driver, self.backend, self.telemetry, self._published = driver, backend, driver.telemetry, False
@@ -95,7 +95,7 @@ class LockStep:
 
 
 class FirmwareBackend:
-    """The reference firmware on the linkage."""
+    """The reference firmware on the simulated linkage."""
 
     def __init__(self, firmware: Firmware, handle: FirmwareHandle, linkage: Linkage):
         self.firmware, self.handle, self.linkage = firmware, handle, linkage

@@ -1,4 +1,4 @@
-"""The HID driver on the reference firmware: what is read, what is sent, and what is measured on the way."""
+"""The HID driver on the reference firmware: readings, commands, and measurements of the link."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
 
 
 class Clock:
-    """Seconds that pass when told so."""
+    """A clock that the test sets."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -56,7 +56,7 @@ def test_joint_angles_are_read_to_half_an_encoder_count(
     handle.tick()
     handle.tick()
     assert driver.read(reading, 0.0)
-    np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest
+    np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest report
 
 
 def test_joint_torques_reach_the_shafts_within_rounding(driver, handle, firmware) -> None:
@@ -102,7 +102,7 @@ def test_telemetry_measures_temperature_round_trip_loss_jitter_and_staleness(dri
         clock.now -= 0.3e-3 if k % 2 else 0.0
     np.testing.assert_array_equal(telemetry[TEMPERATURE : TEMPERATURE + 3], [30.0, 31.0, np.nan])
     assert (telemetry[READ], telemetry[BAD], telemetry[LOST]) == (192.0, 0.0, 10.0)
-    assert telemetry[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, for one of which the device held it
+    assert telemetry[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, of which the device held it for 1 ms
     assert telemetry[JITTER] == pytest.approx(0.3e-3, rel=0.2)
     assert telemetry[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
 
@@ -122,14 +122,14 @@ def test_calibration_is_stored_in_the_device(driver, handle, firmware) -> None:
 
 
 def test_commands_are_accepted_from_the_first_reading_after_a_previous_session(handle, firmware, driver) -> None:
-    """The firmware takes no number twice; where the last program stopped, the device tells."""
+    """The firmware accepts no number twice; it reports the last one that an earlier program sent."""
     reading, torque = np.zeros(9), np.array([0.1, -0.1, 0.1])
     for _ in range(500):
         driver.write(torque, True)
         handle.tick()
         driver.read(reading, 0.0)
     for _ in range(20):
-        handle.tick()  # it was killed: the firmware switched off
+        handle.tick()  # the earlier program was killed, and the firmware switched off
     handle.queue.clear()
     reopened = HidPhantom(handle, "in memory")
     handle.tick()
@@ -159,7 +159,7 @@ def test_reset_device_continues_only_if_it_kept_its_zero(driver, handle, firmwar
 
 
 def push_and_read(driver: HidPhantom, handle: FirmwareHandle, clock: Clock, ticks: int) -> None:
-    """Told to push, tick by tick, and read."""
+    """Command a torque and read, tick by tick."""
     for _ in range(ticks):
         driver.write(np.array([0.1, 0.0, 0.0]), True)
         clock.now += 1e-3
@@ -175,7 +175,7 @@ def test_commands_are_accepted_and_missed_ones_detected_where_numbers_wrap(handl
     driver.read(np.zeros(9), 0.0)
     push_and_read(driver, handle, clock, 40)
     assert firmware.motors.on
-    assert driver.telemetry[ROUND_TRIP] == pytest.approx(0.0, abs=1e-9)  # the device held it all the time
+    assert driver.telemetry[ROUND_TRIP] == pytest.approx(0.0, abs=1e-9)  # the device held the report the whole time
     handle.write = lambda buff: len(buff)
     with pytest.raises(DriverFault) as lost:
         push_and_read(driver, handle, clock, 40)
@@ -186,7 +186,7 @@ def test_motors_that_stay_off_are_a_fault(handle, firmware, clock) -> None:
     handle.tick()
     driver = HidPhantom(handle, "in memory", clock)
     driver.read(np.zeros(9), 0.0)
-    handle.write = lambda buff: len(buff)  # nothing arrives, from the first command on
+    handle.write = lambda buff: len(buff)  # no command arrives
     with pytest.raises(DriverFault, match=r"left its motors off for 0\.01") as off:
         push_and_read(driver, handle, clock, 40)
     assert off.value.fault is Fault.MOTORS_OFF

@@ -1,4 +1,4 @@
-"""One description of the reports, in Python and in C; and what the firmware promises by itself."""
+"""The reports have the same layout in Python and in C; and guarantees of the firmware alone."""
 
 import subprocess
 import zlib
@@ -35,7 +35,7 @@ STRUCTS = {
 
 
 def c_output(folder: Path, lines: list[str]) -> str:
-    """What C prints that knows the header."""
+    """Output of a C program that includes the header and runs these statements."""
     source = folder / "printed.c"
     body = "\n".join(lines)
     head = f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\n'
@@ -142,7 +142,7 @@ def test_malformed_feature_report_error_names_size_and_number() -> None:
 
 
 def test_reference_main_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> None:
-    """The main program with a board of nothing: a thousand periods, and the last report is sound."""
+    """The main program with an empty board runs a thousand periods, and its last report is sound."""
     board = tmp_path / "board.c"
     board.write_text(f"""#include <stdio.h>
 #include "{ROOT}/firmware/phantom_board.h"
@@ -240,7 +240,7 @@ def test_hot_motor_has_to_cool_by_five_degrees_before_it_is_driven(firmware: Fir
 
 
 def documented_bytes(report: int) -> bytes:
-    """The example of a report in the protocol's page."""
+    """The example of a report on the protocol's documentation page."""
     page = (ROOT / "docs" / "reference" / "hid-protocol.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.splitlines() if line.startswith(f"{report:02x} ") and set(line) <= set(HEX)]
     return bytes.fromhex(line)

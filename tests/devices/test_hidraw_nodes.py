@@ -1,4 +1,4 @@
-"""What goes through /dev/hidraw0 and hidapi as it comes, in a process that has umockdev loaded before all else."""
+"""Tests through /dev/hidraw0 and an unmodified hidapi, in a process with umockdev preloaded."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ INNER = "HVF_INNER"
 
 
 def run_with_umockdev(*arguments: str, seconds: float = 240.0) -> str:
-    """Pytest's output in a process with umockdev; the test is skipped where there is none."""
+    """Run pytest in a process with umockdev and return its output; the test is skipped where there is none."""
     if os.environ.get(INNER):
         pytest.skip("this is the process")
     if umockdev_missing() or COMPILER is None:

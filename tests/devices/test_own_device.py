@@ -1,4 +1,4 @@
-"""A device of one's own: a class in a file."""
+"""A user-defined device: a class in a file."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ POSITION = np.array([0.01, -0.02, 0.03])
 
 
 class Scripted(TipDevice):
-    """Reads what it is told, and keeps what it is given; None is a release."""
+    """Returns a given pose (or raises it), and records the forces written to it; None is a release."""
 
     def __init__(self, pose=None):
         self.pose, self.written = pose, []

@@ -1,4 +1,4 @@
-"""A SpaceMouse: a push is a velocity, within the workspace."""
+"""A SpaceMouse as a device: a push sets the velocity of the tip within the workspace."""
 
 from collections import deque
 
@@ -21,7 +21,7 @@ from tests.devices.test_hid import Clock
 
 
 class Cap:
-    """A HID handle with reports to order."""
+    """A HID handle whose reports the test queues."""
 
     def __init__(self) -> None:
         self.queue, self.plugged = deque[bytes](), True

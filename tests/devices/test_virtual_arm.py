@@ -1,4 +1,4 @@
-"""A pose and a force of another device, through the Phantom's joints and back."""
+"""Poses and forces of other devices, converted to the Phantom's joints and back."""
 
 import numpy as np
 import pytest

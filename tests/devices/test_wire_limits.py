@@ -1,4 +1,4 @@
-"""Whatever a field asks for and a person requests, the bytes that go over the wire are within the limits."""
+"""The bytes sent to a device stay within the limits whatever the field commands and the person requests."""
 
 import struct
 import zlib
@@ -24,13 +24,13 @@ from tests.sim.bare_servos import follow_program
 from tests.sim.hardware.emulation import gated_servo
 
 T = 1e-3
-GAINS = (1234.5, 67.8)  # found by their values among the field's parameters
-ROUNDED = 1e-4  # [N] that half a micronewton metre at each shaft is at the tip
+GAINS = (1234.5, 67.8)  # of the spring and the damper; located by value among the field's parameters
+ROUNDED = 1e-4  # [N], effect at the tip of rounding by half a micronewton metre at each shaft
 LIMITS = {"ramp": 0.02, "quiet": 2e-3, "small": 2.0}
 
 
 class RecordingHandle(FirmwareHandle):
-    """The firmware's handle, and all output reports that went through it."""
+    """The firmware's handle, which keeps all output reports."""
 
     def __init__(self, firmware: Firmware):
         super().__init__(firmware)
@@ -42,7 +42,7 @@ class RecordingHandle(FirmwareHandle):
 
 
 def output(report: bytes) -> tuple[bool, np.ndarray]:
-    """Whether the motors are on, and the joints' torques [N m], by the places that the protocol's page tells."""
+    """Whether the motors are on, and the joint torques [N m], decoded as the protocol's page describes."""
     assert len(report) == 64
     assert report[0] == 2
     assert zlib.crc32(report[:60]) == struct.unpack_from("<I", report, 60)[0]
@@ -50,7 +50,7 @@ def output(report: bytes) -> tuple[bool, np.ndarray]:
 
 
 def tip_force(ticker: Ticker, torque: np.ndarray) -> np.ndarray:
-    """What torques of the joints are at the tip beyond the linkage's weight, as far as it is balanced [N]."""
+    """Force at the tip [N] of joint torques, less those that balance the linkage's weight."""
     theta = tuple(ticker.parts.servo.device.memory[:3])
     weight = ticker.gated.gate[GATE_SHARE] * np.array(gravity_torques(theta))
     return np.linalg.solve(np.array(jacobian(theta)).T, torque - weight)
@@ -92,7 +92,7 @@ def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
         for k in range(times):
             handle.sent.clear()
             if slip:
-                firmware.zero[k % 3] += slip  # somebody pulls, or an encoder slips
+                firmware.zero[k % 3] += slip  # somebody pulls, or the encoder slips
             ticker.tick(number, request if k == 0 else NO_REQUEST)
             number += 1
             assert handle.sent
@@ -114,7 +114,7 @@ def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
 
 
 def test_random_sequences_can_reach_the_motors(firmware_library) -> None:
-    """Else the property would hold of a device that is never on."""
+    """Otherwise the property would hold for a device that is never on."""
     firmware = Firmware(firmware_library)
     handle = RecordingHandle(firmware)
     driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBackend(firmware, handle, Linkage()))

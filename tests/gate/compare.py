@@ -1,9 +1,9 @@
-"""The gate of a change that moves code and no number: short runs of a commit and of this tree, compared bit for bit.
+"""Gate for refactorings: short runs of a commit and of this tree, compared bit for bit.
 
 ``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case
 there and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings
-could not be kept instead: libraries round by processor, and a figure with contacts magnifies that. Cases that need
-another one's recording or map bring it along.
+could not be kept instead: libraries round by processor, and a figure with contacts magnifies that. A case that
+needs the recording or map of another one includes that case.
 """
 
 import os
@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-_MAP, _RUN = "MAP", "RUN"  # stand for the file of the lifted map, and the folder of the case "follow", of a tree
-_SCRIPT = "SCRIPT"  # a script of this folder, which is given the folder to write and further arguments
+_MAP, _RUN = "MAP", "RUN"  # placeholders for the lifted map's file and for the folder of the case "follow"
+_SCRIPT = "SCRIPT"  # a script of this folder; its arguments are the output folder and further ones
 _NEEDS = {"lifted": "lift", "lifted-rivers": "lift", "reproduce": "follow", "replay": "follow"}
 
 CASES = {
@@ -53,7 +53,7 @@ CASES = {
 
 
 def command(case: str, folder: Path) -> list[str]:
-    """What runs a case in a tree, and writes into the case's own folder."""
+    """Command that runs a case and writes into the case's own folder."""
     substitutes = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
     first, *others = (substitutes.get(word, word) for word in CASES[case].split())
     out = str(folder / case)
@@ -71,14 +71,14 @@ def command(case: str, folder: Path) -> list[str]:
 
 
 def start(case: str, tree: Path, folder: Path) -> "subprocess.Popen[bytes]":
-    """Begin a case in a tree."""
+    """Start a case in a tree."""
     log = (folder / f"{case}.log").open("wb")
     environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONSAFEPATH": "", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(command(case, folder), cwd=tree, env=environment, stdout=log, stderr=log)
 
 
 def differences(before: Path, after: Path) -> Iterator[str]:
-    """Channels of two recordings that are not the same to the last bit."""
+    """Channels of two recordings that differ in any bit."""
     with h5py.File(before) as old, h5py.File(after) as new:
         for group in ("ticks", "frames"):
             for name in sorted({*old[group], *new[group]} - {"rows"}):

@@ -1,4 +1,4 @@
-"""Run in a virtual machine by `vm.py`: hidapi as it comes, Linux's own hidraw, and a device of its uhid."""
+"""Run in a virtual machine by `vm.py`: an unmodified hidapi, Linux's hidraw, and a device made through uhid."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""A HID device of the kernel's own, by /dev/uhid, with the reference firmware behind it (linux/uhid.h)."""
+"""A HID device made through /dev/uhid, with the reference firmware behind it (linux/uhid.h)."""
 
 import os
 import struct
@@ -13,11 +13,11 @@ _USB = 3
 
 
 class UhidDevice:
-    """The firmware, as a device that the kernel has."""
+    """The firmware as a device of the kernel."""
 
     def __init__(self, firmware: Firmware, name: str = "Reference", serial: str = "HVF-0001"):
         self.firmware, self.fd, self._lock = firmware, os.open("/dev/uhid", os.O_RDWR), threading.Lock()
-        self._clock_zero: float | None = None  # when its clock was zero, while it goes on by itself
+        self._clock_zero: float | None = None  # when its clock was zero, while it runs in real time
         descriptor = firmware.descriptor()
         identity = (name.encode(), b"uhid", serial.encode(), len(descriptor))
         head = struct.pack("<I128s64s64sHHIIII", CREATE2, *identity, _USB, 0x16C0, 0x0486, 1, 0)
@@ -29,13 +29,13 @@ class UhidDevice:
         os.write(self.fd, struct.pack("<IH", INPUT2, len(report)) + report)
 
     def tick(self, period: float = 1e-3) -> None:
-        """A period passes, and is reported."""
+        """Advance by a period and send the report."""
         with self._lock:
             report = self.firmware.tick(period)
         self.send(report)
 
     def run_realtime(self, seconds: float, period: float = 1e-3) -> threading.Thread:
-        """Tick for a while, in a thread, in real time; what arrives between two ticks is stamped with it too."""
+        """Tick for a while in a thread, in real time, which also stamps what arrives between two ticks."""
 
         def run() -> None:
             begin, k = time.monotonic(), 0
@@ -57,7 +57,7 @@ class UhidDevice:
             self.firmware.sensors.time_us = round(1e6 * (time.monotonic() - self._clock_zero))
 
     def unplug(self) -> None:
-        """The device goes."""
+        """Remove the device."""
         os.write(self.fd, struct.pack("<I", DESTROY))
 
     def _listen(self) -> None:

@@ -56,7 +56,7 @@ def signs_flipped(*joints: int) -> Wiring:
     return lambda values: signs * values
 
 
-def second_and_third_swapped(values: np.ndarray) -> np.ndarray:
+def swapped(values: np.ndarray) -> np.ndarray:
     return values[[0, 2, 1]]
 
 
@@ -86,10 +86,10 @@ def test_reversed_motors_are_released_with_a_fault(torque: Wiring) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("torque", "reading", "delay_ticks"),
-    [(unchanged, signs_flipped(0), 0), (unchanged, signs_flipped(1), 0), (unchanged, signs_flipped(2), 0), (second_and_third_swapped, unchanged, 0),
-     (unchanged, second_and_third_swapped, 0), (lambda torque: 3.0 * torque, unchanged, 0), (unchanged, unchanged, 20)],
+    [(unchanged, signs_flipped(0), 0), (unchanged, signs_flipped(1), 0), (unchanged, signs_flipped(2), 0), (swapped, unchanged, 0),
+     (unchanged, swapped, 0), (lambda torque: 3.0 * torque, unchanged, 0), (unchanged, unchanged, 20)],
     ids=["encoder 1", "encoder 2", "encoder 3", "motors swapped", "encoders swapped", "torque constant", "20 ms late"],
 )  # fmt: skip
 def test_tip_stays_slow_under_any_miswiring(torque: Wiring, reading: Wiring, delay_ticks: int) -> None:
     _, device = run_miswired(torque, reading, delay_ticks)
-    assert device.top_speed() < (SPEED_LIMIT_ENCODERS_SWAPPED if reading is second_and_third_swapped else SPEED_LIMIT)
+    assert device.top_speed() < (SPEED_LIMIT_ENCODERS_SWAPPED if reading is swapped else SPEED_LIMIT)

@@ -1,4 +1,4 @@
-"""The twin goes where the device goes, and tells what the hand does."""
+"""The digital twin follows the device and estimates the force of the hand."""
 
 import itertools
 
@@ -9,12 +9,13 @@ from controllers.safety.arming import ARM
 from models.phantom.kinematics import jacobian
 from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import Ticker
-from sim.hardware.twin import Twin, tip_force
+from sim.hardware.twin import RESIDUAL_GAIN, Twin, tip_force
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
 from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo, run
 
 PUSH = Push(2.0, 1.0, 1.5, (0.3, -0.5, 0.81))
+PERIOD = SceneConfig().servo_period
 
 
 @pytest.fixture(scope="module")
@@ -30,13 +31,16 @@ def test_prediction_of_a_tick_is_within_encoder_resolution(pushed) -> None:
 
 
 def test_hand_force_is_the_filtered_push_and_otherwise_zero(pushed) -> None:
+    """The estimate is the true force behind a first-order low-pass of rate K, here discretised exactly."""
     _, twin = pushed
-    t = np.arange(4000) * 1e-3
+    t = np.arange(4000) * PERIOD
     true = np.where((t > 2.0) & (t < 3.0), 1.5 * np.sin(np.pi * (t - 2.0)) ** 2, 0.0)[:, None] * np.array(
         PUSH.direction
     )
     true /= max(1.0, np.linalg.norm(PUSH.direction))
-    filtered = np.array([np.convolve(x, np.exp(-np.arange(200) * 1e-3 * 62.8) * 0.0609)[:4000] for x in true.T]).T
+    decay = np.exp(-RESIDUAL_GAIN * PERIOD)
+    response = (1.0 - decay) * decay ** np.arange(200)
+    filtered = np.array([np.convolve(x, response)[:4000] for x in true.T]).T
     error = np.linalg.norm(twin["hand_force"] - filtered, axis=1)
     assert np.abs(twin["hand_force"]).max() > 1.0
     assert np.sqrt(np.mean(error[500:] ** 2)) < 0.08
