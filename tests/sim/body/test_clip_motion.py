@@ -8,7 +8,7 @@ from sim.body.clip_motion import clip_motion
 
 
 def _wandering_clip(closing: bool) -> Clip:
-    """A smooth motion of every joint that walks on and turns left; it closes after a second, or is cut short before."""
+    """A smooth motion of every joint that walks and turns left; closed after a second, or cut short before."""
     model, phase = figure_model(), 2 * np.pi * np.arange(61) / 60
     poses = np.empty((61, N_POSE))
     for k, p in enumerate(phase):

@@ -6,7 +6,7 @@ from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 
 
 def _random_problem(rng):
-    """Cones at random points under a body, scaled as the figure's control does, and a demand near body weight."""
+    """Cones at random points under a body, scaled as in the figure's control, and a wrench near body weight."""
     n = int(rng.integers(1, 11))
     edges = np.empty((N_EDGES * n, 6))
     for i in range(n):

@@ -57,7 +57,7 @@ def test_rotation_error_and_rotated_vector_equal_scipy():
 
 
 def _imbalance(model, data, figure):
-    """Generalised force that the planned motion needs beyond what motors, ground and residual are planned to give."""
+    """Generalised force of the planned motion, less those planned for motors, ground and residual."""
     s, M, J = figure.state, np.empty((57, 57)), np.empty((3, 57))
     mujoco.mj_fullM(model, data, M)
     given = np.zeros(57)
@@ -174,7 +174,7 @@ def test_residual_stays_within_its_bounds():
     gains = FigureGains(force_bound=0.05, moment_bound=0.01)
     _, data, figure, pose = _figure(gains=gains)
     far = pose.copy()
-    far[0] += 0.4  # nearer than what counts as a fall
+    far[0] += 0.4  # less than what counts as a fall
     figure.update(far, STILL, STILL)
     weight = figure.state.weight
     assert np.linalg.norm(data.qfrc_applied[:3]) <= 0.05 * weight * (1 + 1e-9)

@@ -1,4 +1,4 @@
-"""Where the feet of a figure go whose root strays in flight."""
+"""Placement of the feet of a figure whose root deviates in flight."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def _displaced(pose, shift, turn):
 
 
 def _planned_acceleration(pose, velocity, reference, reach):
-    """Accelerations of all joints that are planned in a state, for a reference at rest."""
+    """Planned joint accelerations in a state, for a reference at rest."""
     model = floor_world(TrackingConfig())
     data = mujoco.MjData(model)
     figure = Figure(model, data, figure_model(), "figure/", FigureGains(placement_reach=reach))
@@ -49,7 +49,7 @@ def _planned_acceleration(pose, velocity, reference, reach):
 
 
 def _placement_acceleration(pose, velocity, reference, reach=1.0):
-    """What the placement of feet adds to them, in all 57 degrees of freedom."""
+    """What foot placement adds to the planned accelerations, in all 57 degrees of freedom."""
     planned = [_planned_acceleration(pose, velocity, reference, value) for value in (reach, 0.0)]
     return np.concatenate((np.zeros(6), planned[0] - planned[1]))
 
@@ -109,7 +109,7 @@ def test_feet_not_under_the_root_are_not_placed(turn):
 
 @pytest.mark.slow
 def test_placement_does_not_disturb_a_somersault():
-    """Up to its landing at 1.67 s, which takes all that its legs have with placed feet and without."""
+    """Up to its landing at 1.67 s, where the legs saturate with and without placement."""
     clip = embedded("backflip")
     placed, unplaced = (
         track(clip, 1.65, TrackingConfig(gains=FigureGains(placement_reach=reach)))

@@ -1,4 +1,4 @@
-"""Which contact points bear load, against what the clip itself does later: the control predicts, the tests look."""
+"""Predicted load on the contact points, compared with what the clip does afterwards."""
 
 import mujoco
 import numpy as np
@@ -15,7 +15,7 @@ GAINS = FigureGains()
 
 
 def _supports(motion: ClipMotion, frames):
-    """Shares of load and stance of the feet's spheres, (n, 8) each, for a figure that is where the reference is."""
+    """Shares of load and stance of the feet's spheres, (n, 8) each, for a figure exactly at its reference."""
     model = floor_world(TrackingConfig())
     data = mujoco.MjData(model)
     figure = Figure(model, data, figure_model(), PREFIX, GAINS)

@@ -48,7 +48,7 @@ def test_residual_of_an_open_clip_is_not_diluted_by_holding_its_end():
 
 
 def test_figure_holds_a_push_up():
-    """Its palms are where load is planned for: what else of a hand touched the floor would hold them above it."""
+    """Load is planned at the palms; they stay on the floor, as nothing else of the hand touches it first."""
     result = track(held(61), 1.0)
     assert result.falls == ()
     assert result.stance.force_rms < 0.02
@@ -95,7 +95,7 @@ def test_low_swinging_foot_is_not_taken_for_stance():
 
 @pytest.mark.parametrize("name", embedded_names())
 def test_every_embedded_clip_is_tracked_within_bounds(name):
-    """The backflip until it lands, after which it may fall: what it does then is chance."""
+    """The backflip only until it lands: whether it falls afterwards is chance."""
     result = track(embedded(name), 1.65 if name == "backflip" else 2.0)
     assert result.warnings == 0
     assert result.residual_in_flight == 0.0
@@ -110,7 +110,7 @@ def test_every_embedded_clip_is_tracked_for_ten_seconds(name):
     result = track(embedded(name), 10.0)
     assert result.warnings == 0
     assert result.residual_in_flight == 0.0
-    if name != "backflip":  # nothing steers a flight, so that one of several flips in a row may end in a fall
+    if name != "backflip":  # flight is not controlled, so one of several flips in a row may end in a fall
         assert result.joint_error < 10.0
         assert result.root_error < 0.05
 

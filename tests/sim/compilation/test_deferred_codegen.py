@@ -1,4 +1,4 @@
-"""Code generation left to the unit: the same results, errors and addresses, and no symbol undefined."""
+"""Code generation deferred to the unit: the same results, errors and addresses, and no undefined symbols."""
 
 import gc
 import itertools

@@ -1,4 +1,4 @@
-"""Units of compiled code: a run compiles what it uses, the next process finds it, and every path gives the same."""
+"""Units of compiled code: a run compiles what it uses, later processes load it, and all call paths agree."""
 
 import os
 import pickle

@@ -1,4 +1,4 @@
-"""Calls in processes of their own: what they keep is there afterwards, and one that fails takes none with it."""
+"""Calls in separate processes: their side effects remain, and a failing call does not affect others."""
 
 from pathlib import Path
 

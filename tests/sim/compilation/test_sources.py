@@ -1,4 +1,4 @@
-"""Hash of what a module is made of: other after a change of code that it reaches, and after no other."""
+"""Hash of a module's sources: changes with the code that the module reaches, and with nothing else."""
 
 import shutil
 from collections.abc import Iterator

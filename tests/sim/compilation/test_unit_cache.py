@@ -1,4 +1,4 @@
-"""Units on disk: compiled once, found by the next process and by several at once, and never believed when damaged."""
+"""Units on disk: compiled once, shared between processes, and recompiled when damaged."""
 
 import os
 import shutil
@@ -140,7 +140,7 @@ def test_nested_entry_point_is_compiled_into_its_caller(folder: Path):
 
 
 def _misses(sources: Path, cache: Path) -> list[int]:
-    """Units that a process compiles which loads both toys: `force` and `other`."""
+    """Number of units a process compiles that loads both toy kernels, `force` and `other`."""
     process = subprocess.run(
         [sys.executable, "-P", "-c", _LOAD], check=True, capture_output=True, text=True, cwd=sources,
         env=os.environ | {"HVF_CACHE_DIR": str(cache), "PYTHONPATH": f"{sources}{os.pathsep}{ROOT}"},

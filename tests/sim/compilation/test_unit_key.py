@@ -1,4 +1,4 @@
-"""The key of a unit: other for all that its code is made of, the same for everything else."""
+"""The key of a unit: changes with everything that determines its code, and with nothing else."""
 
 import dis
 import sys
@@ -33,7 +33,7 @@ VECTOR = types.Array(types.float64, 1, "C")
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch):
-    """Keys of the toy's `force` and `other`, after its source was changed."""
+    """Keys of the toy kernels `force` and `other` after a change of their source."""
 
     def of(old: str = "", new: str = "") -> tuple[str, str]:
         assert old in SOURCE
@@ -58,7 +58,7 @@ def keys(monkeypatch: pytest.MonkeyPatch):
         ("def other", "def one_more(x: float) -> float:\n    return x\n\n\n@njit\ndef other"),
         ("x: float, out: list[float]", "x, out"),
     ],
-    ids=["comment", "no docstring", "docstring", "function more", "annotation"],
+    ids=["comment", "no docstring", "docstring", "another function", "annotation"],
 )
 def test_changes_without_effect_on_code_leave_the_key(keys, old: str, new: str):
     assert keys(old, new) == keys()
@@ -74,7 +74,7 @@ def test_changes_without_effect_on_code_leave_the_key(keys, old: str, new: str):
         ("@njit\ndef stretch", "@njit(fastmath=True)\ndef stretch"),
         ("    stiffness: float\n    rest: float", "    rest: float\n    stiffness: float"),
     ],
-    ids=["constant", "its type", "called function", "own code", "options", "fields of a tuple"],
+    ids=["constant", "constant's type", "called function", "own code", "options", "tuple fields"],
 )
 def test_code_changes_alter_only_the_keys_of_functions_that_reach_them(keys, old: str, new: str):
     (force, other), (force_now, other_now) = keys(), keys(old, new)

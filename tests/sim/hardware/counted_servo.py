@@ -1,7 +1,7 @@
-"""A servo against the clock whose ticks' calls of the heap are counted: run with `heap_calls.c` preloaded.
+"""A servo whose heap calls per tick are counted: run with `heap_calls.c` preloaded.
 
-With PYTHONMALLOC=malloc what Python takes comes from the same functions as what compiled code, NumPy, MuJoCo and libc
-take, so nothing is hidden in a pool.
+With PYTHONMALLOC=malloc Python allocates through the same functions as compiled code, NumPy, MuJoCo and libc, so that
+no allocation is hidden in a pool.
 """
 
 import ctypes
@@ -74,7 +74,7 @@ class Reports:
 
 
 class Frames:
-    """A mock of HDAPI, whose thread goes on by itself: a turn that follows in time on one with a sample has to wait."""
+    """A mock of HDAPI, whose thread runs by itself: the tick after one with a sample waits for the next sample."""
 
     def __init__(self, library: str):
         self.hd = HDAPI.load(library)
@@ -112,7 +112,7 @@ DEVICES = {"packets": Packets, "HID": Reports, "HDAPI": Frames, "DHD": Poses}
 
 
 class CountedServo(ServoProcess):
-    """Counts after tick `WARM`, but for what the device does between two turns, and orders its end `TICKS` later."""
+    """Counts from tick `WARM` on, except what the device does between two ticks, and stops `TICKS` later."""
 
     def __init__(self, device: Packets | Reports | Frames | Poses):
         self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)

@@ -1,4 +1,4 @@
-"""Gated servos of an emulated Phantom and a FOLLOW field with no clips behind them."""
+"""Gated servos of an emulated Phantom and a FOLLOW field without clips."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from controllers.safety.faults import Fault
 from controllers.safety.gate import Gate
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
-from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_THETA, exchange
+from sim.devices.exchange import READING_CLOCK, READING_THETA, exchange
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker, columns
 from sim.users.hand.arm import Arm
@@ -40,7 +40,7 @@ def activate(ticker: Ticker, n: int = 150) -> int:
 
 
 class FaultyDriver:
-    """A driver through which faults are ordered: `read` and `write` pass until one is due."""
+    """A driver that injects faults: `read` and `write` are passed on until one is set."""
 
     def __init__(self, driver: EmulatedPhantom):
         self.driver, self.identity, self.telemetry = driver, driver.identity, driver.telemetry
@@ -88,10 +88,6 @@ def jump_joint(axis: int):
 
 def clock_back(reading) -> None:
     reading[READING_CLOCK] -= 3.0
-
-
-def _frozen_sequence(reading) -> None:
-    reading[READING_SEQUENCE] = 100.0
 
 
 READING_INDICES = (READING_CLOCK, *range(READING_THETA, READING_THETA + 6))

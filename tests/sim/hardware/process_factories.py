@@ -1,4 +1,4 @@
-"""What the processes of the tests are made of; found by name from other processes."""
+"""Servos and devices that other processes of the tests make; importable by name from there."""
 
 import socket
 

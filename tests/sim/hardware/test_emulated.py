@@ -1,4 +1,4 @@
-"""The device that is real to the software: its hand, and what it does when commands stay out."""
+"""The emulated device: its hand, and its behaviour without commands."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A servo behind a gate is the simulation's run where all is well, and lets go within two ticks where it is not."""
+"""A servo behind a gate: equal to the simulation without faults, motors off within two ticks after a fault."""
 
 import numpy as np
 import pytest
@@ -118,7 +118,7 @@ def test_memory_or_parameters_that_are_not_finite_are_a_fault(part: str, bad: fl
 
 
 def assert_fault_releases(attribute: str, failure, fault: Fault, within: int = 2) -> None:
-    """Order a fault of the driver: the motors go off within so many ticks, and the fault stays until it is cleared."""
+    """A fault of the driver switches the motors off within some ticks and stays latched until it is cleared."""
     driver = gated_servo(**UNRAMPED_GATE).driver
     assert isinstance(driver, EmulatedPhantom)
     faulty = FaultyDriver(driver)
@@ -172,7 +172,7 @@ def test_encoder_offsets_are_subtracted_once_also_without_new_readings() -> None
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])
 def test_unstable_loop_is_damped_by_the_detector_and_still_guides(stiffness: float, damping: float) -> None:
-    """Far beyond the certificate's boundary: without the detector they shake the hand until they are too fast."""
+    """Far beyond the certificate's boundary: without the detector the loop shakes the hand until it is too fast."""
     program = follow_program(stiffness, damping)
     bare = Ticker(gated_servo(program=program, holds=2.0, small=10.0, dead_man=False,
                               oscillation=OscillationDetector(PERIOD, turns=1e9)))  # fmt: skip

@@ -1,7 +1,7 @@
-"""What is hidden in a simulated device is found, each quantity within its interval.
+"""Identification finds the hidden parameters of a simulated device, each within its interval.
 
-``HVF_DRAWS=50`` draws fifty devices in place of one; then nine of ten have to be within all of their intervals, and the
-intervals neither too narrow nor too wide.
+With ``HVF_DRAWS=50`` fifty devices are drawn in place of one; nine of ten have to lie within all of their intervals,
+and the intervals must be neither too narrow nor too wide.
 """
 
 import os
@@ -26,7 +26,7 @@ INERTIA = np.array([3.6e-3, 2.4e-3, 0.93e-3])  # of the linkage at θ = 0
 
 
 def random_linkage(rng: np.random.Generator) -> tuple[Linkage, float]:
-    """A linkage, and by how much its heavy bars are heavier than published."""
+    """A random linkage, and by what fraction its heavy bars are heavier than published."""
     return Linkage(
         coulomb=tuple(rng.uniform(0.5, 2.0, 3) * PREMIUM_1_5.coulomb_friction),
         viscous=tuple(rng.uniform(0.3, 4.0, 3) * PREMIUM_1_5.viscous_friction),
@@ -68,13 +68,13 @@ def true_values(linkage: Linkage, extra_mass: float) -> np.ndarray:
 
 
 def motions_and_truth(seed: int) -> tuple[list[Motion], np.ndarray]:
-    """Motions of a device, and what is true of it."""
+    """Motions of a device, and its true parameters."""
     linkage, extra_mass = random_linkage(np.random.default_rng(seed))
     return [simulated_motion(linkage, extra_mass, curve(lap)) for lap in LAPS], true_values(linkage, extra_mass)
 
 
 def identified(seed: int) -> tuple[Identified, np.ndarray]:
-    """What is found of a device, and what is true of it."""
+    """Identified and true parameters of a device."""
     motions, hidden = motions_and_truth(seed)
     return identify_linkage(motions), hidden
 
@@ -119,7 +119,7 @@ def test_intervals_are_narrow_enough_to_be_useful(identification) -> None:
 
 @pytest.mark.slow
 def test_unmodelled_torque_widens_the_intervals_that_then_cover_the_errors(device_motions, identification) -> None:
-    """A ripple of one percent of the friction, the same again in every lap, which no average takes out."""
+    """A ripple of one percent of the friction that repeats in every lap, so that averaging does not remove it."""
     motions, hidden = device_motions
     rippled = [
         m._replace(torque=m.torque + 0.01 * hidden[:3] * np.sin(12.0 * m.theta + [0.3, 1.0, 2.0])) for m in motions
@@ -132,7 +132,7 @@ def test_unmodelled_torque_widens_the_intervals_that_then_cover_the_errors(devic
 
 @pytest.mark.slow
 def test_motion_that_leaves_the_delay_unidentifiable_is_refused() -> None:
-    """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
+    """Two slow laps round a saddle: the fit runs to the largest delay of its model."""
     linkage, extra_mass = random_linkage(np.random.default_rng(5000))
     s = np.linspace(0.0, 2.0 * np.pi, 97)
     points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.03 * np.sin(2.0 * s)], axis=1)

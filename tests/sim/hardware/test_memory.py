@@ -1,4 +1,4 @@
-"""The servo's loop takes nothing from the heap: not in compiled code, not in the Python that drives it, not in C."""
+"""The servo loop allocates nothing on the heap: neither in compiled code nor in Python nor in C."""
 
 import os
 import subprocess
@@ -37,8 +37,8 @@ RUNS = {
     "bunny": RunConfig(mode=modes.Bunny()),
     "rivers": RunConfig(mode=modes.Rivers()),
     "stretch": RunConfig(mode=modes.Stretch()),
-    "all that FOLLOW can have": RunConfig(mode=RESTRICTED, map=maps.Cylindrical(expressive=True)),
-    "walls of a composite": RunConfig(mode=modes.Follow(walls=modes.JointWalls()), map=maps.Composite()),
+    "FOLLOW with all options": RunConfig(mode=RESTRICTED, map=maps.Cylindrical(expressive=True)),
+    "joint walls of a composite": RunConfig(mode=modes.Follow(walls=modes.JointWalls()), map=maps.Composite()),
 }
 
 
@@ -46,7 +46,7 @@ RUNS = {
 @pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
 @pytest.mark.parametrize("device", LIBRARY_SOURCES)
 def test_servo_loop_makes_no_heap_calls_in_2000_ticks(device: str, tmp_path: Path) -> None:
-    """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself, in the servo or a vendor's thread."""
+    """Counts calls of Python, numba, NumPy, MuJoCo and libc, in the servo and in a vendor's thread."""
     library = compile_c(tmp_path, HERE / "heap_calls.c")
     environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
     libraries = [str(compile_c(tmp_path, *LIBRARY_SOURCES[device]))] if LIBRARY_SOURCES[device] else []
@@ -55,11 +55,11 @@ def test_servo_loop_makes_no_heap_calls_in_2000_ticks(device: str, tmp_path: Pat
     state, calls, calls_of_a_thousand_numbers = result.stdout.split()
     assert state == State.ACTIVE.name, result.stderr
     assert int(calls) == 0
-    assert int(calls_of_a_thousand_numbers) > 1000  # the counter counts
+    assert int(calls_of_a_thousand_numbers) > 1000  # the counter works
 
 
 class UncountedDevice(EmulatedPhantom):
-    """A device whose time passes between two ticks, where nothing is counted."""
+    """A device that is simulated between two ticks, where nothing is counted."""
 
     command_kept = np.zeros(3), False
 

@@ -1,4 +1,4 @@
-"""A device that is wired or set up wrong, and a hand that lets go of the stylus: the gate does so before it is fast."""
+"""A wrongly wired or configured device whose stylus is released: the gate switches off before it is fast."""
 
 from collections.abc import Callable
 
@@ -14,20 +14,20 @@ from sim.hardware.gated_servo import Ticker
 from tests.sim.hardware.emulation import PERIOD, FaultyDriver, gated_servo
 
 SPEED_LIMIT = 2.0
-"""Speed of the tip that nothing may pass [m/s]: the fault's 1.5, and what 4 N add to 75 g in the filter's few ms."""
+"""Largest allowed speed of the tip [m/s]: the fault's 1.5, and what 4 N add to 75 g during the filter's delay."""
 SPEED_LIMIT_ENCODERS_SWAPPED = 4.0
-"""With encoders in each other's sockets the gate sees another linkage than there is, and a third of its speed [m/s]."""
+"""The same with exchanged encoders, where the gate sees a wrong linkage and a third of the speed [m/s]."""
 Wiring = Callable[[np.ndarray], np.ndarray]
 
 
 class Miswired(FaultyDriver):
-    """A driver between which and its device the torques, or the readings, are mixed up; keeps the tip's true place."""
+    """A driver whose torques or readings are altered on the way; records the true positions of the tip."""
 
     def __init__(self, driver: EmulatedPhantom, torque: Wiring, reading: Wiring, delay_ticks: int = 0):
         super().__init__(driver)
         self.torque, self.tamper, self.tips = (
             torque,
-            lambda reading_row: _rewire(reading_row, reading),
+            lambda row: _rewire(row, reading),
             list[np.ndarray](),
         )
         self._delayed = [(np.zeros(3), False)] * delay_ticks
@@ -42,8 +42,8 @@ class Miswired(FaultyDriver):
         return float(np.linalg.norm(np.diff(self.tips, axis=0), axis=1).max()) / PERIOD
 
 
-def _rewire(reading_row: np.ndarray, wiring: Wiring) -> None:
-    reading_row[READING_THETA : READING_THETA + 3] = wiring(reading_row[READING_THETA : READING_THETA + 3].copy())
+def _rewire(row: np.ndarray, wiring: Wiring) -> None:
+    row[READING_THETA : READING_THETA + 3] = wiring(row[READING_THETA : READING_THETA + 3].copy())
 
 
 def unchanged(values: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def swapped(values: np.ndarray) -> np.ndarray:
 
 
 def run_miswired(torque: Wiring, reading: Wiring, delay_ticks: int = 0) -> tuple[Ticker, Miswired]:
-    """Four seconds from arming, with the default limits and a hand that lets go once the force is in."""
+    """Four seconds from arming, with default limits and a hand that lets go once the force has ramped in."""
     driver = gated_servo(holds=1.5).driver
     assert isinstance(driver, EmulatedPhantom)
     miswired = Miswired(driver, torque, reading, delay_ticks)
@@ -86,8 +86,9 @@ def test_reversed_motors_are_released_with_a_fault(torque: Wiring) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("torque", "reading", "delay_ticks"),
-    [(unchanged, signs_flipped(0), 0), (unchanged, signs_flipped(1), 0), (unchanged, signs_flipped(2), 0), (swapped, unchanged, 0),
-     (unchanged, swapped, 0), (lambda torque: 3.0 * torque, unchanged, 0), (unchanged, unchanged, 20)],
+    [(unchanged, signs_flipped(0), 0), (unchanged, signs_flipped(1), 0), (unchanged, signs_flipped(2), 0),
+     (swapped, unchanged, 0), (unchanged, swapped, 0),
+     (lambda torque: 3.0 * torque, unchanged, 0), (unchanged, unchanged, 20)],
     ids=["encoder 1", "encoder 2", "encoder 3", "motors swapped", "encoders swapped", "torque constant", "20 ms late"],
 )  # fmt: skip
 def test_tip_stays_slow_under_any_miswiring(torque: Wiring, reading: Wiring, delay_ticks: int) -> None:

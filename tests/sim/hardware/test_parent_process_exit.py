@@ -1,4 +1,4 @@
-"""A process whose parent was killed while it started ends, too."""
+"""A process ends if its parent was killed while it started."""
 
 import os
 import queue
@@ -21,12 +21,12 @@ from sim.hardware.shared import Ring, SharedNumbers
 from tests.sim.hardware.process_factories import PERIOD
 from tests.sim.hardware.test_processes import job
 
-UNUSED_PID = 2**22 + 1  # no process has such an id
+UNUSED_PID = 2**22 + 1  # above the largest process id
 
 
 @pytest.fixture
 def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
-    """This process is one whose parent is gone."""
+    """Makes this process appear as one whose parent has died."""
     monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=UNUSED_PID))
 
 
@@ -36,7 +36,7 @@ def test_emulated_device_ends_if_its_parent_died_while_it_started(orphan, monkey
 
         def write(self, torque, enable) -> None:
             self.writes += 1
-            assert self.writes < 3, "it goes on"
+            assert self.writes < 3, "the loop does not end"
 
         def read(self, reading, timeout) -> None: ...
 
@@ -63,7 +63,7 @@ def test_worker_ends_if_its_page_died_while_it_worked(orphan) -> None:
 
         def get(self, timeout: float) -> None:
             self.times += 1
-            assert self.times < 3, "it goes on"
+            assert self.times < 3, "the loop does not end"
             raise queue.Empty
 
     assert newest(EmptyQueue()) is None
@@ -95,7 +95,7 @@ if __name__ == "__main__":
 def test_killed_parent_leaves_no_device_process(tmp_path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(SCRIPT)
-    # Its output ends when the last process that has it is gone.
+    # Its output ends only when the last process that holds it has ended.
     paths = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, timeout=60, check=False, env=paths)
     assert ended.returncode == -signal.SIGKILL

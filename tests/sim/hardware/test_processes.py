@@ -1,6 +1,6 @@
-"""Kill or freeze whom you like: the servo goes on, or lets go; and what was recorded can be read.
+"""Processes of a hardware run, killed or frozen: the servo continues or lets go, and the recording stays readable.
 
-Those that no busy machine disturbs are `slow`, the others `processes`.
+Tests that a busy machine cannot disturb are `slow`, the others `processes`.
 """
 
 import contextlib
@@ -33,7 +33,7 @@ from sim.recording.recording import Recording
 from tests.sim.hardware.process_factories import PERIOD, emulated_device, servo_over_packets, servo_with_own_device
 
 LENIENT_CLOCK = ServoClock(late=20.0, heartbeat=20.0)
-"""So long that a busy machine makes no fault of its own; a test of lateness or silence has a clock of its own."""
+"""Limits so long that a busy machine causes no fault; tests of lateness or silence set their own."""
 LATE_LIMIT, HEARTBEAT_LIMIT = 0.2, 0.6
 
 
@@ -52,7 +52,7 @@ def wait_until(run: HardwareRun, condition: Callable[[RunStatus], bool], seconds
 
 
 def activate(run: HardwareRun) -> None:
-    """Arm, again where this machine was too busy to be in time."""
+    """Arm; repeatedly where this machine was too busy to be in time."""
     for _ in range(5):
         run.request(ARM)
         status = wait_until(run, lambda status: status.state in (State.ACTIVE, State.FAULT))
@@ -80,7 +80,7 @@ def assert_keeps_running(run: HardwareRun, ticks: int = 100) -> None:
 
 
 def assert_complete(path: Path, ended: Ended | None) -> None:
-    """The recording opens, and leaves out missed deadlines only: what the servo ran, where it could still say so."""
+    """The recording opens and lacks only missed deadlines; its length is the servo's count where that is known."""
     with Recording(path) as recording:
         tick, missed, dropped = (recording.channel("ticks", name)[:] for name in ("tick", "missed", "dropped"))
         for name in ("p", "force", "torque", "hand_force"):
@@ -93,7 +93,7 @@ def assert_complete(path: Path, ended: Ended | None) -> None:
 
 @pytest.mark.slow
 def test_run_with_a_recorder_writes_nothing_to_stderr(tmp_path: Path) -> None:
-    """Neither while it runs, nor when its three processes end."""
+    """Neither during the run nor when its three processes end."""
     script = (
         "import pathlib, sys; from tests.sim.hardware.test_processes import running\n"
         "with running(pathlib.Path(sys.argv[1])) as run: print(run.stop().ticks)"
@@ -149,7 +149,7 @@ def test_recording_of_a_run_is_complete_and_counts_missed_deadlines(tmp_path: Pa
 
 
 def read_as_page(status: SharedNumbers, started: SharedNumbers) -> None:
-    """Reads the servo's row as a page does, until whoever started it is gone."""
+    """Reads the servo's row as a page does, until its parent has ended."""
     row, parent = np.zeros(ROW_SIZE), os.getppid()
     while os.getppid() == parent:
         status.read(row)
@@ -177,7 +177,7 @@ def test_servo_does_not_wait_for_a_frozen_or_killed_page(tmp_path: Path) -> None
 
 
 def record_with_size_limit(size: int, *arguments) -> None:
-    """A recorder whose disk is full at so many bytes."""
+    """A recorder whose file may not grow beyond a size [bytes], as on a full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
     record_rows(*arguments)
@@ -228,7 +228,7 @@ def wait_for_ticks(run: HardwareRun, ticks: int = 20) -> None:
 @pytest.mark.processes
 @pytest.mark.parametrize("stall", [0.05, 0.5])
 def test_stopped_servo_misses_deadlines_and_does_not_catch_up(tmp_path: Path, stall: float) -> None:
-    """A stop of 50 ms is counted where more is allowed; one of 500 ms is a fault where 200 ms are."""
+    """A stop of 50 ms is counted with a limit above it; one of 500 ms is a fault with a limit of 200 ms."""
     path = tmp_path / "run.h5"
     with running(path, ServoClock(late=LATE_LIMIT if stall > LATE_LIMIT else 20.0, heartbeat=20.0)) as run:
         assert run.servo.pid is not None
@@ -283,7 +283,10 @@ def test_device_watchdog_releases_when_the_servo_is_stopped_or_killed(tmp_path: 
                     time.sleep(2.0 * LATE_LIMIT)
                     os.kill(run.servo.pid, resumed)
                     status = wait_until(run, lambda status: status.fault is not Fault.NONE)
-                    assert status.fault in (Fault.SERVO_LATE, Fault.READING_STALE)  # the latter if just before
+                    assert status.fault in (
+                        Fault.SERVO_LATE,
+                        Fault.READING_STALE,
+                    )  # the latter if stopped just before a reading
                     assert not pushes()
                     run.request(CLEAR)
                     wait_until(run, lambda status: status.state is State.DISARMED)
@@ -316,7 +319,7 @@ def test_killed_device_is_a_fault(tmp_path: Path) -> None:
             device_process.kill()
 
             def gone(status: RunStatus) -> bool:
-                if status.fault is Fault.READING_STALE:  # a process that is killed is silent before its socket closes
+                if status.fault is Fault.READING_STALE:  # a killed process is silent before its socket closes
                     run.request(CLEAR)
                 return status.fault is Fault.UNPLUGGED
 

@@ -1,4 +1,4 @@
-"""What processes share is whole or not there, and a ring that is not emptied says how much is gone."""
+"""Memory shared by processes: no partial values, and a ring that counts the rows it lost."""
 
 import multiprocessing
 import pickle
@@ -27,7 +27,7 @@ def ring() -> Iterator[Ring]:
 
 def test_reader_never_sees_a_partial_write(numbers: SharedNumbers) -> None:
     other, stop, seen = pickle.loads(pickle.dumps(numbers)), threading.Event(), np.zeros(64)
-    numbers.write(seen)  # compiled before anybody reads
+    numbers.write(seen)  # compile before anybody reads
 
     def write() -> None:
         k = 0
@@ -73,7 +73,7 @@ def test_ring_overflow_counts_lost_rows(ring: Ring) -> None:
     for k in range(30):
         ring.append(np.array([k, 0.0]))
     rows, lost = ring.take()
-    np.testing.assert_array_equal(rows[:, 0], range(23, 30))  # one place is where the next row is being written
+    np.testing.assert_array_equal(rows[:, 0], range(23, 30))  # one slot is reserved for the next row
     assert lost == 23
     ring.append(np.array([30.0, 0.0]))
     rows, lost = ring.take()

@@ -1,4 +1,4 @@
-"""Ctrl-C does not reach the processes of a run, from the moment at which they start."""
+"""Ctrl-C does not reach the processes of a run from their start on."""
 
 import multiprocessing
 import signal

@@ -9,7 +9,7 @@ from sim.loop.clock import RealTime
 
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A wall clock that only sleeping and the test itself move."""
+    """A wall clock that only `sleep` and the test advance."""
     now = [100.0]
 
     def sleep(seconds: float) -> None:

@@ -1,7 +1,7 @@
-"""Faults: what a device must not read and a servo must not do, injected; the force goes, and stays away until rearmed.
+"""Faults injected into readings and memories: the force is zero until the servo is rearmed.
 
-The device behind two arrays is driven by a second simulated Phantom (`tests.sim.bare_servos.Driver`), so what is
-injected lies between the two, as it would with hardware.
+The device behind two arrays is driven by a second simulated Phantom (`tests.sim.bare_servos.SimulatedDriver`), so that
+faults are injected between the two, as they would occur with hardware.
 """
 
 from collections.abc import Callable
@@ -37,11 +37,11 @@ from tests.sim.bare_servos import (
 )
 
 SILENCE = SILENT_PERIODS * 1e-3
-FORCE_PRESENT = 0.02  # [N] more than this is a force that is there
+FORCE_PRESENT = 0.02  # [N], a force above this counts as present
 
 
 class ExchangeLoop:
-    """A servo, the device behind two arrays, and the driver, tick by tick, with what it commanded."""
+    """A servo, the device behind two arrays, and its driver, run tick by tick; records commands and faults."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class ExchangeLoop:
         self.force, self.torque, self.fault, self.applied = [], [], [], []
 
     def run(self, n: int, tamper: Callable[[], None] = lambda: None) -> None:
-        """Some ticks; `spoil` is called between the driver's reading and the servo."""
+        """Run some ticks; `tamper` is called between the driver's reading and the servo."""
         for _ in range(n):
             if self.tick > 0:
                 self.driver.write()
@@ -79,7 +79,7 @@ class ExchangeLoop:
 
 
 def assert_motors_off(loop: ExchangeLoop, since: int) -> None:
-    """From a tick on: a fault is latched, and there is neither force nor torque, nor any at the motors."""
+    """From a tick on a fault is latched, and force, commanded torque and motor torque are zero."""
     assert all(loop.fault[since:])
     assert not np.any(loop.force[since:])
     assert not np.any(loop.torque[since:])
@@ -87,7 +87,7 @@ def assert_motors_off(loop: ExchangeLoop, since: int) -> None:
 
 
 def assert_recovers_after_rearm(loop: ExchangeLoop) -> None:
-    """Only when it is rearmed, and then slowly."""
+    """The force returns once the servo is rearmed, without a jump."""
     first = len(loop.force)
     rearm_servo(loop.servo)
     loop.run(150)
@@ -97,7 +97,7 @@ def assert_recovers_after_rearm(loop: ExchangeLoop) -> None:
     assert np.abs(np.diff(loop.sizes[first:])).max() < 0.3
 
 
-# One by one
+# Single faults
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -157,7 +157,7 @@ def test_encoder_jump_is_an_impossible_rate(joint: int, jump: float) -> None:
 
 @pytest.mark.parametrize("silent", [SILENT_PERIODS, 40])
 def test_readings_that_stop_are_stale_after_the_silent_periods(silent: int) -> None:
-    """The hand lets go before it is pushed anywhere: the driver's motors are off a silence later."""
+    """The driver's motors are off after the silent periods, too."""
     loop = ExchangeLoop(silent=silent)
     loop.run(300)
     last = loop.device.reading.copy()
@@ -175,7 +175,7 @@ def test_readings_that_stop_are_stale_after_the_silent_periods(silent: int) -> N
 
 
 def freeze_encoders(loop: ExchangeLoop, ticks: int) -> np.ndarray:
-    """Let encoders stand while readings go on; where the stylus really was."""
+    """Freeze the encoders while readings continue; returns the true joint angles."""
     angles = loop.device.reading[READING_THETA:].copy()
     port, positions = loop.driver.phantom.port, []
 
@@ -287,7 +287,7 @@ def test_tank_memory_that_is_not_finite_is_a_fault(place: int) -> None:
 
 
 def test_force_cut_by_the_tank_obeys_the_slew_limit_and_its_work_is_booked() -> None:
-    """8 N that a tank without energy forbids go down by the slew a tick, and the work of these ticks is booked."""
+    """8 N, cut by a tank without energy, fall by the slew per tick, and the work of these ticks is booked."""
     limiter, tank = ForceLimiter(1e-3), EnergyTank(1e-3, power=1e-9, capacity=1.0)
     memory, store, faults = limiter.fresh_memory(), tank.fresh_memory(), plausibility().fresh()
     hand, wrench, force, forces = np.zeros(15), np.array([8.0, 0, 0, 0, 0, 0]), np.zeros(3), []
@@ -310,7 +310,7 @@ def plausibility() -> Plausibility:
     return Plausibility(1e-3, TOP_RATES, PREMIUM_1_5.encoder_step, SILENCE)
 
 
-# What is no fault
+# No false alarms
 
 
 def test_motionless_hand_is_no_fault() -> None:
@@ -329,7 +329,7 @@ def test_motionless_hand_is_no_fault() -> None:
         run_block(servo, 0, 3000, False, ticks, frames)
         assert not ticks.fault.any()
         motionless.append(np.all(np.diff(ticks.hand[-600:, 1:4], axis=0) == 0.0))
-    assert all(motionless)  # so the rule had its chance
+    assert all(motionless)  # so that frozen encoders could have been suspected
 
 
 def test_trembling_firm_hand_under_force_is_no_fault() -> None:
@@ -342,7 +342,7 @@ def test_trembling_firm_hand_under_force_is_no_fault() -> None:
 
 
 def test_linkage_at_peak_torque_stays_below_the_impossible_rate() -> None:
-    """Every motor at its peak torque from stop to stop, friction and all: below what counts as impossible."""
+    """Every motor at its peak torque from stop to stop, with friction, stays below the impossible rate."""
     world = World(kind="none")
     model, fastest = world.model, np.zeros(3)
     dofs = [int(model.joint(PHANTOM + name).dofadr[0]) for name in ("theta1", "theta2", "theta3")]
@@ -359,11 +359,11 @@ def test_linkage_at_peak_torque_stays_below_the_impossible_rate() -> None:
     assert np.all(fastest > 0.15 * np.array(TOP_RATES))
 
 
-# At random
+# Random faults
 
 
 def random_fault(rng: np.random.Generator, loop: ExchangeLoop) -> tuple[str, Callable[[], None], int]:
-    """A fault drawn at random: its name, what spoils the tick, and how many ticks it may take to be seen."""
+    """A random fault: its name, the function that injects it, and within how many ticks it must be detected."""
     reading, field = loop.device.reading, loop.servo.field
     bad = float(rng.choice([np.nan, np.inf, -np.inf]))
     joint = int(rng.integers(3))
@@ -411,7 +411,7 @@ def test_random_fault_zeroes_the_force_in_the_tick_of_its_detection(seed: int) -
             loop.run(1, tamper)
         loop.run(20)
         if not any(loop.fault):
-            # A parameter that the law does not read, or not here, spoils nothing.
+            # A parameter that the law does not read here has no effect.
             assert name == "law"
             assert np.isfinite(loop.force).all()
             continue

@@ -1,4 +1,4 @@
-"""A figure in the physics, one that is only shown, and none: what is recorded, read and drawn of each."""
+"""Physical figure, kinematic figure and none: what is recorded, read and drawn of each."""
 
 import time
 from pathlib import Path

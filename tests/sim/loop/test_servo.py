@@ -1,4 +1,4 @@
-"""The compiled tick: what the sensors tell, what the motors do, and that a run is a pure function of its inputs."""
+"""The compiled tick: sensors, motors, and runs that depend only on their inputs."""
 
 import ctypes
 import sys
@@ -95,7 +95,7 @@ def test_motor_torques_are_limited_to_peak_torque() -> None:
 
 
 def test_stylus_without_force_floats() -> None:
-    """Gravity compensation: it stays within a tenth of a millimetre for half a second."""
+    """Gravity compensation keeps it within a tenth of a millimetre for half a second."""
     world = World()
     start = np.array([0.03, 0.02, 0.02])
     world.reset(start, rest_pose())
@@ -128,7 +128,7 @@ def test_run_depends_only_on_configuration_and_seed(clips: tuple) -> None:
 
 
 def test_block_size_does_not_change_the_result(clips: tuple) -> None:
-    """A run in one block and the same run in pieces are the same to the last bit."""
+    """A run in one block and in several blocks are equal bit for bit."""
     whole, pieces = session_of(clips), session_of(clips)
     run_logged(whole, 400)
     blocks: list[int] = []
@@ -138,7 +138,7 @@ def test_block_size_does_not_change_the_result(clips: tuple) -> None:
 
 
 def test_device_called_from_python_matches_the_compiled_loop(clips: tuple) -> None:
-    """Read, evaluate, limit, write from Python: the same stylus, but for what the figure does to the solver."""
+    """Read, evaluate, limit and write from Python: the same stylus, except for the figure's effect on the solver."""
     compiled, stepped = session_of(clips), session_of(clips)
     ticks, _ = run_logged(compiled, 300)
     arm = Arm(pushes=CONFIG.user.pushes)

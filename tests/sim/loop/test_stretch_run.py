@@ -1,4 +1,4 @@
-"""The servo with STRETCHY TUBES: a simulated hand bends the curve, and the figure shows what is under it."""
+"""The servo with STRETCHY TUBES: a simulated hand bends the curve, and the figure shows the pose at the hand."""
 
 import matplotlib.image
 import numpy as np
@@ -49,7 +49,7 @@ def run_stretch() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
         channels["force"].append(ticks.force[:n].copy())
         shown.append(frames.reference[: -(-n // servo.figure_ticks)].copy())
 
-    Loop(servo, session.world, append_block).run_stretch(SECONDS)
+    Loop(servo, session.world, append_block).run(SECONDS)
     recorded = {name: np.concatenate(blocks) for name, blocks in channels.items()}
     return session, field, recorded | {"shown": np.concatenate(shown), "memory": servo.field.memory}
 
@@ -72,7 +72,7 @@ def test_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(stretch_run) -
     assert summary.held_off_m < 1e-9
     assert summary.line().startswith("The curve was bent once, by up to 1")
     last = np.flatnonzero(held)[-1]
-    # What was held stays where it was let go of.
+    # The held point stays where it was released.
     _, distances = closest_phases(field.edited(recorded["memory"]).packed(), recorded["p"][last : last + 1])
     assert distances[0] < 1e-9
 
@@ -120,7 +120,7 @@ def test_bent_curve_is_saved_loaded_and_drawn(stretch_run, tmp_path) -> None:
         draw_stretch(recording, tmp_path, tmp_path / "stretch.png")
     image = matplotlib.image.imread(tmp_path / "stretch.png")
     green = (image[..., 1] > image[..., 0] + 0.2) & (image[..., 1] > image[..., 2] + 0.2)
-    assert green.sum() > 1000  # the curve after, twice
+    assert green.sum() > 1000  # the bent curve, drawn twice
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The energy tank of the servo: a field as it is meant does not feel it, a wrong or late one is held to its budget."""
+"""The energy tank of the servo: does not affect passive fields, and limits active ones to its budget."""
 
 from collections import deque
 
@@ -21,7 +21,7 @@ UNLIMITED_TANK = EnergyTank(1e-3, power=1e3, capacity=1e3)
 
 
 def run(program, tank=None, seconds=1.0, config=CONFIG):
-    """Positions, forces and tank of a run with a field; its configuration's if there is none."""
+    """Session, positions, forces and tank of a run with a field; by default the configuration's field."""
     logs = []
 
     def append_block(ticks, frames, n):
@@ -37,7 +37,7 @@ def run(program, tank=None, seconds=1.0, config=CONFIG):
 
 
 def work_on_hand(p, force):
-    """Work [J] that the held forces have done on the hand up to each tick."""
+    """Work of the forces, held constant within each tick, on the hand up to each tick [J]."""
     return np.cumsum(np.sum(force[:-1] * np.diff(p, axis=0), axis=1))
 
 
@@ -67,7 +67,7 @@ def test_unneeded_tank_leaves_forces_bit_for_bit():
 
 
 def test_energy_stored_by_the_hand_in_a_spring_is_given_back():
-    """A push of 4 N stores more than the tank held at first could lose; the way back is not held back."""
+    """A push of 4 N stores more energy than the tank held initially; the return is not limited."""
     config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=lap_pushes(0.0, 1.0, 4.0)[:1])
     tank = EnergyTank(1e-3, power=0.012, capacity=2.0, initial=2e-3)
     _, p, force, tank_log = run(wire(config, load_clips(CLIPS)[0]).field.program(), tank, 1.0, config)
@@ -85,7 +85,7 @@ def negative_damper(hand):
 
 
 def delayed_spring(ticks):
-    """A spring to the origin of H and a damper that are late by some ticks [N]."""
+    """A spring and a damper delayed by some ticks [N]."""
     past = deque(maxlen=ticks)
 
     def force(hand):

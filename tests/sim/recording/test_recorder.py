@@ -1,4 +1,4 @@
-"""A recording keeps what it was given, whole or killed, and never overwrites another."""
+"""A recording keeps all data, also of a killed run, and never overwrites another."""
 
 import json
 import random
@@ -19,7 +19,7 @@ from sim.recording.unclosed import lookup3
 CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
 GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
 
-# Writes rows that hold their own number, and says after each block how many there are.
+# Writes rows that hold their own number, and prints after each block how many there are.
 WRITER = """
 import sys
 from pathlib import Path
@@ -93,8 +93,8 @@ def test_killed_run_opens_and_has_lost_less_than_a_second(tmp_path, seed):
         assert not recording.complete
 
 
-# Kills a writer N times, from the moment its file appears until after it is closed, and reads each file in a process
-# of its own, since HDF5 waits for ever on a structure that is torn.
+# Kills a writer N times between the appearance of its file and its closing, and reads each file in a separate process,
+# since HDF5 hangs on a torn structure.
 KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
@@ -218,7 +218,7 @@ def test_rows_can_be_flushed_at_any_moment(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_run(tmp_path):
-    """Fifty times the rows may cost a few megabytes more, not the hundred that they occupy."""
+    """Fifty times as many rows cost a few megabytes more, not the hundred that they occupy."""
     script = """
 import sys
 from pathlib import Path
@@ -333,7 +333,7 @@ def test_truncated_or_corrupt_file_is_read_or_refused_without_hanging(tmp_path, 
             refused.append(str(error))
     assert len(refused) > 30
     assert not [message for message in refused if "\n" in message]
-    assert time.perf_counter() - began < 30.0  # HDF5 alone would wait for ever
+    assert time.perf_counter() - began < 30.0  # HDF5 alone would hang
 
 
 def test_error_for_a_truncated_file_names_both_sizes(tmp_path):
@@ -344,7 +344,7 @@ def test_error_for_a_truncated_file_names_both_sizes(tmp_path):
 
 
 def test_lookup3_hash_equals_published_values():
-    assert lookup3(b"Four score and seven years ago") == 0x17770551  # of lookup3.c itself
+    assert lookup3(b"Four score and seven years ago") == 0x17770551  # from lookup3.c itself
     assert lookup3(b"") == 0xDEADBEEF
 
 
@@ -387,7 +387,7 @@ except DiskFull as error:
 
 
 def test_file_size_limit_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path):
-    """A limit that the disk does not tell is met while HDF5 writes."""
+    """A limit that is not visible as free space is met while HDF5 writes."""
     done = subprocess.run(
         [sys.executable, "-c", QUOTA, str(tmp_path / "run.h5")], capture_output=True, text=True, timeout=60, check=True
     )

@@ -1,4 +1,4 @@
-"""The pace of a clip on its river: a push along the curve makes no clip race, and it stops when the hand does."""
+"""The pace of a clip on its river: a push along the curve does not speed it up, and it stops with the hand."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from sim.reference.reference import make_reference, reference_along
 LAP, PERIOD = 3.4, 2e-3
 FIGURE = figure_model()
 CURVE = Trajectory.circle(0.0477, LAP)
-PUSHED, BUMP, LEAD = 1.0, 0.25, 0.08  # [s]: a push begins, lasts, and takes the hand on along the curve by so much
+PUSHED, BUMP, LEAD = 1.0, 0.25, 0.08  # [s]: start and duration of a push, and how far it moves the hand ahead
 
 
 class Played(NamedTuple):
@@ -37,7 +37,7 @@ def walk() -> RiverClips:
 
 
 def _played(clips: RiverClips, phases: np.ndarray) -> Played:
-    """What a reference does whose hand is at phases of the river [s], tick by tick."""
+    """Ticks of a reference whose hand is at given phases of the river [s]."""
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, 0.4, packed_legs(FIGURE))
     traces, poses = np.zeros((1, TRACE_SIZE)), np.empty((1, 75))
     rows = []
@@ -70,7 +70,7 @@ def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: 
 
 def test_velocity_and_acceleration_are_those_of_the_shown_motion(walk: RiverClips) -> None:
     played = _played(walk, _bumped_phases(1.6))
-    # While all of the excess is taken up; later the stylus filter's prediction of a pushed hand is off by itself.
+    # While all of the excess is compensated; later the stylus filter's prediction of a pushed hand is wrong anyway.
     pushed = slice(round((PUSHED + 0.04) / PERIOD), round((PUSHED + 0.1) / PERIOD))
     assert (np.diff(played.hand)[pushed] / PERIOD).max() > 1.5
     difference = np.gradient(played.velocity[:, :3], PERIOD, axis=0) - played.acceleration[:, :3]

@@ -1,4 +1,4 @@
-"""Changes that are known before a run: they begin at a gate, end in the other clip, and nothing jumps meanwhile."""
+"""Clip changes computed before a run: they begin at a gate and end in the other clip, without jumps."""
 
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -41,7 +41,7 @@ def map_with_offsets() -> RiverClips:
 
 @pytest.fixture(scope="module")
 def map_with_changes(map_with_offsets: RiverClips) -> RiverClips:
-    """With a change from the first clip to the second, as it is where the search begins."""
+    """With a change from the first clip to the second, taken from where the search starts."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(river_changes, "feasible", lambda clip, *rest, **more: SimpleNamespace(clip=clip, costs=(0.0,)))
         gate, *rows = river_changes._found(map_with_offsets.on_one_river(), 0.4, FIGURE, 0, 1, LAP / 8 * np.arange(8))
@@ -49,7 +49,7 @@ def map_with_changes(map_with_offsets: RiverClips) -> RiverClips:
 
 
 def _played(clips: RiverClips, rivers: tuple[tuple[float, int], ...], seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of a hand that each river has from a moment on, and what the memory then holds."""
+    """Poses and memory rows of a hand that changes to each river at a given moment."""
     t = np.arange(round(seconds / PERIOD)) * PERIOD
     stylus, traces = gliding_hand(CURVES, LAP, rivers, t)
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, 0.4, packed_legs(FIGURE))
@@ -66,14 +66,14 @@ def test_change_begins_at_its_gate_ends_in_the_other_clip_without_jumps(map_with
     gate, begins = change.gates[0], 0.3
     poses, memory = _played(map_with_changes, ((begins, 1),), 2.0 * LAP)
     t = np.arange(len(poses)) * PERIOD
-    # The hand is timed by the river that has it at once, the clip plays on to the gate.
+    # The course of the hand changes at once, while the clip plays on to the gate.
     assert t[memory[:, COURSE] == 1.0][0] < begins + 0.1
     assert t[memory[:, RIVER] == 1.0][0] == pytest.approx(gate if gate > begins + 0.05 else gate + LAP, abs=0.05)
     passing = t[memory[:, CHANGE] >= 0.0]
     assert passing[-1] - passing[0] == pytest.approx(change.seconds, abs=0.1)
     rate = pose_difference(poses[:-1], poses[1:]) / PERIOD
     velocity_steps = np.abs(np.diff(rate, axis=0))[round(0.5 / PERIOD) :]
-    # Of a joint 1.5 rad/s in 2 ms, of the root 5 cm/s: without the offset they are 100 and more, and 1 m/s.
+    # Changes within 2 ms: without the offset 100 rad/s and more, and 1 m/s.
     assert velocity_steps[:, 6:].max() < 1.5
     assert velocity_steps[:, :3].max() < 0.05
     after = round((passing[-1] + 0.2) / PERIOD)
@@ -105,10 +105,10 @@ def test_map_is_unchanged_where_no_change_is_found(
     map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
-    # Other processes would find the changes that this one is told not to find.
+    # Other processes would not see the patched `_passage`.
     monkeypatch.setattr(river_changes, "side_by_side", lambda calls: [call(*given) for call, given in calls])
     monkeypatch.setattr(river_changes, "_passage", lambda *rest: None)
-    for _ in range(2):  # found, and as it is kept
+    for _ in range(2):  # computed, and loaded from the cache
         haptic_map = river_changes.with_changes(map_with_offsets, 0.4, FIGURE)
         assert haptic_map.changes == ()
         np.testing.assert_array_equal(haptic_map.compiled().params, map_with_offsets.compiled().params)
@@ -129,7 +129,7 @@ def test_change_found_in_a_two_lap_round_equals_that_of_a_doubled_lap(
         )
         assert once[0, 0] > 0.5 * LAP
         assert once.shape == again.shape
-        # The filter of the stylus lags twice as far behind a hand that is twice as fast.
+        # The stylus filter lags twice as far behind a hand that is twice as fast.
         np.testing.assert_allclose(again, once, atol=0.02)
 
 
@@ -169,7 +169,7 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
 
 @pytest.fixture(scope="module")
 def run_with_changes(tmp_path_factory: pytest.TempPathFactory) -> CompletedProcess[str]:
-    """A run of three clips in a process of its own, which finds the changes and keeps them."""
+    """A run of three clips in a separate process, which computes the changes and caches them."""
     words = (
         "run",
         "--mode",
@@ -208,7 +208,7 @@ def test_figure_follows_all_changes_between_three_clips_better_than_offsets() ->
     by_offsets, by_changes = (
         followed(river_tour.toured(haptic_map, Figure(), FIGURE), seconds) for haptic_map in (map_with_offsets, found)
     )
-    # 4 and 16 % when this was written; half of what is lacking is the margin.
+    # Measured: 4 and 16 %.
     assert by_changes.fell is None
     assert by_changes.residual < min(0.08, 0.5 * by_offsets.residual)
     assert isinstance(river_tour.toured(found, Figure(), FIGURE), Clip)

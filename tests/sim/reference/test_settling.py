@@ -1,4 +1,4 @@
-"""A hand that holds an animation in the middle of a flight has a figure that stands, not one that hovers."""
+"""Settling: if the hand holds an animation in the middle of a flight, the figure stands instead of hovering."""
 
 import mujoco
 import numpy as np
@@ -54,7 +54,7 @@ def test_flight_poses_are_lowered_to_the_floor_and_stances_unchanged(name: str) 
     assert _lowest(lowered).min() > before.min() - 1e-9
     stands = before < 0.001
     assert np.abs(lowered - poses)[stands].max() < 1e-4
-    # Only the height changes, and nothing without a share.
+    # Only the height changes, and nothing with a share of zero.
     np.testing.assert_array_equal(np.delete(lowered, 2, axis=1), np.delete(poses, 2, axis=1))
     for pose, own in zip(lowered, poses, strict=True):
         pose[:] = own
@@ -80,7 +80,7 @@ def test_lowering_share_falls_to_zero_as_the_hand_reaches_the_clip_pace() -> Non
     assert shares[28] == 1.0  # 0.7 of the pace
     assert max(shares[36:]) < 1e-9  # 0.9 of it
     assert np.all(np.diff(shares) <= 0.0)
-    # The other way round is as fast; up, down, outwards and on the axis it does not move on.
+    # The other direction counts as well; motion upwards, outwards or on the axis does not.
     assert lowering_goal(p, -along, LAP) < 1e-9
     assert lowering_goal(p, np.array([0.3, 0.0, 0.3]), LAP) == 1.0
     assert lowering_goal(np.zeros(3), along, LAP) == 1.0
@@ -99,7 +99,7 @@ def test_share_approaches_its_goal_without_jump_or_overshoot() -> None:
 
 
 def _held_in_flight(clip_seconds: float) -> np.ndarray:
-    """Poses of a hand that goes along a jump and stops in mid-air."""
+    """Poses of a hand that follows a jump and stops in mid-air."""
     poses = _poses("jump")
     clip = load_clips(("jump",))[0][0]
     jumps = Cylindrical([(clip.poses, clip.fps)] * 4, (0.02, 0.08), (-0.025, 0.025), figure_legs(FIGURE_MODEL))
@@ -118,7 +118,7 @@ def test_held_jump_comes_down_and_hovers_without_settling() -> None:
     settled, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
     assert _lowest(hovering)[-1] > 0.2
     assert _lowest(settled)[-1] < 0.006
-    # At its own pace it flies, and it comes down no faster than a body that falls.
+    # At the clip's pace it flies, and it is lowered no faster than a body falls.
     velocity = pose_difference(settled[:-1], settled[1:])[:, 2] / PERIOD
     assert _lowest(settled).max() > 0.15
     assert velocity.min() > -2.5
@@ -154,5 +154,5 @@ def test_physical_figure_stands_through_held_and_carried_flights(clips: tuple[st
 
     Loop(session.servo, session.world, append_errors).run(config.seconds)
     assert config.seconds > edited_until(session.config.user.grabs) + 3.0
-    # It fell at 11.7 s with the jump and at 6.2 s with the four.
+    # A figure that does not stand falls at 11.7 s with the jump and at 6.2 s with the four clips.
     assert max(errors) < 0.3

@@ -1,4 +1,4 @@
-"""The filter between stylus and figure turns as it moves: no lag at constant acceleration, no bit at rest."""
+"""The filter between stylus and figure: no lag at constant acceleration, exact at rest, also for orientations."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -77,7 +77,7 @@ def test_encoder_step_is_spread_over_several_periods() -> None:
 
 
 def test_velocity_and_acceleration_of_circular_motion_are_unbiased() -> None:
-    # Jerk that turns with the hand: without it the velocity of this lap is 1.6 % short.
+    # The filter assumes jerk that turns with the hand: without it the velocity of this lap is 1.6 % too small.
     period, lap = 2e-3, 2.2
     smoothing, rate = float(np.exp(-2.0 * np.pi * 6.0 * period)), 2.0 * np.pi / lap
     hand = np.zeros((3, 3))

@@ -1,4 +1,4 @@
-"""Submovements, natural pace, wishes and intents: tables that are what they say."""
+"""Submovements, natural pace, and the tables of wishes that intents make."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_submovement_meets_both_ends_with_least_jerk() -> None:
         np.testing.assert_allclose(state[:2], end[:2], atol=1e-10)
     submovement(plan, seconds, seconds * (1.0 - 1e-9), state)
     np.testing.assert_allclose(state[2], goal[2], atol=1e-5)
-    # A minimum of ∫ x⃛² has no sixth derivative: any change that keeps both ends has more jerk.
+    # A minimum of ∫ x⃛² has no sixth derivative: any variation that keeps both ends has more jerk.
     s = np.linspace(0.0, 1.0, 4001)
     jerk = (6.0 * plan[3, 0] + 24.0 * plan[4, 0] * s + 60.0 * plan[5, 0] * s**2) / seconds**3
     change = np.polynomial.Polynomial([0, 0, 0, 1, -3, 3, -1]).deriv(3)(s) / seconds**3  # s³ (1 − s)³
@@ -71,7 +71,7 @@ def test_submovement_count_minimises_the_total_time() -> None:
 def test_natural_pace_of_an_ellipse_is_harmonic() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 257)
     ellipse = np.stack([0.04 * np.cos(angle), 0.02 * np.sin(angle)], axis=1)
-    # Points evenly in arc length, so that nothing is told of the pace.
+    # Points equally spaced in arc length, so that they carry no pace.
     length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))))
     even = np.interp(np.linspace(0.0, length[-1], 257), length, angle)
     points = np.stack([0.04 * np.cos(even), 0.02 * np.sin(even)], axis=1)
@@ -115,20 +115,20 @@ def test_cut_corner_is_straight() -> None:
 
 
 def test_change_over_ends_on_the_other_curve() -> None:
-    wishes = ChangeOver(Trajectory.circle(0.06, 4.0), row_at=3.0).wishes(CIRCLE, 8.0, 1)
+    wishes = ChangeOver(Trajectory.circle(0.06, 4.0), at=3.0).wishes(CIRCLE, 8.0, 1)
     assert np.hypot(*row_at(wishes, 2.5)[:2]) == pytest.approx(0.04, rel=1e-3)
     assert np.hypot(*row_at(wishes, 6.0)[:2]) == pytest.approx(0.06, rel=1e-3)
 
 
 def test_resist_holds_its_place_with_a_firm_grip_then_continues() -> None:
-    wishes = Resist(row_at=1.0, seconds=2.0, grip=9.0).wishes(CIRCLE, 8.0, 1)
+    wishes = Resist(at=1.0, seconds=2.0, grip=9.0).wishes(CIRCLE, 8.0, 1)
     np.testing.assert_allclose(row_at(wishes, 1.2)[:3], row_at(wishes, 2.8)[:3])
     assert row_at(wishes, 2.0)[GRIP] == 9.0
     np.testing.assert_allclose(row_at(wishes, 3.2)[:3], CIRCLE.point(CIRCLE.start + 1.2), atol=1e-9)
 
 
 def test_get_lost_leaves_the_curve_lets_go_and_comes_back() -> None:
-    wishes = GetLost(row_at=1.0, seconds=4.0).wishes(CIRCLE, 8.0, 5)
+    wishes = GetLost(at=1.0, seconds=4.0).wishes(CIRCLE, 8.0, 5)
     away = np.linalg.norm(wishes.rows[:, :3] - CIRCLE.point(CIRCLE.start + 0.02 * np.arange(len(wishes.rows))), axis=1)
     assert away.max() > 0.005
     assert away[:50].max() < 1e-9
@@ -158,8 +158,8 @@ def test_press_is_a_force_away_from_the_middle() -> None:
         lambda: Press([Push(0.0, 1.0, 1.0, place=(0.0, 0.0, 0.0))]), lambda: Bend([Grab(0.0, (0.0, 0.0, 0.0))]),
         lambda: Wishes(np.zeros((3, 4))), lambda: Wishes(np.full((3, 10), np.nan)),
         lambda: targets(np.zeros((2, 3)), 0.0),
-        lambda: Press([]), lambda: Bend([]), lambda: ChangeOver(row_at=np.inf), lambda: Resist(row_at=np.inf),
-        lambda: GetLost(row_at=np.inf), lambda: GetLost(seconds=np.inf), lambda: GetLost(seconds=np.nan),
+        lambda: Press([]), lambda: Bend([]), lambda: ChangeOver(at=np.inf), lambda: Resist(at=np.inf),
+        lambda: GetLost(at=np.inf), lambda: GetLost(seconds=np.inf), lambda: GetLost(seconds=np.nan),
         lambda: Lead([], 0.1), lambda: Lead(np.zeros((3, 2)), 0.1), lambda: Lead(np.full((3, 3), np.nan), 0.1),
         lambda: Lead(np.zeros((3, 3)), 0.0), lambda: Lead(np.zeros((3, 3)), -1.0),
         lambda: Lead(np.zeros((3, 3)), np.nan),

@@ -1,4 +1,4 @@
-"""The live page draws the state it is shown, at most thirty times a second."""
+"""The live page draws the shown state, at most thirty times per second."""
 
 import mujoco
 import numpy as np
@@ -73,7 +73,7 @@ def test_camera_follows_a_travelling_figure_and_not_a_dancing_one(page):
     for k in range(200):
         stage.show(shown_state(stage._model, root=1.0 + 0.02 * k, t=0.02 * k))
     assert 3.0 < stage._view_offset[0] < 5.0
-    stage.show(shown_state(stage._model))  # put back
+    stage.show(shown_state(stage._model))  # reset to the start
     assert np.all(stage._view_offset == 0.0)
 
 

@@ -1,4 +1,4 @@
-"""The replay shows what was recorded, where it was, in one page that asks for nothing else."""
+"""The replay shows the recorded motion in one self-contained page."""
 
 import base64
 import re
@@ -30,7 +30,7 @@ def model():
 
 
 def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02, rivers=None):
-    """A hand on a circle that presses harder with time; a figure that leans and may travel along x."""
+    """Record a hand on a circle that presses harder with time, and a figure that leans and may travel along x."""
     ticks, frames = np.arange(0, seconds, 1e-3), np.arange(0, seconds, 1e-2)
     root = int(model.joint("figure/root").qposadr[0])
     theta1 = int(model.joint("phantom/theta1").qposadr[0])
@@ -56,7 +56,7 @@ def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02, rivers
 
 
 def decoded(page: str) -> dict:
-    """The recording that viser put into the page."""
+    """The recording that viser embedded in the page."""
     found = re.search(r'__VISER_EMBED_DATA__="([^"]+)"', page)
     assert found is not None
     raw = zstandard.ZstdDecompressor().decompress(base64.b64decode(found[1])[8:])
@@ -72,7 +72,7 @@ def decoded(page: str) -> dict:
 
 
 class State:
-    """Where everything is at a time: the messages until then, applied."""
+    """The scene at a time, after all messages until then."""
 
     def __init__(self, content: dict, time: float):
         self.position: dict[str, np.ndarray] = {}
@@ -92,7 +92,7 @@ class State:
 
 
 class References(HTMLParser):
-    """Everything a page would fetch."""
+    """All references that a page would fetch."""
 
     def __init__(self, page: str):
         super().__init__()
@@ -216,7 +216,7 @@ def test_river_colours_differ_from_each_other_and_from_hand_and_field():
         seen = np.array([rgb(color) for color in colors], dtype=float)
         distances = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
         assert distances.min() > 25.0
-        # Seen on white, in the page and in figures.
+        # Distinct from white, the background of the page and of figures.
         assert (np.linalg.norm(seen - 255.0, axis=1) > 100.0).all()
 
 
@@ -303,7 +303,7 @@ def test_tube_about_a_resting_or_sharply_turning_path_is_intact(points):
     vertices, _ = tube(points, 0.1, sides=6)
     rings = vertices.reshape(len(points), 6, 3) - points[:, None]
     np.testing.assert_allclose(np.linalg.norm(rings, axis=2), 0.1, atol=1e-12)
-    # No ring is flat.
+    # No ring is degenerate.
     assert all(np.linalg.svd(ring, compute_uv=False)[1] > 0.1 for ring in rings)
 
 

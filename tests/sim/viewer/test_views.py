@@ -1,4 +1,4 @@
-"""A view of the live page is in the middle of what the panel leaves free, and all of it is there."""
+"""Views of the live page are centred in the space beside the panel, and completely visible."""
 
 import asyncio
 from collections.abc import Callable
@@ -38,11 +38,11 @@ def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int])
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)
     assert inside.all()
     spread = np.ptp(pixels, axis=0) / free
-    assert spread.max() == pytest.approx(1.0)  # no smaller than it has to be
+    assert spread.max() == pytest.approx(1.0)  # as large as possible
 
 
 def opened_page() -> tuple[Any, Any, Callable[[], None]]:
-    """A server, the camera of its browser of 900×520, and what tells it that the camera has changed."""
+    """A server, the camera of its browser of 900×520, and a function that reports a change of the camera."""
     calls: dict[str, Callable[..., Any]] = {}
     server: Any = SimpleNamespace(
         initial_camera=SimpleNamespace(), on_client_connect=lambda call: calls.update(connect=call)
@@ -64,7 +64,7 @@ def test_view_is_fitted_to_resized_windows_until_somebody_turns_it() -> None:
         resize(camera, *size)
         update()
         np.testing.assert_allclose(camera.position, camera_of(VIEWS["both"], *size).position)
-    look(camera, VIEWS["stage"], (390, 780))  # by its button
+    look(camera, VIEWS["stage"], (390, 780))  # as by its button
     update()
     resize(camera, 800, 600)
     update()

@@ -1,4 +1,4 @@
-"""A simulated hand that takes hold: where it means to be, and when the switch is pressed."""
+"""A simulated hand that grabs: where it wants to be, and when the switch is pressed."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ GRAB = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.2, place=(0.05, 0.0, 0.0)
 
 
 class Hand:
-    """The hand of an arm that is held at a point: its force in terms of its stiffness is where it wants to be."""
+    """A hand held at a point: its force divided by its stiffness tells where it wants to be."""
 
     def __init__(self, arm: Arm):
         self.arm = arm.compiled()

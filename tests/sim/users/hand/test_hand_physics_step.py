@@ -1,4 +1,4 @@
-"""A hand whose impedance is too stiff for the physics step is refused, at the step from which it diverges."""
+"""A hand whose impedance is too stiff for the physics step is refused exactly from where it diverges."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A simulated hand that turns the stylus: what it wants, its moment, where the stylus goes, and its replay."""
+"""A simulated hand that turns the stylus: wanted turn, moment, motion of the stylus, and replay."""
 
 import mujoco
 import numpy as np
@@ -116,7 +116,7 @@ def test_run_with_turns_replays_bit_for_bit():
     np.testing.assert_array_equal(frames.qpos, again.qpos)
     assert ticks.applied.shape == (400, first.servo.plant.substeps, 6)
     assert np.abs(ticks.applied[:, :, 3:]).max() > 1e-3
-    # The moment of the field is recorded; the motors get nothing of it.
+    # The moment of the field is recorded, although the motors cannot apply it.
     moment = tick_channels(ticks, 400)["field"][:, 3:]
     expected = -0.2 * np.array([rotation(q).as_rotvec() for q in ticks.hand[:, 4:8]]) - 1e-3 * ticks.hand[:, 11:14]
     near = np.linalg.norm(expected, axis=1) > 1e-3

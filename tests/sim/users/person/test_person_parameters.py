@@ -1,4 +1,4 @@
-"""Persons and populations: numbers within published intervals, seeded, and refused in one line where they are not."""
+"""Persons and populations: parameters within published intervals, seeded, and otherwise refused in one line."""
 
 from dataclasses import fields, replace
 

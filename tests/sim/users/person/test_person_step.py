@@ -1,4 +1,4 @@
-"""A person in compiled code: statics and delays in closed form, and the same run for the same seed."""
+"""A person in compiled code: statics and delays in closed form, and runs determined by the seed."""
 
 from dataclasses import replace
 
@@ -46,7 +46,7 @@ def _held(person: PersonState, ticks: int, first: int, p: np.ndarray, force: np.
 
 
 class ClampedPerson:
-    """A person whose stylus is held where the test says, in the unit that a run has."""
+    """A person whose stylus the test holds at a point, in the compiled unit of a run."""
 
     def __init__(self, person: Person, wishes: Wishes):
         self.state = Participant(person, wishes, 1).holding(PERIOD, STEP)
@@ -104,7 +104,7 @@ def test_direction_error_has_the_variance_of_filtered_noise() -> None:
     speed, directions = 0.2, np.empty((2_000_000, 3))
     person.vectors[HAND_V] = 0.0, speed, 0.0
     _direction_errors(person, directions)
-    # An Ornstein-Uhlenbeck process of time τ through a filter of time T: σ² v² T² τ / (T + τ), and none along the way.
+    # An Ornstein-Uhlenbeck process of time τ behind a filter of time T: σ² v² T² τ / (T + τ), none along the motion.
     variance = (Person().direction_noise * speed * ASTRAY_TIME) ** 2 * VEER_TIME / (ASTRAY_TIME + VEER_TIME)
     np.testing.assert_allclose(directions.std(axis=0), [variance**0.5, 0.0, variance**0.5], rtol=0.08, atol=1e-9)
     assert abs(np.mean(directions[:, 0] * directions[:, 2])) < 0.1 * variance
@@ -150,7 +150,7 @@ CIRCLE = 0.04 * np.stack([np.cos(PHASE), np.sin(PHASE), 0.0 * PHASE], axis=1)
 
 
 def eye_of(effect: np.ndarray, p: np.ndarray, trust: float) -> Eye:
-    """An eye that has learned a figure whose root is at effect @ p, and is shown that of a place p."""
+    """An eye that has learned a figure whose root is at effect @ p, and sees that of the place p."""
 
     def pose(p: np.ndarray) -> np.ndarray:
         return np.concatenate([effect @ p, np.tile([1.0, 0.0, 0.0, 0.0], 18)])
@@ -170,7 +170,7 @@ def test_eye_finds_the_place_of_a_pose() -> None:
 
 
 def test_unseen_directions_are_taken_from_the_felt_place() -> None:
-    """The most likely place of a picture without noise is that of the linear Gaussian problem, in closed form."""
+    """Without noise the most likely place is the closed-form solution of the linear Gaussian problem."""
     effect, p, felt_place, place = (
         np.diag([50.0, 50.0, 0.0]),
         np.array([0.04, 0.0, 0.006]),
