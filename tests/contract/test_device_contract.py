@@ -67,7 +67,7 @@ def exchange_hook(device: Exchange) -> Callable[[int], None]:
 def make_subject(
     request: pytest.FixtureRequest, hand_rows: np.ndarray, tmp_path: Path
 ) -> Callable[..., ServoUnderTest]:
-    def subject(**parts) -> ServoUnderTest:
+    def build(**parts) -> ServoUnderTest:
         world = device_world()
         if request.param == "simulated":
             return ServoUnderTest(bare_servo(world, simulated(world, ARM), **parts), world)
@@ -80,7 +80,7 @@ def make_subject(
         request.addfinalizer(rig.driver.close)
         return ServoUnderTest(bare_servo(world, device, **parts), world, rig)
 
-    return subject
+    return build
 
 
 def test_time_starts_at_zero_and_advances_by_the_period(make_subject) -> None:

@@ -76,15 +76,15 @@ def test_unplugging_faults_reads_and_writes_but_not_release(phantom) -> None:
 
 def test_malformed_reports_arrive_unaltered(phantom) -> None:
     driver, reading = open_device("hid"), np.zeros(9)
-    genuine = phantom.firmware.tick()
+    valid_report = phantom.firmware.tick()
     for size in (1, 63, 65):
-        phantom.node.post((genuine + b"\0")[:size])
+        phantom.node.post((valid_report + b"\0")[:size])
         with pytest.raises(DriverFault, match=f"a report of {size} bytes"):
             driver.read(reading, 0.0)
     for _ in range(2):
-        phantom.node.post(genuine[:40] + b"\xff" + genuine[41:])
+        phantom.node.post(valid_report[:40] + b"\xff" + valid_report[41:])
         assert not driver.read(reading, 0.0)
-    phantom.node.post(genuine[:40] + b"\xff" + genuine[41:])
+    phantom.node.post(valid_report[:40] + b"\xff" + valid_report[41:])
     with pytest.raises(DriverFault, match="3 reports in a row had a wrong checksum"):
         driver.read(reading, 0.0)
     driver.close()

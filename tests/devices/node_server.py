@@ -67,7 +67,7 @@ class Node(UMockdev.IoctlBase):
         elif not self.packets:
             client.complete(-1, errno.EAGAIN)
         else:
-            os.read(self.slave, 1)  # the mark that made poll() say so
+            os.read(self.slave, 1)  # the byte that made poll() return
             buffer = client.get_arg()
             packet = self.packets.popleft()[: len(buffer.retrieve())]
             buffer.update(0, packet)
@@ -142,7 +142,7 @@ def main() -> None:
             node.features[message["feature"][0]] = bytes.fromhex(message["feature"][1])
         else:
             node.gone = True
-            os.close(mark)  # a poll() that waits sees a hang-up, as it does on unplug
+            os.close(mark)  # a waiting poll() sees a hang-up, as on unplug
         node.send(done=True)
 
     def serve() -> None:

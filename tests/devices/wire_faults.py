@@ -38,8 +38,8 @@ class Wire:
         self.ticker.tick(self.number, request)
         self.number += 1
         self.rows.append(self.ticker.row.copy())
-        asked = self.ticker.gated.torque.any() or self.ticker.gated.force.any()
-        return not asked, not self.firmware.joint_torque.any()
+        commanded = self.ticker.gated.torque.any() or self.ticker.gated.force.any()
+        return not commanded, not self.firmware.joint_torque.any()
 
     def run_active(self, ticks: int) -> None:
         """Arm, and run for some ticks with force."""
@@ -163,11 +163,11 @@ def unplug(wire: Wire, rng: np.random.Generator) -> int:
 
 
 def _stall(wire: Wire, milliseconds: int) -> int:
-    left = [milliseconds]
+    remaining = [milliseconds]
 
     def tamper(report: bytes) -> list[bytes]:
-        left[0] -= 1
-        return [] if left[0] >= 0 else [report]
+        remaining[0] -= 1
+        return [] if remaining[0] >= 0 else [report]
 
     wire.handle.tamper = tamper
     return 4  # five periods of silence
@@ -197,8 +197,8 @@ def repeated_report(wire: Wire, rng: np.random.Generator) -> int:
 
 
 def sequence_back(wire: Wire, rng: np.random.Generator) -> int:
-    back = int(rng.integers(1, 50))
-    wire.handle.tamper = lambda report: [resealed(report, sequence=field(report, "sequence") - 1 - back)]
+    offset = int(rng.integers(1, 50))
+    wire.handle.tamper = lambda report: [resealed(report, sequence=field(report, "sequence") - 1 - offset)]
     return 0
 
 
@@ -295,8 +295,8 @@ def encoder_jump(wire: Wire, rng: np.random.Generator) -> int:
 
 def clock_back(wire: Wire, rng: np.random.Generator) -> int:
     """As of a device timer that wraps unexpectedly."""
-    back = int(rng.integers(1, 60)) * 1_000_000
-    wire.handle.tamper = lambda report: [resealed(report, time_us=(field(report, "time_us") - back) % 2**64)]
+    offset = int(rng.integers(1, 60)) * 1_000_000
+    wire.handle.tamper = lambda report: [resealed(report, time_us=(field(report, "time_us") - offset) % 2**64)]
     return 0
 
 

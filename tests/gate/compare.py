@@ -1,8 +1,8 @@
 """Gate for refactorings: short runs of a commit and of this tree, compared bit for bit.
 
 ``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case
-there and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings
-could not be kept instead: libraries round by processor, and a figure with contacts magnifies that. A case that
+there and here on this machine, both at once, and compares every channel of the two recordings. Stored hashes of
+recordings would not do: libraries round by processor, and a figure with contacts magnifies the difference. A case that
 needs the recording or map of another one includes that case.
 """
 

@@ -67,20 +67,22 @@ def main(library: str) -> None:
     while driver.read(reading, 0.0):
         pass
 
-    genuine = firmware.tick()
+    valid_report = firmware.tick()
     for size in (40, 63, 70):
-        device.send((genuine + bytes(6))[:size])
+        device.send((valid_report + bytes(6))[:size])
         readings: list[bool] = []
         fault = fault_of(lambda readings=readings: readings.append(driver.read(reading, 0.5)))
         # Linux passes a report of another size on, or keeps back one that is short, or cuts one that is long.
-        cut = size > len(genuine) and readings == [True]
-        taken = fault == (Fault.REPORT_MALFORMED, float(min(size, len(genuine) + 1)))  # as much as is asked for
-        print(
-            f"    {'a fault' if taken else 'cut to 64 by the kernel' if cut else 'kept back by the kernel'}", flush=True
-        )
-        check(f"{size} bytes are no other reading", taken or cut or readings == [False], True)
+        is_truncated = size > len(valid_report) and readings == [True]
+        is_fault = fault == (
+            Fault.REPORT_MALFORMED,
+            float(min(size, len(valid_report) + 1)),
+        )  # capped by the size asked for
+        outcome = "a fault" if is_fault else "cut to 64 by the kernel" if is_truncated else "kept back by the kernel"
+        print(f"    {outcome}", flush=True)
+        check(f"{size} bytes are no other reading", is_fault or is_truncated or readings == [False], True)
     for _ in range(3):
-        device.send(genuine[:20] + bytes([genuine[20] ^ 1]) + genuine[21:])
+        device.send(valid_report[:20] + bytes([valid_report[20] ^ 1]) + valid_report[21:])
     time.sleep(0.05)
     check("three wrong bits", fault_of(lambda: driver.read(reading, 1.0)), (Fault.CHECKSUM_WRONG, 3))
     begin = time.monotonic()

@@ -118,7 +118,7 @@ def test_every_embedded_clip_is_tracked_for_ten_seconds(name):
 def test_infeasible_motion_shows_in_the_residual():
     glide = _squats()
     poses = np.tile(glide.poses[0], (121, 1))
-    poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, feet and all
+    poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, with its feet
     result = track(Clip(poses, 60.0, "glide"), 1.5)
     assert result.stance.force_rms > 0.05 or result.root_error > 0.05
 

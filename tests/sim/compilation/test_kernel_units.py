@@ -77,12 +77,12 @@ def test_derivative_called_by_address_equals_python_bit_for_bit():
 
 def test_field_loaded_from_disk_equals_python_bit_for_bit():
     program, units = (FIELD + FIELD).limited(2.0), law_units(FIELD)
-    named, other, wrench, same = program.fresh_memory(), program.fresh_memory(), np.empty(6), np.empty(6)
+    named, other, wrench, linked_wrench = program.fresh_memory(), program.fresh_memory(), np.empty(6), np.empty(6)
     for t in np.linspace(0.0, 4.0, 50):
         hand = HandState.at((0.05 * np.cos(t), 0.04 * np.sin(t), 0.01), (0.1, 0.0, 0.0), t).vector()
         evaluate(*program.compiled(), named, hand, wrench)
-        evaluate(units, program.ops, program.params, other, hand, same)
-        np.testing.assert_array_equal(same, wrench)
+        evaluate(units, program.ops, program.params, other, hand, linked_wrench)
+        np.testing.assert_array_equal(linked_wrench, wrench)
         np.testing.assert_array_equal(other, named)
 
 

@@ -61,16 +61,16 @@ def test_servo_loop_makes_no_heap_calls_in_2000_ticks(device: str, tmp_path: Pat
 class UncountedDevice(EmulatedPhantom):
     """A device that is simulated between two ticks, where nothing is counted."""
 
-    command_kept = np.zeros(3), False
+    pending_command = np.zeros(3), False
 
     def read(self, reading: Array, timeout: float) -> bool:
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
-        self.command_kept = torque, enable
+        self.pending_command = torque, enable
 
     def pass_tick(self, reading: Array) -> None:
-        super().write(*self.command_kept)
+        super().write(*self.pending_command)
         super().read(reading, 0.0)
 
 

@@ -318,12 +318,12 @@ def test_killed_device_is_a_fault(tmp_path: Path) -> None:
             activate(run)
             device_process.kill()
 
-            def gone(status: RunStatus) -> bool:
+            def is_unplugged(status: RunStatus) -> bool:
                 if status.fault is Fault.READING_STALE:  # a killed process is silent before its socket closes
                     run.request(CLEAR)
                 return status.fault is Fault.UNPLUGGED
 
-            assert not wait_until(run, gone).row["torque"].any()
+            assert not wait_until(run, is_unplugged).row["torque"].any()
             ended = run.stop()
         assert_complete(path, ended)
     finally:

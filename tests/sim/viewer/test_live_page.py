@@ -100,5 +100,5 @@ def test_showing_a_state_leaves_the_model_unchanged():
     page = LivePage(model, DRAWN, 0.02, port=0)
     page.show(shown_state(model)._replace(qpos=data.qpos + 0.1))
     page.close()
-    for array, kept in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):
-        assert np.array_equal(array, kept)
+    for array, original in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):
+        assert np.array_equal(array, original)

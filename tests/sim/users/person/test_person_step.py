@@ -216,21 +216,21 @@ def test_own_intent_moves_the_hand_in_python_and_compiled() -> None:
     def compiled(t, place, force, rows):
         rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 9] = 0.03, 0.01, 0.0, 1.0
 
-    asked: list[float] = []
+    ask_times: list[float] = []
     for own in (Own(in_python, every=0.1), Own(compiled, compiled=True)):
         participant = Participant(NOISELESS, own.wishes(Trajectory.circle(0.04, 4.0), 1.0, 1), 1, own)
         servo, world = servo_of(participant)
         person = servo.device.user.person  # pyright: ignore[reportAttributeAccessIssue]
 
         def ask(t: float) -> None:
-            asked.append(t)
+            ask_times.append(t)
             own.ask(person, t)  # noqa: B023 - used within the turn
 
         polling = {} if own.compiled else {"ask": ask, "ask_seconds": own.every}
         rows: list[np.ndarray] = []
         Loop(servo, world, lambda ticks, frames, n: rows.append(ticks.hand[:n].copy()), **polling).run(1.0)  # noqa: B023
         assert np.concatenate(rows)[-1, 1] > START[0] + 0.002
-    np.testing.assert_allclose(asked, 0.1 * np.arange(10), atol=1e-9)
+    np.testing.assert_allclose(ask_times, 0.1 * np.arange(10), atol=1e-9)
 
 
 def test_servo_without_a_person_needs_no_person_unit() -> None:
