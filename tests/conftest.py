@@ -1,8 +1,8 @@
-"""What all tests share: one thread of BLAS a process, and kernels on disk.
+"""Shared by all tests: one BLAS thread per process, and kernels cached on disk.
 
-Tests run side by side, a process a core; further threads of BLAS only spin, and lifting four clips took five times the
-processor time. A run compiles its kernels as parts of a few units; a test that calls one by itself would compile it
-anew in each process: such kernels are kept on disk between processes, as units are.
+Tests run in parallel, one process per core; more BLAS threads only spin, and lifting four clips took five times the
+processor time. A run compiles its kernels as parts of a few units; a test that calls a kernel directly would compile it
+anew in each process. Such kernels are cached on disk between processes, as units are.
 """
 
 import signal
@@ -26,27 +26,27 @@ from sim.compilation.unit_key import UnknownIngredient, UnknownName
 signal.signal(signal.SIGINT, signal.default_int_handler)  # pytest's own, in place of the start-up's
 
 # The same examples in every run, also on a machine that is slow or busy.
-settings.register_profile("the same", derandomize=True, deadline=None)
-settings.load_profile("the same")
+settings.register_profile("deterministic", derandomize=True, deadline=None)
+settings.load_profile("deterministic")
 
 
-class _BesideUnits(UnitCache):
-    """In a folder of its own, for tests count the files of units."""
+class _TestKernelCache(UnitCache):
+    """Cache in a folder of its own, because some tests count the files of units."""
 
     def path(self, signature: Any) -> Path:
         path = super().path(signature)
         return path.parent / "kernels" / path.name
 
 
-class _Kept(NullCache):
-    """Keeps a kernel where a key can be made of it; no `UnitCache` itself, so nobody takes the kernel for a unit.
+class _KernelCache(NullCache):
+    """Caches every kernel that has a key; no `UnitCache` itself, so that the kernel is not taken for a unit.
 
-    One that a run has compiled as a unit is loaded as such.
+    A kernel that a run has compiled as a unit is loaded from there.
     """
 
     def __init__(self, kernel: Dispatcher):
         self._units = UnitCache(kernel.py_func, kernel.targetoptions)
-        self._kernels = _BesideUnits(kernel.py_func, kernel.targetoptions)
+        self._kernels = _TestKernelCache(kernel.py_func, kernel.targetoptions)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -57,7 +57,7 @@ class _Kept(NullCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of kernels that hold an address, which are not kept
+            warnings.simplefilter("ignore")  # of kernels that hold an address, which cannot be cached
             try:
                 self._kernels.save_overload(sig, data)
             except (UnknownIngredient, UnknownName):
@@ -69,7 +69,7 @@ _compile = Dispatcher.compile
 
 def _compile_or_load(self: Any, signature: Any) -> Any:
     if type(self._cache) is NullCache and not is_nested() and self.py_func.__module__ != kept_call.__name__:
-        self._cache = _Kept(self)
+        self._cache = _KernelCache(self)
     return _compile(self, signature)
 
 
@@ -78,5 +78,5 @@ Dispatcher.compile = _compile_or_load
 
 @pytest.fixture
 def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run writes neither figures nor a page, which take longer than the run: for tests of what it does."""
+    """Runs write neither figures nor a report page, which would take longer than the run itself."""
     monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)

@@ -1,4 +1,4 @@
-"""A run with a field of one's own, in Python or composed, in the place of a mode's."""
+"""A run with a user-defined field, in Python or composed, in place of its mode's field."""
 
 from dataclasses import replace
 

@@ -1,15 +1,15 @@
-"""Devices that are real to the software: the reference firmware, and vendor libraries built from C."""
+"""Fixtures with the reference firmware, compiled from C."""
 
 from pathlib import Path
 
 import pytest
 
-from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compiled
+from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compile_c
 
 
 @pytest.fixture(scope="session")
 def firmware_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(tmp_path_factory.mktemp("firmware"), ROOT / "firmware" / "hvf_hid.c")
+    return compile_c(tmp_path_factory.mktemp("firmware"), ROOT / "firmware" / "hvf_hid.c")
 
 
 @pytest.fixture

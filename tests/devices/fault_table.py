@@ -1,6 +1,6 @@
-"""`make fault-table`: every injected fault in one table of the documents, measured anew.
+"""`make fault-table`: measures every injected fault and writes the table of the documentation.
 
-Those on the wire are injected here. Those of processes are tests against the clock: a row is there if its test passes.
+Faults on the wire are injected here. Faults of processes are tests in real time: a row tells whether its test passes.
 """
 
 import subprocess
@@ -10,75 +10,76 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.devices.firmware import ROOT, compiled
-from tests.devices.wire_faults import INJECTIONS, ORDERS, Order, inject
+from tests.devices.firmware import ROOT, compile_c
+from tests.devices.wire_faults import INJECTIONS, REPEATS, Injection, inject
 
 PAGE = ROOT / "docs" / "validation" / "fault-matrix.md"
 BEGIN = "| injected | times | evident after | no torque commanded after | motors off after | latched | recording |"
 TESTS = "tests/sim/hardware/test_processes.py", "tests/devices/test_fault_matrix.py"
 
 
-class Process(NamedTuple):
-    """An injection whose evidence is a test: in words, how often, what comes of it, and the test's name."""
+class ProcessFault(NamedTuple):
+    """A fault of a process, whose evidence is a test: cells of the table, and the beginning of the test's name."""
 
-    words: str
-    times: int
-    evident: str
-    zero: str
-    off: str
+    description: str
+    count: int
+    detected_after: str
+    command_zero_after: str
+    motors_off_after: str
     latched: str
     recording: str
     test: str
 
 
-_COUNTED = "test_what_a_bus_does_now_and_then"
-_SERVO_STOPPED = "test_a_servo_that_was_stopped"
-_WATCHDOG = "test_a_device_s_watchdog_lets_go"
-_RECORDER = "test_the_recorder_frozen_and_killed"
-_PAGE = "test_a_page_that_is_frozen_and_killed"
-PROCESSES = (
-    Process("duplicated, lost, late and singly spoiled reports, a third of all", 5, "at once", "not", "not",
-            "nothing: they are counted", "whole", _COUNTED),
-    Process("host away for 5, 50, 500 ms", 3, "its next tick", "not", "10 (firmware's watchdog)",
-            "nothing: a gap, ramped in again", "whole", "test_a_host_that_was_away"),
-    Process("servo SIGSTOP, 50 ms", 1, "when it goes on", "not", "not", "nothing: missed deadlines are counted",
-            "whole", _SERVO_STOPPED),
-    Process("servo SIGSTOP, 500 ms", 1, "when it goes on", "0", "0", "SERVO_LATE", "whole", _SERVO_STOPPED),
-    Process("servo SIGSTOP, device on packets", 1, "20 ms (device's watchdog)", "it is stopped", "at once",
-            "SERVO_LATE or CONTROL_LOST when it goes on", "whole", _WATCHDOG),
-    Process("servo SIGKILL, device on packets", 1, "20 ms (device's watchdog)", "it is dead", "at once",
-            "none: the controls say that it is gone", "up to then", _WATCHDOG),
-    Process("device's process killed", 1, "next tick", "0", "it is dead",
-            "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_a_device_that_is_gone"),
-    Process("controls frozen", 1, "the heartbeat's time", "0", "0", "CONTROL_LOST", "whole",
-            "test_controls_that_freeze"),
-    Process("page SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
-    Process("page SIGKILL", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
-    Process("recorder SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole after 5 s or less",
-            _RECORDER),
-    Process("recorder SIGKILL", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
-            _RECORDER),
-    Process("disk full", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
-            "test_a_full_disk_ends_the_recording"),
+_BUS_ERRORS = "test_occasional_bus_errors"
+_SERVO_STOPPED = "test_stopped_servo_misses_deadlines"
+_WATCHDOG = "test_device_watchdog_releases"
+_RECORDER = "test_recorder_frozen_and_killed"
+_PAGE = "test_servo_does_not_wait_for_a_frozen_or_killed_page"
+PROCESS_FAULTS = (
+    ProcessFault("duplicated, lost, late and singly spoiled reports, a third of all", 5, "at once", "not", "not",
+                 "nothing: they are counted", "whole", _BUS_ERRORS),
+    ProcessFault("host away for 5, 50, 500 ms", 3, "its next tick", "not", "10 (firmware's watchdog)",
+                 "nothing: a gap, ramped in again", "whole", "test_late_host_trips_the_watchdog"),
+    ProcessFault("servo SIGSTOP, 50 ms", 1, "when it goes on", "not", "not", "nothing: missed deadlines are counted",
+                 "whole", _SERVO_STOPPED),
+    ProcessFault("servo SIGSTOP, 500 ms", 1, "when it goes on", "0", "0", "SERVO_LATE", "whole", _SERVO_STOPPED),
+    ProcessFault("servo SIGSTOP, device on packets", 1, "20 ms (device's watchdog)", "it is stopped", "at once",
+                 "SERVO_LATE or CONTROL_LOST when it goes on", "whole", _WATCHDOG),
+    ProcessFault("servo SIGKILL, device on packets", 1, "20 ms (device's watchdog)", "it is dead", "at once",
+                 "none: the controls say that it is gone", "up to then", _WATCHDOG),
+    ProcessFault("device's process killed", 1, "next tick", "0", "it is dead",
+                 "UNPLUGGED, or READING_STALE before its socket closes", "whole", "test_killed_device"),
+    ProcessFault("controls frozen", 1, "the heartbeat's time", "0", "0", "CONTROL_LOST", "whole",
+                 "test_frozen_controls"),
+    ProcessFault("page SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
+    ProcessFault("page SIGKILL", 1, "never", "not", "not", "nothing: nobody waits for it", "whole", _PAGE),
+    ProcessFault("recorder SIGSTOP", 1, "never", "not", "not", "nothing: nobody waits for it",
+                 "whole after 5 s or less", _RECORDER),
+    ProcessFault("recorder SIGKILL", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
+                 _RECORDER),
+    ProcessFault("disk full", 1, "controls' next look", "not", "not", "nothing: controls say it", "up to then",
+                 "test_full_disk_ends_the_recording"),
 )  # fmt: skip
 
 
-def row_of(process: Process, note: str) -> str:
-    """A row of the table; the note is why it has failed, or empty."""
+def row_of(process: ProcessFault, note: str) -> str:
+    """A row of the table; the note says that its test has failed, or is empty."""
     return f"| {' | '.join(str(cell) for cell in process[:7])}{note} |"
 
 
-def wire_row(order: Order, library: Path, folder: Path) -> str:
+def wire_row(injection: Injection, library: Path, folder: Path) -> str:
     """A row of the table, measured."""
-    told = [inject(order, seed, library, folder) for seed in range(INJECTIONS)]
+    results = [inject(injection, seed, library, folder) for seed in range(REPEATS)]
 
     def worst(name: str) -> int:
-        return max(getattr(each, name) for each in told)
+        return max(getattr(each, name) for each in results)
 
-    faults = ", ".join(sorted({each.fault.name for each in told}))
-    whole = "whole" if all(each.recorded for each in told) else "**not whole**"
-    zero = max(each.zero - each.detected for each in told)
-    return f"| {order.words} | {len(told)} | {worst('detected')} | {zero} | {worst('off')} | {faults} | {whole} |"
+    faults = ", ".join(sorted({each.fault.name for each in results}))
+    whole = "whole" if all(each.recording_complete for each in results) else "**not whole**"
+    zero = max(each.command_zero_after - each.detected_after for each in results)
+    detected, off = worst("detected_after"), worst("motors_off_after")
+    return f"| {injection.description} | {len(results)} | {detected} | {zero} | {off} | {faults} | {whole} |"
 
 
 def table() -> Iterator[str]:
@@ -86,18 +87,18 @@ def table() -> Iterator[str]:
     yield BEGIN
     yield "|" + "---|" * (BEGIN.count("|") - 1)
     with tempfile.TemporaryDirectory() as name:
-        library = compiled(Path(name), ROOT / "firmware" / "hvf_hid.c")
-        for order in ORDERS:
-            yield wire_row(order, library, Path(name))
-    names = " or ".join(dict.fromkeys(process.test for process in PROCESSES))
-    told = subprocess.run(
+        library = compile_c(Path(name), ROOT / "firmware" / "hvf_hid.c")
+        for injection in INJECTIONS:
+            yield wire_row(injection, library, Path(name))
+    names = " or ".join(dict.fromkeys(process.test for process in PROCESS_FAULTS))
+    output = subprocess.run(
         [sys.executable, "-m", "pytest", "-o", "addopts=", "-v", "-k", names, *TESTS],
         cwd=ROOT, capture_output=True, text=True, check=False,
     ).stdout  # fmt: skip
-    if "failed" in told.splitlines()[-1]:
-        print(told, file=sys.stderr)
-    for process in PROCESSES:
-        lines = [line for line in told.splitlines() if f"::{process.test}" in line]
+    if "failed" in output.splitlines()[-1]:
+        print(output, file=sys.stderr)
+    for process in PROCESS_FAULTS:
+        lines = [line for line in output.splitlines() if f"::{process.test}" in line]
         passed = bool(lines) and all("PASSED" in line for line in lines)
         yield row_of(process, "" if passed else " (**test failed**)")
 

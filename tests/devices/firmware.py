@@ -1,4 +1,4 @@
-"""The reference firmware as a shared library, and a HID handle with it behind: what hidapi is to a real device."""
+"""The reference firmware as a shared library, and a HID handle that takes hidapi's place in front of it."""
 
 import ctypes
 import shutil
@@ -18,8 +18,8 @@ COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 NO_SENSOR = protocol.NO_TEMPERATURE
 
 
-def compiled(folder: Path, *sources: Path, program: bool = False) -> Path:
-    """A library, or a program, of C files; the test is skipped where there is no compiler."""
+def compile_c(folder: Path, *sources: Path, program: bool = False) -> Path:
+    """Compile C files to a library or a program; the test is skipped where there is no compiler."""
     if COMPILER is None:
         pytest.skip("no C compiler (cc, gcc or clang)")
     target = folder / (sources[0].stem if program else f"lib{sources[0].stem}.so")
@@ -40,30 +40,32 @@ class Motors(ctypes.Structure):
 
 
 def identity(watchdog_max_us: int = 100_000) -> np.ndarray:
-    made = protocol.blank(protocol.IDENTITY)
-    made["capabilities"] = protocol.HAS_MOTORS | protocol.HAS_WATCHDOG | protocol.HAS_TEMPERATURE | protocol.HAS_GIMBAL
-    made["rate_hz"], made["watchdog_max_us"] = 1000, watchdog_max_us
-    made["peak_torque"] = round(PREMIUM_1_5.stall_motor_torque / protocol.PEAK_UNIT)
-    made["name"], made["firmware"], made["serial"] = b"Reference", b"1.0", b"HVF-0001"
-    return made
+    record = protocol.blank(protocol.IDENTITY)
+    record["capabilities"] = (
+        protocol.HAS_MOTORS | protocol.HAS_WATCHDOG | protocol.HAS_TEMPERATURE | protocol.HAS_GIMBAL
+    )
+    record["rate_hz"], record["watchdog_max_us"] = 1000, watchdog_max_us
+    record["peak_torque"] = round(PREMIUM_1_5.stall_motor_torque / protocol.PEAK_UNIT)
+    record["name"], record["firmware"], record["serial"] = b"Reference", b"1.0", b"HVF-0001"
+    return record
 
 
 def calibration() -> np.ndarray:
-    made = protocol.blank(protocol.CALIBRATION)
-    made["flags"] = protocol.CALIBRATED
+    record = protocol.blank(protocol.CALIBRATION)
+    record["flags"] = protocol.CALIBRATED
     turns = [*PREMIUM_1_5.capstan, 1.0, 1.0, 1.0]
     counts = [PREMIUM_1_5.encoder_counts] * 3 + [PREMIUM_1_5.gimbal_counts] * 3
-    made["zero"] = [1000, -2000, 3000, 0, 100, -100]
-    made["counts_per_turn"] = np.rint(np.multiply(turns, counts) / protocol.COUNT_UNIT)
-    made["motor_turns"] = np.rint(np.array(PREMIUM_1_5.capstan) / protocol.TURN_UNIT)
-    return made
+    record["zero"] = [1000, -2000, 3000, 0, 100, -100]
+    record["counts_per_turn"] = np.rint(np.multiply(turns, counts) / protocol.COUNT_UNIT)
+    record["motor_turns"] = np.rint(np.array(PREMIUM_1_5.capstan) / protocol.TURN_UNIT)
+    return record
 
 
 def output_report(enable: bool, boot: int, sequence: int, watchdog_us: int, torque: list[int], answers: int) -> bytes:
-    made = protocol.blank(protocol.OUTPUT)
-    made["flags"], made["boot"], made["sequence"] = protocol.ENABLE if enable else 0, boot, sequence
-    made["watchdog_us"], made["torque"], made["answers"] = watchdog_us, torque, answers
-    return protocol.sealed(made)
+    record = protocol.blank(protocol.OUTPUT)
+    record["flags"], record["boot"], record["sequence"] = protocol.ENABLE if enable else 0, boot, sequence
+    record["watchdog_us"], record["torque"], record["answers"] = watchdog_us, torque, answers
+    return protocol.sealed(record)
 
 
 class Firmware:
@@ -83,12 +85,12 @@ class Firmware:
         self.power_up()
 
     def power_up(self, calibrated: bool = True) -> None:
-        """Power goes off and on; encoders that count from where they wake up are not calibrated then."""
+        """Switch power off and on; incremental encoders then have lost their zero (`calibrated` false)."""
         self.boot += 1
         self.sensors.time_us = 0
-        kept = calibration()
-        kept["flags"] = protocol.CALIBRATED if calibrated else 0
-        self.c.hvf_begin(self.device, identity().tobytes(), kept.tobytes(), ctypes.c_uint16(self.boot))
+        stored = calibration()
+        stored["flags"] = protocol.CALIBRATED if calibrated else 0
+        self.c.hvf_begin(self.device, identity().tobytes(), stored.tobytes(), ctypes.c_uint16(self.boot))
 
     def descriptor(self) -> bytes:
         """HID report descriptor."""
@@ -103,39 +105,39 @@ class Firmware:
         return bool(self.c.hvf_take_feature(self.device, report, len(report)))
 
     def feature(self, number: int) -> bytes:
-        room = ctypes.create_string_buffer(64)
-        size = self.c.hvf_give_feature(self.device, ctypes.c_uint8(number), room)
-        return room.raw[:size]
+        buffer = ctypes.create_string_buffer(64)
+        size = self.c.hvf_give_feature(self.device, ctypes.c_uint8(number), buffer)
+        return buffer.raw[:size]
 
     def tick(self, period: float = 1e-3) -> bytes:
-        """A period passes; the input report."""
+        """Advance by a period; returns the input report."""
         self.sensors.time_us += round(period * 1e6)
-        room = ctypes.create_string_buffer(64)
-        self.c.hvf_tick(self.device, ctypes.byref(self.sensors), room)
+        buffer = ctypes.create_string_buffer(64)
+        self.c.hvf_tick(self.device, ctypes.byref(self.sensors), buffer)
         self.c.hvf_drive(self.device, ctypes.byref(self.motors))
-        return room.raw
+        return buffer.raw
 
     def turn_to(self, angles: np.ndarray) -> None:
-        """Joint and gimbal angles (6,) [rad], as its encoders count them."""
+        """Set the encoder counts to joint and gimbal angles [rad], shape (6,)."""
         self.sensors.encoder[:] = (np.rint(angles / self.angle).astype(int) + self.zero).tolist()
 
     @property
     def joint_torque(self) -> np.ndarray:
-        """What the motors give, at the joints [N m]; zero while they are off."""
+        """Motor torques at the joints [N m]; zero while the motors are off."""
         shaft = np.array(self.motors.torque[:]) * protocol.TORQUE_UNIT if self.motors.on else np.zeros(3)
         return shaft * PREMIUM_1_5.capstan
 
 
 class FirmwareHandle:
-    """hidapi's handle, with the firmware behind it and faults to order; no time passes in it."""
+    """A handle like hidapi's with the firmware behind it; `tamper` alters its reports. No time passes in it."""
 
     def __init__(self, firmware: Firmware):
         self.firmware, self.queue, self.plugged = firmware, deque[bytes](), True
-        self.spoil: Callable[[bytes], list[bytes]] = lambda report: [report]
+        self.tamper: Callable[[bytes], list[bytes]] = lambda report: [report]
 
     def tick(self) -> None:
-        """The device goes on by a period, and its report is under way."""
-        self.queue.extend(self.spoil(self.firmware.tick()))
+        """Advance the device by a period and queue its report."""
+        self.queue.extend(self.tamper(self.firmware.tick()))
 
     def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
         if not self.plugged:

@@ -11,14 +11,14 @@ from sim.loop.channels import tick_channels
 from sim.loop.loop import Loop
 from tests.devices.rig import Rig
 from tests.sim.bare_servos import CUTOFF, bare_servo, device_world, run, simulated
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo
 from tests.sim.hardware.emulation import run as run_ticks
 
 LAP = 4.0  # s
 
 
 def simulated_follow() -> np.ndarray:
-    """Places of the stylus of the pure simulation [m], a row a tick; its force is ramped in, as a real device's is."""
+    """Stylus positions of the pure simulation [m], one row per tick; the force is ramped in as on a real device."""
     world = device_world()
     device = simulated(world)
     device.faults[FAULT_RAMP] = 0.0
@@ -27,22 +27,22 @@ def simulated_follow() -> np.ndarray:
 
 
 def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
-    """Places of the stylus of a device, whose rig is made for an exchange, and the rig."""
+    """Stylus positions of a device, and its rig, which `make_rig` makes for an exchange."""
     world = device_world()
     device = exchange(world, CUTOFF)
     rig = make_rig(device)
     blocks = []
 
-    def keep(ticks, frames, n):
+    def append_block(ticks, frames, n):
         blocks.append(tick_channels(ticks, n)["p"].copy())
 
-    Loop(bare_servo(world, device), world, keep, before_tick=rig).run(LAP)
+    Loop(bare_servo(world, device), world, append_block, before_tick=rig).run(LAP)
     return np.concatenate(blocks), rig
 
 
 def gated_follow(driver: Driver) -> dict[str, np.ndarray]:
-    """Rows of a gated servo that leads a device which goes on by a period with each command."""
-    rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **AT_ONCE)), round(LAP * 1e3), request=ARM)
+    """Rows of a gated servo that guides a device in lock-step."""
+    rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **UNRAMPED_GATE)), round(LAP * 1e3), request=ARM)
     assert not rows["fault"].any()
     return rows
 

@@ -1,4 +1,4 @@
-"""Devices behind a /dev/hidraw0 that hidapi opens as it comes: the test's side of `node_server.py`."""
+"""Devices behind a /dev/hidraw0 that an unmodified hidapi opens: the test's side of `node_server.py`."""
 
 import functools
 import json
@@ -12,7 +12,7 @@ from sim.devices.exchange import Exchange
 from sim.devices.hardware_list import open_device, open_hid
 from sim.users.hand.arm import Arm
 from tests.devices.drivers import spacemouse_rig
-from tests.devices.firmware import ROOT, Firmware, compiled
+from tests.devices.firmware import ROOT, Firmware, compile_c
 from tests.devices.rig import Linkage, Rig
 
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -25,14 +25,14 @@ def umockdev_missing() -> str:
     """Why there is no umockdev here; empty where there is one."""
     probe = "import gi; gi.require_version('UMockdev', '1.0'); from gi.repository import UMockdev"
     try:
-        told = subprocess.run([SYSTEM_PYTHON, "-c", probe], capture_output=True, timeout=30)
+        probed = subprocess.run([SYSTEM_PYTHON, "-c", probe], capture_output=True, timeout=30)
     except OSError:
         return f"no {SYSTEM_PYTHON}"
-    return "umockdev, python3-gi or gir1.2-umockdev-1.0 is not installed" if told.returncode else ""
+    return "umockdev, python3-gi or gir1.2-umockdev-1.0 is not installed" if probed.returncode else ""
 
 
-def why_not() -> str:
-    """Why nodes cannot be had in this process; empty where they can."""
+def missing_reason() -> str:
+    """Why this process cannot create nodes; empty where it can."""
     if PRELOAD not in os.environ.get("LD_PRELOAD", ""):
         return umockdev_missing() or "run by tests/devices/test_hidraw_nodes.py, which loads umockdev before"
     return ""
@@ -50,56 +50,56 @@ class HidrawNode:
     """
 
     def __init__(self, descriptor: bytes, vendor: int, product: int, name: str, serial: str = ""):
-        self._line, theirs = socket.socketpair()
+        self._socket, theirs = socket.socketpair()
         self._server = subprocess.Popen(
             [SYSTEM_PYTHON, str(Path(__file__).parent / "node_server.py"), str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
         )
         theirs.close()
-        self._text, self._written = b"", []
-        self._tell(descriptor=descriptor.hex(), vendor=vendor, product=product, name=name, serial=serial)
-        os.environ["UMOCKDEV_DIR"] = self._until("directory")
+        self._buffer, self._written = b"", []
+        self._send(descriptor=descriptor.hex(), vendor=vendor, product=product, name=name, serial=serial)
+        os.environ["UMOCKDEV_DIR"] = self._receive("directory")
 
-    def _tell(self, **said: object) -> None:
-        self._line.sendall(json.dumps(said).encode() + b"\n")
+    def _send(self, **message: object) -> None:
+        self._socket.sendall(json.dumps(message).encode() + b"\n")
 
-    def _until(self, key: str):
-        """The next answer with a key; what was written meanwhile is kept."""
+    def _receive(self, key: str):
+        """Wait for the next answer with a key; reports that were written meanwhile are collected."""
         while True:
-            while b"\n" not in self._text:
-                got = self._line.recv(65536)
-                assert got, "the node's server has ended"
-                self._text += got
-            line, self._text = self._text.split(b"\n", 1)
-            said = json.loads(line)
-            if "written" in said:
-                self._written.append(bytes.fromhex(said["written"]))
-            if key in said:
-                return said[key]
+            while b"\n" not in self._buffer:
+                chunk = self._socket.recv(65536)
+                assert chunk, "the node's server has ended"
+                self._buffer += chunk
+            line, self._buffer = self._buffer.split(b"\n", 1)
+            message = json.loads(line)
+            if "written" in message:
+                self._written.append(bytes.fromhex(message["written"]))
+            if key in message:
+                return message[key]
 
     def post(self, packet: bytes) -> None:
-        """An input report, which is there to be read when this returns."""
-        self._tell(packet=packet.hex())
-        self._until("done")
+        """Send an input report, which can be read once this returns."""
+        self._send(packet=packet.hex())
+        self._receive("done")
 
     def feature(self, number: int, report: bytes) -> None:
-        """What a feature report is answered with."""
-        self._tell(feature=[number, report.hex()])
-        self._until("done")
+        """Set the answer to requests of a feature report."""
+        self._send(feature=[number, report.hex()])
+        self._receive("done")
 
     def unplug(self) -> None:
-        self._tell(gone=True)
-        self._until("done")
+        self._send(gone=True)
+        self._receive("done")
 
     def written(self) -> list[bytes]:
         """Output and feature reports since the last call."""
-        self._tell(feature=[255, ""])  # whose answer comes behind all of them
-        self._until("done")
+        self._send(feature=[255, ""])  # answered after all of them
+        self._receive("done")
         taken, self._written = self._written, []
         return taken
 
     def close(self) -> None:
-        self._line.close()
+        self._socket.close()
         try:
             self._server.wait(10)
         except subprocess.TimeoutExpired:  # umockdev sometimes waits for a client that has gone
@@ -108,10 +108,10 @@ class HidrawNode:
 
 
 class NodeFirmware:
-    """The reference firmware on the linkage, behind a node."""
+    """The reference firmware on the simulated linkage, behind a node."""
 
     def __init__(self, folder: Path, arm: Arm | None = None, period: float = 1e-3):
-        self.firmware, self.period = Firmware(compiled(folder, ROOT / "firmware" / "hvf_hid.c")), period
+        self.firmware, self.period = Firmware(compile_c(folder, ROOT / "firmware" / "hvf_hid.c")), period
         self.linkage = Linkage(arm)
         self.node = HidrawNode(self.firmware.descriptor(), 0x16C0, 0x0486, "Reference", "HVF-0001")
         self._features()
@@ -120,20 +120,20 @@ class NodeFirmware:
         for number in (protocol.IDENTITY, protocol.CALIBRATION):
             self.node.feature(number, self.firmware.feature(number))
 
-    def tell(self) -> None:
+    def publish_reading(self) -> None:
         self.firmware.turn_to(self.linkage.angles())
         self.node.post(self.firmware.tick(self.period))
 
-    def hear(self) -> bool:
-        """Take what was written; whether there was anything."""
+    def receive_commands(self) -> bool:
+        """Pass written reports to the firmware; returns whether there were any."""
         reports = self.node.written()
         for report in reports:
             self.firmware.take(report)
         return bool(reports)
 
-    def move(self) -> None:
-        self.hear()
-        self.linkage.turn(self.firmware.joint_torque)
+    def advance(self) -> None:
+        self.receive_commands()
+        self.linkage.step(self.firmware.joint_torque)
 
     def power_up(self, calibrated: bool) -> None:
         self.firmware.power_up(calibrated)
@@ -141,23 +141,23 @@ class NodeFirmware:
 
 
 class NodeRig(Rig):
-    """A rig whose node goes when the driver is closed."""
+    """A rig whose node is removed when the driver is closed."""
 
-    def __init__(self, device: Exchange, driver, behind, node: HidrawNode):
-        super().__init__(device, driver, behind)
+    def __init__(self, device: Exchange, driver, backend, node: HidrawNode):
+        super().__init__(device, driver, backend)
         close = driver.close
 
-        def closed() -> None:
+        def close_both() -> None:
             close()
             node.close()
 
-        driver.close = closed
+        driver.close = close_both
 
 
 def node_rig(kind: str, device: Exchange, arm: Arm, folder: Path) -> Rig:
     if kind == "hid node":
-        behind = NodeFirmware(folder, arm)
-        return NodeRig(device, open_device("hid:HVF-0001"), behind, behind.node)
+        backend = NodeFirmware(folder, arm)
+        return NodeRig(device, open_device("hid:HVF-0001"), backend, backend.node)
     node = HidrawNode(SPACEMOUSE_DESCRIPTOR, 0x256F, 0xC635, "SpaceMouse Compact")
     rig = spacemouse_rig(device, open_hid("/dev/hidraw0"), node.post, "/dev/hidraw0")
-    return NodeRig(device, rig.driver, rig.behind, node)
+    return NodeRig(device, rig.driver, rig.backend, node)

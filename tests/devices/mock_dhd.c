@@ -1,4 +1,4 @@
-/* Force Dimension's DHD as far as it is used, with a device that the test poses and faults to order. */
+/* Force Dimension's DHD as far as it is used, with a device whose pose and faults the test sets. */
 #include <string.h>
 
 static struct {

@@ -1,4 +1,4 @@
-/* OpenHaptics' HDAPI as far as it is used, with a device that the test poses and faults to order.
+/* OpenHaptics' HDAPI as far as it is used, with a device whose pose and faults the test sets.
  * Its scheduler is a thread at the rate that was set, or, after mock_manual(1), whoever calls mock_tick(). */
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
@@ -20,7 +20,7 @@ static struct {
     pthread_t thread;
 } m;
 
-extern void heap_open(void) __attribute__((weak)); /* where calls of the heap are counted, those of its thread are */
+extern void heap_open(void) __attribute__((weak)); /* if heap calls are counted, those of its thread are counted too */
 
 static void fail(unsigned code) { if (m.last - m.first < 32) m.errors[m.last++ % 32] = code; }
 

@@ -1,4 +1,4 @@
-"""A /dev/hidraw0 of umockdev's, for whoever has libumockdev-preload loaded: run by the system's Python, which has gi.
+"""A /dev/hidraw0 of umockdev for processes with libumockdev-preload: run by the system's Python, which has gi.
 
 The node is a pty, so that poll() works; ioctl, read and write come here, so that packets keep their boundaries and an
 unplugged device answers as the kernel does. Lines of JSON on the socket whose file descriptor is the only argument:
@@ -26,7 +26,7 @@ SET_FEATURE, GET_FEATURE = 0x06, 0x07
 
 
 class Node(UMockdev.IoctlBase):
-    """What the kernel's hidraw does for a process that has it open."""
+    """Stands in for the kernel's hidraw towards a process that has the node open."""
 
     def __init__(self, line, descriptor: bytes, slave: int):
         super().__init__()
@@ -35,8 +35,8 @@ class Node(UMockdev.IoctlBase):
         self.features: dict[int, bytes] = {}
         self.gone = False
 
-    def tell(self, **said) -> None:
-        self.line.sendall(json.dumps(said).encode() + b"\n")
+    def send(self, **message) -> None:
+        self.line.sendall(json.dumps(message).encode() + b"\n")
 
     def do_handle_ioctl(self, client) -> bool:
         request = client.get_request()
@@ -50,12 +50,12 @@ class Node(UMockdev.IoctlBase):
             client.get_arg().resolve(0, size).update(4, self.descriptor)
             client.complete(0, 0)
         elif number == GET_FEATURE:
-            room = client.get_arg().resolve(0, size)
-            told = self.features.get(room.retrieve()[0], b"")[:size]
-            room.update(0, told)
-            client.complete(len(told) if told else -1, 0 if told else errno.EPIPE)
+            buffer = client.get_arg().resolve(0, size)
+            report = self.features.get(buffer.retrieve()[0], b"")[:size]
+            buffer.update(0, report)
+            client.complete(len(report) if report else -1, 0 if report else errno.EPIPE)
         elif number == SET_FEATURE:
-            self.tell(written=bytes(client.get_arg().resolve(0, size).retrieve()).hex())
+            self.send(written=bytes(client.get_arg().resolve(0, size).retrieve()).hex())
             client.complete(size, 0)
         else:
             client.complete(-1, errno.ENOTTY)
@@ -67,10 +67,10 @@ class Node(UMockdev.IoctlBase):
         elif not self.packets:
             client.complete(-1, errno.EAGAIN)
         else:
-            os.read(self.slave, 1)  # the mark that made poll() say so
-            room = client.get_arg()
-            packet = self.packets.popleft()[: len(room.retrieve())]
-            room.update(0, packet)
+            os.read(self.slave, 1)  # the byte that made poll() return
+            buffer = client.get_arg()
+            packet = self.packets.popleft()[: len(buffer.retrieve())]
+            buffer.update(0, packet)
             client.complete(len(packet), 0)
         return True
 
@@ -79,14 +79,14 @@ class Node(UMockdev.IoctlBase):
             client.complete(-1, errno.ENODEV)
         else:
             packet = bytes(client.get_arg().retrieve())
-            self.tell(written=packet.hex())
+            self.send(written=packet.hex())
             client.complete(len(packet), 0)
         return True
 
 
-def description(asked: dict) -> str:
-    vendor, product = asked["vendor"], asked["product"]
-    number, name, serial = f"0003:{vendor:08X}:{product:08X}", asked["name"], asked["serial"]
+def description(settings: dict) -> str:
+    vendor, product = settings["vendor"], settings["product"]
+    number, name, serial = f"0003:{vendor:08X}:{product:08X}", settings["name"], settings["serial"]
     uevent = f"HID_ID={number}\\nHID_NAME={name}\\nHID_PHYS=usb-1/input0\\nHID_UNIQ={serial}\\n"
     hid = f"0003:{vendor:04X}:{product:04X}.0001"
     return f"""P: /devices/usb1/1-1
@@ -110,7 +110,7 @@ E: HID_ID={number}
 E: HID_NAME={name}
 E: HID_UNIQ={serial}
 A: uevent={uevent}
-H: report_descriptor={asked["descriptor"].upper()}
+H: report_descriptor={settings["descriptor"].upper()}
 
 P: /devices/usb1/1-1/1-1:1.0/{hid}/hidraw/hidraw0
 N: hidraw0
@@ -124,37 +124,37 @@ L: device=../../../{hid}
 def main() -> None:
     line = socket.socket(fileno=int(sys.argv[1]))
     lines = line.makefile("r")
-    asked = json.loads(lines.readline())
+    settings = json.loads(lines.readline())
     testbed = UMockdev.Testbed.new()
-    testbed.add_from_string(description(asked))
+    testbed.add_from_string(description(settings))
     directory, mark = testbed.get_root_dir(), testbed.get_dev_fd("/dev/hidraw0")
     slave = os.open(os.readlink(f"{directory}/dev/hidraw0"), os.O_RDWR | os.O_NOCTTY)
     tty.setraw(slave)
-    node = Node(line, bytes.fromhex(asked["descriptor"]), slave)
+    node = Node(line, bytes.fromhex(settings["descriptor"]), slave)
     testbed.attach_ioctl("/dev/hidraw0", node)
     loop = GLib.MainLoop()
 
-    def obey(said: dict) -> None:
-        if "packet" in said:
-            node.packets.append(bytes.fromhex(said["packet"]))
+    def handle_message(message: dict) -> None:
+        if "packet" in message:
+            node.packets.append(bytes.fromhex(message["packet"]))
             os.write(mark, b".")
-        elif "feature" in said:
-            node.features[said["feature"][0]] = bytes.fromhex(said["feature"][1])
+        elif "feature" in message:
+            node.features[message["feature"][0]] = bytes.fromhex(message["feature"][1])
         else:
             node.gone = True
-            os.close(mark)  # a poll() that waits sees a hang-up, as it does on unplug
-        node.tell(done=True)
+            os.close(mark)  # a waiting poll() sees a hang-up, as on unplug
+        node.send(done=True)
 
     def serve() -> None:
         try:
-            for said in map(json.loads, lines):
-                obey(said)
+            for message in map(json.loads, lines):
+                handle_message(message)
         except ConnectionError:
             pass  # the test has ended
         finally:
             GLib.idle_add(loop.quit)  # by the loop itself, which may not have begun yet
 
-    node.tell(directory=directory)
+    node.send(directory=directory)
     threading.Thread(target=serve, daemon=True).start()
     loop.run()
 

@@ -1,4 +1,4 @@
-"""A device's driver in the loop: what stands behind its arrays is the linkage in MuJoCo, in lock-step."""
+"""A device's driver in the loop, in lock-step with a simulated linkage behind it."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -17,7 +17,7 @@ from tests.sim.bare_servos import START, device_world, pass_period, simulated
 
 
 class Linkage:
-    """The Phantom in MuJoCo with a hand on it: true angles, and torques that somebody sets."""
+    """The Phantom in MuJoCo with a hand on it: gives true angles, takes joint torques."""
 
     def __init__(self, arm: Arm | None = None, start: np.ndarray = START):
         self.world = device_world(start=start)
@@ -30,8 +30,8 @@ class Linkage:
         port = self.phantom.port
         return port.qpos[[*port.arm_q, *port.gimbal_q]]
 
-    def turn(self, torque: np.ndarray) -> None:
-        """A period passes under these torques of the joints."""
+    def step(self, torque: np.ndarray) -> None:
+        """Advance by a period under these joint torques."""
         self.plant.ctrl[list(self.phantom.port.motor)] = torque
         pass_period(self.plant, self.phantom.port, self.phantom.user, self.ticks * self.plant.period, self._applied)
         self.ticks += 1
@@ -48,44 +48,44 @@ class HeldLinkage:
         self._device.read(reading, 0.0)
         return reading[READING_THETA:]
 
-    def turn(self, torque: np.ndarray) -> None:
+    def step(self, torque: np.ndarray) -> None:
         self._device.write(torque, bool(torque.any()))
 
 
-class Behind(Protocol):
-    """The real side of a device."""
+class DeviceBackend(Protocol):
+    """The simulated hardware behind a driver."""
 
-    def tell(self) -> None:
-        """A period begins: a reading is under way."""
+    def publish_reading(self) -> None:
+        """Begin a period: send a reading."""
         ...
 
-    def move(self) -> None:
-        """The period passes under whatever was commanded."""
+    def advance(self) -> None:
+        """End the period: move under the last command."""
         ...
 
 
 class LockStep:
-    """A driver whose device goes on by a period with each command, for a servo without a clock."""
+    """A driver whose device advances by a period with each command, for a servo without a clock."""
 
-    def __init__(self, driver: Driver, behind: Behind):
-        self.driver, self.behind, self.telemetry, self._told = driver, behind, driver.telemetry, False
+    def __init__(self, driver: Driver, backend: DeviceBackend):
+        self.driver, self.backend, self.telemetry, self._published = driver, backend, driver.telemetry, False
 
     @property
     def identity(self) -> DeviceIdentity:
         return self.driver.identity
 
     def read(self, reading: np.ndarray, timeout: float) -> bool:
-        if not self._told:
-            self.behind.tell()
-            self._told = True
+        if not self._published:
+            self.backend.publish_reading()
+            self._published = True
         return self.driver.read(reading, timeout)
 
     def write(self, torque: np.ndarray, enable: bool) -> None:
         try:
             self.driver.write(torque, enable)
         finally:
-            self.behind.move()
-            self._told = False
+            self.backend.advance()
+            self._published = False
 
     def let_go(self) -> None:
         self.driver.let_go()
@@ -94,25 +94,25 @@ class LockStep:
         self.driver.close()
 
 
-class FirmwareBehind:
-    """The reference firmware on the linkage."""
+class FirmwareBackend:
+    """The reference firmware on the simulated linkage."""
 
     def __init__(self, firmware: Firmware, handle: FirmwareHandle, linkage: Linkage):
         self.firmware, self.handle, self.linkage = firmware, handle, linkage
 
-    def tell(self) -> None:
+    def publish_reading(self) -> None:
         self.firmware.turn_to(self.linkage.angles())
         self.handle.tick()
 
-    def move(self) -> None:
-        self.linkage.turn(self.firmware.joint_torque)
+    def advance(self) -> None:
+        self.linkage.step(self.firmware.joint_torque)
 
 
 class Rig:
     """Called before each tick: sends the last command, and reads; a fault of the driver is latched in the device."""
 
-    def __init__(self, device: Exchange, driver: Driver, behind: Behind, period: float = 1e-3):
-        self.device, self.driver, self.behind, self.period = device, driver, behind, period
+    def __init__(self, device: Exchange, driver: Driver, backend: DeviceBackend, period: float = 1e-3):
+        self.device, self.driver, self.backend, self.period = device, driver, backend, period
 
     def send(self) -> None:
         command = self.device.command
@@ -121,13 +121,13 @@ class Rig:
     def __call__(self, tick: int) -> None:
         if tick > 0:
             self._guarded(self.send, tick)
-            self.behind.move()
-        self.behind.tell()
+            self.backend.advance()
+        self.backend.publish_reading()
         self._guarded(lambda: self.driver.read(self.device.reading, 0.0), tick)
 
-    def _guarded(self, do: Callable[[], object], tick: int) -> None:
+    def _guarded(self, action: Callable[[], object], tick: int) -> None:
         try:
-            do()
+            action()
         except DriverFault as fault:
             latch(self.device.faults, int(fault.fault), tick * self.period, fault.value)
             self.driver.let_go()

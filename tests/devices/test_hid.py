@@ -1,4 +1,4 @@
-"""The HID driver on the reference firmware: what is read, what is sent, and what is measured on the way."""
+"""The HID driver on the reference firmware: readings, commands, and measurements of the link."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle, output_report
 from tests.devices.follow import device_follow, gated_follow, rms, simulated_follow
-from tests.devices.rig import FirmwareBehind, Linkage, LockStep, Rig
+from tests.devices.rig import FirmwareBackend, Linkage, LockStep, Rig
 
 POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
 
 
 class Clock:
-    """Seconds that pass when told so."""
+    """A clock that the test sets."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -37,11 +37,13 @@ def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
     return HidPhantom(handle, "in memory", clock)
 
 
-def test_a_device_says_who_it_is(driver: HidPhantom, firmware: Firmware) -> None:
+def test_identity_is_read_from_the_device(driver: HidPhantom, firmware: Firmware) -> None:
     assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot, False)
 
 
-def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
+def test_joint_angles_are_read_to_half_an_encoder_count(
+    driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware
+) -> None:
     firmware.turn_to(POSE)
     firmware.sensors.pressed = 1
     handle.tick()
@@ -54,10 +56,10 @@ def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: Firmw
     handle.tick()
     handle.tick()
     assert driver.read(reading, 0.0)
-    np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest
+    np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest report
 
 
-def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver, handle, firmware) -> None:
+def test_joint_torques_reach_the_shafts_within_rounding(driver, handle, firmware) -> None:
     rng = np.random.default_rng(4)
     for _ in range(200):
         torque = rng.uniform(-1.0, 1.0, 3) * PREMIUM_1_5.peak_torque
@@ -69,9 +71,7 @@ def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver
     assert not firmware.joint_torque.any()
 
 
-def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finite_lets_go(
-    driver, handle, firmware
-) -> None:
+def test_torque_is_limited_to_peak_and_not_finite_torque_switches_off(driver, handle, firmware) -> None:
     rng = np.random.default_rng(5)
     bad = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, 0.0]
     for _ in range(500):
@@ -88,9 +88,9 @@ def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finit
             assert not firmware.motors.on
 
 
-def test_temperatures_round_trip_loss_jitter_and_staleness_are_told(driver, handle, firmware, clock) -> None:
-    reading, told = np.zeros(9), driver.telemetry
-    assert np.isnan(told[ROUND_TRIP])
+def test_telemetry_measures_temperature_round_trip_loss_jitter_and_staleness(driver, handle, firmware, clock) -> None:
+    reading, telemetry = np.zeros(9), driver.telemetry
+    assert np.isnan(telemetry[ROUND_TRIP])
     for k in range(202):
         driver.write(np.zeros(3), True)
         clock.now += 0.4e-3
@@ -100,14 +100,14 @@ def test_temperatures_round_trip_loss_jitter_and_staleness_are_told(driver, hand
         clock.now += 0.6e-3 + (0.3e-3 if k % 2 else 0.0)
         driver.read(reading, 0.0)
         clock.now -= 0.3e-3 if k % 2 else 0.0
-    np.testing.assert_array_equal(told[TEMPERATURE : TEMPERATURE + 3], [30.0, 31.0, np.nan])
-    assert (told[READ], told[BAD], told[LOST]) == (192.0, 0.0, 10.0)
-    assert told[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, for one of which the device held it
-    assert told[JITTER] == pytest.approx(0.3e-3, rel=0.2)
-    assert told[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
+    np.testing.assert_array_equal(telemetry[TEMPERATURE : TEMPERATURE + 3], [30.0, 31.0, np.nan])
+    assert (telemetry[READ], telemetry[BAD], telemetry[LOST]) == (192.0, 0.0, 10.0)
+    assert telemetry[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, of which the device held it for 1 ms
+    assert telemetry[JITTER] == pytest.approx(0.3e-3, rel=0.2)
+    assert telemetry[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
 
 
-def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
+def test_calibration_is_stored_in_the_device(driver, handle, firmware) -> None:
     firmware.turn_to(POSE)
     handle.tick()
     driver.calibrate(np.array([0.0, 0.1, -0.1]), np.zeros(3))
@@ -115,36 +115,34 @@ def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
     reading = np.zeros(9)
     driver.read(reading, 0.0)
     np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
-    again = HidPhantom(handle, "in memory")
+    reopened = HidPhantom(handle, "in memory")
     handle.tick()
-    again.read(reading, 0.0)
+    reopened.read(reading, 0.0)
     np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
 
 
-def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_reading_on(handle, firmware, driver) -> None:
-    """The firmware takes no number twice; where the last program stopped, the device tells."""
+def test_commands_are_accepted_from_the_first_reading_after_a_previous_session(handle, firmware, driver) -> None:
+    """The firmware accepts no number twice; it reports the last one that an earlier program sent."""
     reading, torque = np.zeros(9), np.array([0.1, -0.1, 0.1])
     for _ in range(500):
         driver.write(torque, True)
         handle.tick()
         driver.read(reading, 0.0)
     for _ in range(20):
-        handle.tick()  # it was killed: the firmware switched off
+        handle.tick()  # the earlier program was killed, and the firmware switched off
     handle.queue.clear()
-    again = HidPhantom(handle, "in memory")
+    reopened = HidPhantom(handle, "in memory")
     handle.tick()
-    assert again.read(reading, 0.0)
+    assert reopened.read(reading, 0.0)
     for _ in range(2):
-        again.write(torque, True)
+        reopened.write(torque, True)
         handle.tick()
-        assert again.read(reading, 0.0)
+        assert reopened.read(reading, 0.0)
     np.testing.assert_allclose(firmware.joint_torque, torque, atol=13.3e-6)
 
 
 @pytest.mark.parametrize("calibrated", [True, False])
-def test_a_device_that_began_again_goes_on_only_if_it_still_knows_its_zero(
-    driver, handle, firmware, calibrated
-) -> None:
+def test_reset_device_continues_only_if_it_kept_its_zero(driver, handle, firmware, calibrated) -> None:
     reading = np.zeros(9)
     handle.tick()
     assert driver.read(reading, 0.0)
@@ -160,8 +158,8 @@ def test_a_device_that_began_again_goes_on_only_if_it_still_knows_its_zero(
     assert driver.identity.calibrated == calibrated
 
 
-def driven(driver: HidPhantom, handle: FirmwareHandle, clock: Clock, ticks: int) -> None:
-    """Told to push, tick by tick, and read."""
+def push_and_read(driver: HidPhantom, handle: FirmwareHandle, clock: Clock, ticks: int) -> None:
+    """Command a torque and read, tick by tick."""
     for _ in range(ticks):
         driver.write(np.array([0.1, 0.0, 0.0]), True)
         clock.now += 1e-3
@@ -169,34 +167,34 @@ def driven(driver: HidPhantom, handle: FirmwareHandle, clock: Clock, ticks: int)
         driver.read(np.zeros(9), 0.0)
 
 
-def test_where_numbers_wrap_commands_are_heard_and_missed_as_before(handle, firmware, clock) -> None:
+def test_commands_are_accepted_and_missed_ones_detected_where_numbers_wrap(handle, firmware, clock) -> None:
     for number in (2**31 - 1, 2**32 - 6):
         assert firmware.take(output_report(False, firmware.boot, number, 10_000, [0, 0, 0], 0))
     handle.tick()
     driver = HidPhantom(handle, "in memory", clock)
     driver.read(np.zeros(9), 0.0)
-    driven(driver, handle, clock, 40)
+    push_and_read(driver, handle, clock, 40)
     assert firmware.motors.on
-    assert driver.telemetry[ROUND_TRIP] == pytest.approx(0.0, abs=1e-9)  # the device held it all the time
+    assert driver.telemetry[ROUND_TRIP] == pytest.approx(0.0, abs=1e-9)  # the device held the report the whole time
     handle.write = lambda buff: len(buff)
     with pytest.raises(DriverFault) as lost:
-        driven(driver, handle, clock, 40)
+        push_and_read(driver, handle, clock, 40)
     assert lost.value.fault is Fault.DEVICE_REPORTED
 
 
-def test_motors_that_do_not_come_on_are_a_fault(handle, firmware, clock) -> None:
+def test_motors_that_stay_off_are_a_fault(handle, firmware, clock) -> None:
     handle.tick()
     driver = HidPhantom(handle, "in memory", clock)
     driver.read(np.zeros(9), 0.0)
-    handle.write = lambda buff: len(buff)  # nothing arrives, from the first command on
+    handle.write = lambda buff: len(buff)  # no command arrives
     with pytest.raises(DriverFault, match=r"left its motors off for 0\.01") as off:
-        driven(driver, handle, clock, 40)
+        push_and_read(driver, handle, clock, 40)
     assert off.value.fault is Fault.MOTORS_OFF
     assert not firmware.motors.on
 
 
 @pytest.mark.parametrize("angle", [np.nan, np.inf, 1e30])
-def test_a_calibration_that_no_counts_can_hold_is_refused_and_not_sent(driver, handle, firmware, angle) -> None:
+def test_calibration_beyond_32_bit_counts_is_refused_and_not_sent(driver, handle, firmware, angle) -> None:
     handle.tick()
     before = firmware.feature(protocol.CALIBRATION)
     with pytest.raises(SimError, match="expected numbers of 32 bits"):
@@ -204,23 +202,23 @@ def test_a_calibration_that_no_counts_can_hold_is_refused_and_not_sent(driver, h
     assert firmware.feature(protocol.CALIBRATION) == before
 
 
-def test_a_device_without_a_peak_torque_has_no_motors_and_one_whose_watchdog_has_no_time_has_none(handle) -> None:
-    other_feature(protocol.IDENTITY, peak_torque=0)(handle)
+def test_device_without_peak_torque_or_watchdog_time_reports_no_motors_or_watchdog(handle) -> None:
+    with_altered_feature(protocol.IDENTITY, peak_torque=0)(handle)
     assert not HidPhantom(handle, "x").identity.forces
-    other_feature(protocol.IDENTITY, watchdog_max_us=0)(handle)
+    with_altered_feature(protocol.IDENTITY, watchdog_max_us=0)(handle)
     assert not HidPhantom(handle, "x").identity.watchdog
 
 
-def test_a_calibration_without_a_reading_is_refused(driver) -> None:
+def test_calibration_without_a_reading_is_refused(driver) -> None:
     with pytest.raises(SimError, match="nothing to calibrate"):
         driver.calibrate(np.zeros(3), np.zeros(3))
 
 
-def other_feature(number: int, **changed):
+def with_altered_feature(number: int, **changed):
     def feature(handle: FirmwareHandle) -> None:
         genuine = handle.get_feature_report
 
-        def told(report_num: int, max_length: int) -> list[int]:
+        def telemetry(report_num: int, max_length: int) -> list[int]:
             raw = bytes(genuine(report_num, max_length))
             if report_num != number:
                 return list(raw)
@@ -229,41 +227,41 @@ def other_feature(number: int, **changed):
                 record[name] = value
             return list(protocol.sealed(record))
 
-        handle.get_feature_report = told
+        handle.get_feature_report = telemetry
 
     return feature
 
 
-def test_another_major_version_is_a_fault_and_another_minor_one_is_not(handle: FirmwareHandle) -> None:
-    other_feature(protocol.IDENTITY, minor=9)(handle)
+def test_other_major_version_is_a_fault_and_other_minor_version_is_not(handle: FirmwareHandle) -> None:
+    with_altered_feature(protocol.IDENTITY, minor=9)(handle)
     HidPhantom(handle, "x")
-    other_feature(protocol.IDENTITY, major=2)(handle)
+    with_altered_feature(protocol.IDENTITY, major=2)(handle)
     with pytest.raises(DriverFault, match="speaks major version 2 of") as refused:
         HidPhantom(handle, "x")
     assert refused.value.fault is Fault.VERSION_WRONG
 
 
 @pytest.mark.parametrize(
-    ("number", "changed", "says"),
+    ("number", "changed", "message"),
     [(protocol.IDENTITY, {"magic": 5}, "the mark 0x5; expected 0x31465648"),
      (protocol.CALIBRATION, {"counts_per_turn": 0}, "expected none to be 0")],
 )  # fmt: skip
-def test_a_device_that_is_another_or_has_no_scale_is_refused(handle, number, changed, says) -> None:
-    other_feature(number, **changed)(handle)
-    with pytest.raises(SimError, match=says):
+def test_device_with_wrong_magic_or_zero_scale_is_refused(handle, number, changed, message) -> None:
+    with_altered_feature(number, **changed)(handle)
+    with pytest.raises(SimError, match=message):
         HidPhantom(handle, "x")
 
 
 @pytest.mark.slow
-def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
-    places, rig = device_follow(
-        lambda device: Rig(device, HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+def test_follow_through_firmware_matches_simulation_within_1_mm(handle, firmware) -> None:
+    positions, rig = device_follow(
+        lambda device: Rig(device, HidPhantom(handle, "in memory"), FirmwareBackend(firmware, handle, Linkage()))
     )
     assert rig.fault == Fault.NONE
-    assert rms(places, simulated_follow()) < 1e-3
+    assert rms(positions, simulated_follow()) < 1e-3
 
 
 @pytest.mark.slow
-def test_follow_through_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
-    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+def test_follow_through_firmware_and_gate_matches_simulation_within_1_mm(handle, firmware) -> None:
+    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBackend(firmware, handle, Linkage()))
     assert rms(gated_follow(driver)["p"], simulated_follow()) < 1e-3

@@ -1,4 +1,4 @@
-"""One description of the reports, in Python and in C; and what the firmware promises by itself."""
+"""The reports have the same layout in Python and in C; and guarantees of the firmware alone."""
 
 import subprocess
 import zlib
@@ -25,7 +25,7 @@ from sim.devices.hid_reports import (
     make_command,
 )
 from sim.errors import SimError
-from tests.devices.firmware import ROOT, Firmware, compiled, output_report
+from tests.devices.firmware import ROOT, Firmware, compile_c, output_report
 from tests.devices.rig import Linkage
 
 STRUCTS = {
@@ -34,33 +34,33 @@ STRUCTS = {
 }  # fmt: skip
 
 
-def printed(folder: Path, lines: list[str]) -> str:
-    """What C prints that knows the header."""
+def c_output(folder: Path, lines: list[str]) -> str:
+    """Output of a C program that includes the header and runs these statements."""
     source = folder / "printed.c"
     body = "\n".join(lines)
     head = f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\n'
     source.write_text(head + f"int main(void) {{\n{body}\nreturn 0;\n}}\n")
-    return subprocess.run([compiled(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
+    return subprocess.run([compile_c(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
 
 
 def output(
     firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other
 ):
-    made = protocol.blank(protocol.OUTPUT)
-    made["flags"], made["boot"], made["sequence"] = int(enable), firmware.boot, sequence
-    made["watchdog_us"], made["torque"] = watchdog_us, torque
+    report = protocol.blank(protocol.OUTPUT)
+    report["flags"], report["boot"], report["sequence"] = int(enable), firmware.boot, sequence
+    report["watchdog_us"], report["torque"] = watchdog_us, torque
     for name, value in other.items():
-        made[name] = value
-    return protocol.sealed(made)
+        report[name] = value
+    return protocol.sealed(report)
 
 
-def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
+def test_c_and_python_field_offsets_and_sizes_agree(tmp_path: Path) -> None:
     lines = [
         f'printf("{struct} {name} %zu %zu\\n", offsetof({struct}, {name}), sizeof((({struct} *)0)->{name}));'
         for struct, layout in STRUCTS.items()
         for name in layout.names
     ]
-    io = printed(tmp_path, lines)
+    io = c_output(tmp_path, lines)
     expected = [
         f"{struct} {name} {layout.fields[name][1]} {layout.fields[name][0].itemsize}"
         for struct, layout in STRUCTS.items()
@@ -70,7 +70,7 @@ def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
     assert all(layout.itemsize == protocol.REPORT_SIZE for layout in STRUCTS.values())
 
 
-def test_reports_that_compiled_code_takes_apart_and_puts_together_are_those_of_the_layout() -> None:
+def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
     rng, hid = np.random.default_rng(9), HidMemory.fresh(fresh_telemetry())
     hid.angle[:], hid.turns[:], hid.peak[:] = 1.0, 1.0, 1e4
     for k in range(100):
@@ -90,13 +90,13 @@ def test_reports_that_compiled_code_takes_apart_and_puts_together_are_those_of_t
         hid.torque[:], hid.io[IO_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
         hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
         make_command(hid)
-        made = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
-        assert made["torque"].tolist() == torque.tolist()
+        report = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
+        assert report["torque"].tolist() == torque.tolist()
         fields = ("flags", "boot", "sequence", "watchdog_us", "answers")
-        assert [int(made[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
+        assert [int(report[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
 
 
-def test_constants_are_the_header_s(tmp_path: Path) -> None:
+def test_constants_equal_those_of_the_c_header(tmp_path: Path) -> None:
     pairs = {
         "HVF_VERSION_MAJOR": protocol.VERSION[0], "HVF_VERSION_MINOR": protocol.VERSION[1], "HVF_MAGIC": protocol.MAGIC,
         "HVF_STATUS_ENABLED": protocol.STATUS_ENABLED, "HVF_STATUS_CALIBRATED": protocol.STATUS_CALIBRATED,
@@ -109,11 +109,11 @@ def test_constants_are_the_header_s(tmp_path: Path) -> None:
         "HVF_CALIBRATION": protocol.CALIBRATION, "HVF_SWITCH": protocol.SWITCH, "HVF_ENABLE": protocol.ENABLE,
         "HVF_CALIBRATED": protocol.CALIBRATED,
     }  # fmt: skip
-    io = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
+    io = c_output(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
     assert [int(line) for line in io.split()] == list(pairs.values())
 
 
-def test_the_checksum_is_crc_32_of_ethernet_in_both(firmware: Firmware) -> None:
+def test_c_and_python_checksums_are_ethernet_crc_32(firmware: Firmware) -> None:
     crc = firmware.c.hvf_crc32
     crc.restype = __import__("ctypes").c_uint32
     assert crc(b"123456789", 9) == 0xCBF43926 == zlib.crc32(b"123456789")  # the check value of its catalogue entry
@@ -123,7 +123,7 @@ def test_the_checksum_is_crc_32_of_ethernet_in_both(firmware: Firmware) -> None:
         assert crc(data, n) == zlib.crc32(data)
 
 
-def test_no_report_with_up_to_four_wrong_bits_or_a_burst_of_32_is_taken() -> None:
+def test_reports_with_four_wrong_bits_or_a_32_bit_burst_are_rejected() -> None:
     rng = np.random.default_rng(2)
     report = protocol.sealed(protocol.blank(protocol.INPUT))
     for _ in range(5000):
@@ -136,13 +136,13 @@ def test_no_report_with_up_to_four_wrong_bits_or_a_burst_of_32_is_taken() -> Non
         assert not protocol.is_sound(np.packbits(bits, bitorder="little").tobytes())
 
 
-def test_a_feature_report_that_is_none_is_refused_with_what_came() -> None:
+def test_malformed_feature_report_error_names_size_and_number() -> None:
     with pytest.raises(SimError, match=r"has 3 bytes and number 9; expected 64"):
         protocol.unsealed(b"\x09\x00\x00", protocol.IDENTITY)
 
 
-def test_the_reference_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> None:
-    """The main program with a board of nothing: a thousand periods, and the last report is sound."""
+def test_reference_main_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> None:
+    """The main program with an empty board runs a thousand periods, and its last report is sound."""
     board = tmp_path / "board.c"
     board.write_text(f"""#include <stdio.h>
 #include "{ROOT}/firmware/phantom_board.h"
@@ -156,7 +156,7 @@ size_t board_receive(uint8_t *b, size_t n) {{ (void)b; (void)n; return 0; }}
 void board_send(const hvf_input *r) {{ last = *r; if (now == 1000000) fwrite(&last, 1, sizeof last, stdout); }}
 void board_feed_hardware_watchdog(void) {{}}
 """)
-    program = compiled(
+    program = compile_c(
         tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True
     )
     raw = subprocess.run([program], capture_output=True, check=True).stdout
@@ -165,7 +165,7 @@ void board_feed_hardware_watchdog(void) {{}}
     assert (report["sequence"], report["time_us"], report["encoder"][1], report["boot"]) == (1000, 10**6, 10**6, 7)
 
 
-def test_the_firmware_switches_off_when_commands_stay_out_and_stays_off_until_told_so(firmware: Firmware) -> None:
+def test_firmware_watchdog_switches_off_until_disabled_and_enabled_again(firmware: Firmware) -> None:
     assert firmware.take(output(firmware, 1))
     firmware.tick()
     assert firmware.motors.on
@@ -186,7 +186,7 @@ def test_the_firmware_switches_off_when_commands_stay_out_and_stays_off_until_to
 
 
 @pytest.mark.parametrize(
-    "spoiled",
+    "corrupted",
     [
         lambda f: output(f, 1)[:-1],
         lambda f: output(f, 1) + b"\0",
@@ -197,8 +197,8 @@ def test_the_firmware_switches_off_when_commands_stay_out_and_stays_off_until_to
     ],
     ids=["short", "long", "bit", "of another power-up", "no watchdog", "too slow a watchdog"],
 )
-def test_the_firmware_refuses_a_command_that_is_not_sound_and_does_not_count_it_as_heard(firmware, spoiled) -> None:
-    assert not firmware.take(spoiled(firmware))
+def test_firmware_refuses_unsound_commands_and_counts_them(firmware, corrupted) -> None:
+    assert not firmware.take(corrupted(firmware))
     report = np.frombuffer(firmware.tick(), protocol.INPUT_REPORT)[0]
     assert not firmware.motors.on
     assert report["refused"] == 1
@@ -206,13 +206,13 @@ def test_the_firmware_refuses_a_command_that_is_not_sound_and_does_not_count_it_
     assert firmware.take(output(firmware, 1))
 
 
-def test_the_firmware_takes_each_command_once_and_none_out_of_order_also_where_numbers_wrap(firmware: Firmware) -> None:
+def test_firmware_accepts_each_command_number_once_and_in_order_across_wraparound(firmware: Firmware) -> None:
     assert firmware.take(output(firmware, 2**32 - 2))
     for number, taken in [(2**32 - 2, False), (2**32 - 3, False), (2**32 - 1, True), (0, True), (2**32 - 1, False)]:
         assert firmware.take(output(firmware, number)) is taken
 
 
-def test_no_command_makes_the_firmware_exceed_the_peak_torque_or_drive_a_hot_motor(firmware: Firmware) -> None:
+def test_firmware_never_exceeds_peak_torque_nor_drives_a_hot_motor(firmware: Firmware) -> None:
     rng = np.random.default_rng(3)
     limit = round(PREMIUM_1_5.stall_motor_torque * 1e6)
     for k in range(1, 500):
@@ -225,7 +225,7 @@ def test_no_command_makes_the_firmware_exceed_the_peak_torque_or_drive_a_hot_mot
             assert not firmware.motors.on
 
 
-def test_a_motor_that_was_too_hot_has_to_cool_by_five_degrees_before_it_is_driven_again(firmware: Firmware) -> None:
+def test_hot_motor_has_to_cool_by_five_degrees_before_it_is_driven(firmware: Firmware) -> None:
     def driven(k: int, hundredths: int) -> bool:
         firmware.sensors.temperature[0] = hundredths
         firmware.tick()
@@ -239,8 +239,8 @@ def test_a_motor_that_was_too_hot_has_to_cool_by_five_degrees_before_it_is_drive
     ]  # fmt: skip
 
 
-def of_the_page(report: int) -> bytes:
-    """The example of a report in the protocol's page."""
+def documented_bytes(report: int) -> bytes:
+    """The example of a report on the protocol's documentation page."""
     page = (ROOT / "docs" / "reference" / "hid-protocol.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.splitlines() if line.startswith(f"{report:02x} ") and set(line) <= set(HEX)]
     return bytes.fromhex(line)
@@ -249,16 +249,16 @@ def of_the_page(report: int) -> bytes:
 HEX = "0123456789abcdef "
 
 
-def test_the_page_s_bytes_are_those_of_the_firmware_and_of_the_driver(firmware: Firmware) -> None:
+def test_documented_bytes_equal_those_of_firmware_and_driver(firmware: Firmware) -> None:
     """Units and signs, number by number: 1, −2, 3 mN m; 1000, −2000, 3000, 0, 100, −100 counts; 30 and 31 °C."""
-    command = of_the_page(protocol.OUTPUT)
+    command = documented_bytes(protocol.OUTPUT)
     assert command == output_report(True, 1, 7, 10_000, [1000, -2000, 3000], 42)
     assert firmware.take(command)
     np.testing.assert_allclose(firmware.joint_torque, np.array([1e-3, -2e-3, 3e-3]) * PREMIUM_1_5.capstan, rtol=1e-12)
     firmware.sensors.encoder[:] = [1000, -2000, 3000, 0, 100, -100]
     firmware.sensors.pressed = 1
     io = firmware.tick()
-    assert io == of_the_page(protocol.INPUT)
+    assert io == documented_bytes(protocol.INPUT)
     report = np.frombuffer(io, protocol.INPUT_REPORT)[0]
     fields = ("flags", "status", "sequence", "time_us", "boot", "answered", "held_us", "refused")
     assert [int(report[name]) for name in fields] == [1, 3, 1, 1000, 1, 7, 1000, 0]
@@ -267,14 +267,14 @@ def test_the_page_s_bytes_are_those_of_the_firmware_and_of_the_driver(firmware: 
 
 
 @pytest.mark.parametrize("joint", range(3))
-def test_a_positive_torque_in_the_bytes_turns_its_joint_so_that_its_encoder_counts_up(firmware, joint: int) -> None:
+def test_positive_torque_makes_its_encoder_count_up(firmware, joint: int) -> None:
     def counts(torque: int) -> np.ndarray:
         firmware.power_up()
         linkage, k = Linkage(), 0
         for k in range(30):
             shafts = [torque * (i == joint) for i in range(3)]
             assert firmware.take(output_report(True, firmware.boot, k + 1, 10_000, shafts, 0))
-            linkage.turn(firmware.joint_torque)
+            linkage.step(firmware.joint_torque)
             firmware.turn_to(linkage.angles())
             firmware.tick()
         return np.array(firmware.sensors.encoder[:3])

@@ -1,4 +1,4 @@
-"""What goes through /dev/hidraw0 and hidapi as it comes, in a process that has umockdev loaded before all else."""
+"""Tests through /dev/hidraw0 and an unmodified hidapi, in a process with umockdev preloaded."""
 
 import os
 import subprocess
@@ -12,30 +12,30 @@ from tests.devices.hidraw_node import PRELOAD, umockdev_missing
 INNER = "HVF_INNER"
 
 
-def inside(*arguments: str, seconds: float = 240.0) -> str:
-    """Pytest's output in a process with umockdev; the test is skipped where there is none."""
+def run_with_umockdev(*arguments: str, seconds: float = 240.0) -> str:
+    """Run pytest in a process with umockdev and return its output; the test is skipped where there is none."""
     if os.environ.get(INNER):
         pytest.skip("this is the process")
     if umockdev_missing() or COMPILER is None:
         pytest.skip(umockdev_missing() or "no C compiler")
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-m", "pytest", "-o", "addopts=", "-p", "no:cacheprovider", *arguments],
         cwd=ROOT, env=os.environ | {"LD_PRELOAD": PRELOAD, INNER: "1"}, capture_output=True, text=True, timeout=seconds,
     )  # fmt: skip
-    assert told.returncode == 0, told.stdout[-6000:] + told.stderr[-2000:]
-    return told.stdout
+    assert result.returncode == 0, result.stdout[-6000:] + result.stderr[-2000:]
+    return result.stdout
 
 
 @pytest.mark.slow
-def test_the_contract_of_a_device_holds_for_hid_and_spacemouse_through_their_nodes() -> None:
-    assert "18 passed" in inside("tests/contract/test_device_contract.py", "-k", "node")
+def test_device_contract_holds_for_hid_and_spacemouse_through_nodes() -> None:
+    assert "18 passed" in run_with_umockdev("tests/contract/test_device_contract.py", "-k", "node")
 
 
 @pytest.mark.slow
-def test_the_driver_the_list_and_the_doctor_see_a_real_node() -> None:
-    assert "15 passed" in inside("tests/devices/inside_umockdev.py", "-k", "not command_line")
+def test_driver_device_list_and_doctor_work_on_a_node() -> None:
+    assert "15 passed" in run_with_umockdev("tests/devices/inside_umockdev.py", "-k", "not command_line")
 
 
 @pytest.mark.processes
-def test_a_device_behind_a_real_node_is_certified_and_run_from_the_command_line() -> None:
-    assert "1 passed" in inside("tests/devices/inside_umockdev.py", "-k", "command_line", seconds=600.0)
+def test_device_behind_a_node_is_certified_and_run_from_the_command_line() -> None:
+    assert "1 passed" in run_with_umockdev("tests/devices/inside_umockdev.py", "-k", "command_line", seconds=600.0)

@@ -1,4 +1,4 @@
-"""A device of one's own: a class in a file."""
+"""A user-defined device: a class in a file."""
 
 from pathlib import Path
 
@@ -17,14 +17,14 @@ from tests.devices.own_tip import LinkageTip
 from tests.devices.rig import Linkage, Rig
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "own_device.py"
-HERE = np.array([0.01, -0.02, 0.03])
+POSITION = np.array([0.01, -0.02, 0.03])
 
 
 class Scripted(TipDevice):
-    """Reads what it is told, and keeps what it is given; None is a release."""
+    """Returns a given pose (or raises it), and records the forces written to it; None is a release."""
 
     def __init__(self, pose=None):
-        self.pose, self.given = pose, []
+        self.pose, self.written = pose, []
 
     def read(self):
         if isinstance(self.pose, Exception):
@@ -32,24 +32,26 @@ class Scripted(TipDevice):
         return self.pose
 
     def write(self, force):
-        self.given.append(force)
+        self.written.append(force)
 
     def release(self):
-        self.given.append(None)
+        self.written.append(None)
 
 
-def test_the_tip_is_read_in_the_hand_frame_with_its_switch_and_a_number() -> None:
-    driver, reading = TipDriver(Scripted(TipPose(HERE, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
+def test_tip_is_read_in_the_hand_frame_with_switch_and_sequence_number() -> None:
+    driver, reading = TipDriver(Scripted(TipPose(POSITION, pressed=True)), "here", clock=lambda: 5.0), np.zeros(9)
     assert driver.read(reading, 0.0)
-    np.testing.assert_allclose(forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(HERE)), atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(tuple(reading[3:6])), vector_to_device_frame(tuple(POSITION)), atol=1e-12
+    )
     np.testing.assert_array_equal(reading[:3], [1.0, 5.0, 1.0])
     assert driver.telemetry[READ] == 1.0
     driver = TipDriver(Scripted(), "here")
     assert not driver.read(reading, 0.0)
 
 
-def test_the_force_is_the_field_s_and_no_larger_than_the_device_gives() -> None:
-    device, rng = Scripted(TipPose(HERE)), np.random.default_rng(3)
+def test_written_force_is_the_field_force_up_to_the_device_limit() -> None:
+    device, rng = Scripted(TipPose(POSITION)), np.random.default_rng(3)
     driver, reading = TipDriver(device, "here"), np.zeros(9)
     driver.read(reading, 0.0)
     theta = tuple(reading[3:6])
@@ -59,18 +61,18 @@ def test_the_force_is_the_field_s_and_no_larger_than_the_device_gives() -> None:
             np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta)), enable=True
         )
         wanted = f_H * min(1.0, device.largest_force / np.linalg.norm(f_H))
-        np.testing.assert_allclose(device.given[-1], wanted, atol=1e-12)
+        np.testing.assert_allclose(device.written[-1], wanted, atol=1e-12)
     driver.write(np.zeros(3), enable=False)
-    assert device.given[-1] is None
+    assert device.written[-1] is None
 
 
-def test_a_torque_that_is_no_number_releases_it() -> None:
-    device = Scripted(TipPose(HERE))
+def test_torque_that_is_not_finite_releases_the_device() -> None:
+    device = Scripted(TipPose(POSITION))
     driver = TipDriver(device, "here")
     with pytest.raises(DriverFault) as refused:
         driver.write(np.array([0.0, np.nan, 0.0]), enable=True)
     assert refused.value.fault is Fault.FORCE_NOT_FINITE
-    assert device.given == [None]
+    assert device.written == [None]
 
 
 @pytest.mark.parametrize(
@@ -83,7 +85,7 @@ def test_a_torque_that_is_no_number_releases_it() -> None:
         (TipPose(np.array([0.9, 0.0, 0.0])), Fault.LEFT_WORKSPACE),
     ],
 )  # fmt: skip
-def test_what_it_raises_and_what_is_no_pose_is_a_fault_and_no_reading(pose, fault) -> None:
+def test_exception_or_invalid_pose_is_a_fault_without_reading(pose, fault) -> None:
     driver, reading = TipDriver(Scripted(pose), "here"), np.zeros(9)
     with pytest.raises(DriverFault) as refused:
         driver.read(reading, 0.0)
@@ -91,7 +93,7 @@ def test_what_it_raises_and_what_is_no_pose_is_a_fault_and_no_reading(pose, faul
     assert not reading.any()
 
 
-def test_an_error_is_printed_once_with_its_line(capsys) -> None:
+def test_exception_is_printed_once(capsys) -> None:
     driver = TipDriver(Scripted(ValueError("a bad cable")), "here")
     for _ in range(3):
         with pytest.raises(DriverFault):
@@ -99,7 +101,7 @@ def test_an_error_is_printed_once_with_its_line(capsys) -> None:
     assert capsys.readouterr().err.strip().count("ValueError: a bad cable") == 1
 
 
-def test_letting_go_never_raises() -> None:
+def test_release_error_is_not_raised() -> None:
     class Stuck(Scripted):
         def release(self):
             raise RuntimeError("stuck")
@@ -107,7 +109,7 @@ def test_letting_go_never_raises() -> None:
     TipDriver(Stuck(), "here").let_go()
 
 
-def test_one_that_takes_no_force_has_no_motors() -> None:
+def test_device_without_write_has_no_motors() -> None:
     class Mouse(TipDevice):
         def read(self):
             return None
@@ -117,17 +119,17 @@ def test_one_that_takes_no_force_has_no_motors() -> None:
 
 
 @pytest.mark.slow
-def test_follow_through_it_is_the_simulation_s_run_within_a_millimetre() -> None:
+def test_follow_matches_simulation_within_1_mm() -> None:
     def rig(device):
         tip = LinkageTip(Linkage())
         return Rig(device, TipDriver(tip, "here", clock=lambda: tip.linkage.ticks * 1e-3), tip)
 
-    there, made = device_follow(rig)
-    assert made.fault == 0
-    assert rms(there, simulated_follow()) < 1e-3
+    positions, driven_rig = device_follow(rig)
+    assert driven_rig.fault == 0
+    assert rms(positions, simulated_follow()) < 1e-3
 
 
-def test_the_example_is_opened_by_file_and_class() -> None:
+def test_example_device_opens_by_file_and_class() -> None:
     name = f"{EXAMPLE}:Mass"
     check_there(name)
     driver = open_device(name)
@@ -147,7 +149,7 @@ def test_the_example_is_opened_by_file_and_class() -> None:
         ("def", "own.py:Mine", "SyntaxError"),
     ],
 )  # fmt: skip
-def test_a_file_that_gives_no_device_is_one_line(tmp_path, text, name, why) -> None:
+def test_file_without_usable_device_is_reported_in_one_line(tmp_path, text, name, why) -> None:
     if text is not None:
         (tmp_path / "own.py").write_text(text, encoding="utf-8")
     with pytest.raises(SimError, match=why) as refused:

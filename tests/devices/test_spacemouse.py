@@ -1,4 +1,4 @@
-"""A SpaceMouse: a push is a velocity, within the workspace."""
+"""A SpaceMouse as a device: a push sets the velocity of the tip within the workspace."""
 
 from collections import deque
 
@@ -21,7 +21,7 @@ from tests.devices.test_hid import Clock
 
 
 class Cap:
-    """A HID handle with reports to order."""
+    """A HID handle whose reports the test queues."""
 
     def __init__(self) -> None:
         self.queue, self.plugged = deque[bytes](), True
@@ -59,7 +59,7 @@ def mouse(cap: Cap, clock: Clock) -> SpaceMouse:
     return SpaceMouse(cap, "SpaceNavigator", "test", clock)
 
 
-def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, np.ndarray]:
+def read_tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, np.ndarray]:
     reading = np.zeros(9)
     for _ in range(ticks):
         clock.now += 1e-3
@@ -68,38 +68,38 @@ def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, 
 
 
 @pytest.mark.parametrize(
-    ("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
+    ("push", "direction"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
 )
-def test_a_push_right_towards_the_user_or_down_goes_there_at_the_top_speed(mouse, cap, clock, push, way) -> None:
-    tip(mouse, clock, 1)
+def test_full_push_moves_the_tip_at_top_speed_in_its_direction(mouse, cap, clock, push, direction) -> None:
+    read_tip(mouse, clock, 1)
     cap.push(*push)
-    p, _ = tip(mouse, clock, 100)
-    np.testing.assert_allclose(p, np.array(way) * TOP_SPEED * 0.1, atol=1e-9)
+    p, _ = read_tip(mouse, clock, 100)
+    np.testing.assert_allclose(p, np.array(direction) * TOP_SPEED * 0.1, atol=1e-9)
     cap.push(0, 0, 0)
-    q, _ = tip(mouse, clock, 50)
+    q, _ = read_tip(mouse, clock, 50)
     np.testing.assert_array_equal(p, q)
 
 
-def test_a_turn_turns_the_stylus_about_the_same_axes(mouse, cap, clock) -> None:
-    tip(mouse, clock, 1)
+def test_twist_turns_the_stylus_about_the_same_axis(mouse, cap, clock) -> None:
+    read_tip(mouse, clock, 1)
     cap.turn(0, 0, -350)
-    _, reading = tip(mouse, clock, 100)
+    _, reading = read_tip(mouse, clock, 100)
     q = np.array(stylus_orientation(reading[3:6], reading[6:9]))
     half = 0.5 * TOP_TURN * 0.1
     np.testing.assert_allclose(q, [np.cos(half), 0.0, 0.0, np.sin(half)], atol=1e-9)
 
 
-def test_six_axes_in_one_report_and_the_buttons(mouse, cap, clock) -> None:
-    tip(mouse, clock, 1)
+def test_six_axes_in_one_report_and_buttons_are_read(mouse, cap, clock) -> None:
+    read_tip(mouse, clock, 1)
     cap.queue.append(b"\x01" + np.array([350, 0, 0, 0, 0, -350], "<i2").tobytes())
     cap.queue.append(b"\x03\x01\x00")
-    p, reading = tip(mouse, clock, 10)
+    p, reading = read_tip(mouse, clock, 10)
     assert p[1] < 0.0
     assert reading[2] == 1.0
     assert stylus_orientation(reading[3:6], reading[6:9])[3] > 0.0
 
 
-def test_whatever_it_sends_the_tip_stays_in_the_workspace_and_the_gimbal_in_its_range(mouse, cap, clock) -> None:
+def test_tip_stays_in_workspace_and_gimbal_in_range_for_random_input(mouse, cap, clock) -> None:
     rng, reading = np.random.default_rng(8), np.zeros(9)
     for _ in range(400):
         cap.push(*rng.integers(-500, 500, 3))
@@ -117,17 +117,17 @@ def test_whatever_it_sends_the_tip_stays_in_the_workspace_and_the_gimbal_in_its_
             assert np.abs(step).max() <= TOP_SPEED * 0.05 + 1e-9
 
 
-def test_a_cap_that_nobody_touches_does_not_drift_and_other_reports_are_left_out(mouse, cap, clock) -> None:
+def test_untouched_cap_does_not_drift_and_other_reports_are_ignored(mouse, cap, clock) -> None:
     cap.push(5, -5, 8)
     cap.queue.append(b"\x17\x64")  # a battery's
     cap.queue.append(b"\x01\x00")  # too short
-    p, _ = tip(mouse, clock, 100)
+    p, _ = read_tip(mouse, clock, 100)
     assert not p.any()
     assert mouse.telemetry[BAD] == 1.0
     assert mouse.telemetry[READ] == 1.0
 
 
-def test_it_has_no_force_and_unplugging_it_is_a_fault(mouse, cap, clock) -> None:
+def test_device_has_no_force_and_unplugging_is_a_fault(mouse, cap, clock) -> None:
     assert not mouse.identity.forces
     mouse.write(np.ones(3), True)
     cap.plugged = False

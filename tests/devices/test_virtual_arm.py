@@ -1,4 +1,4 @@
-"""A pose and a force of another device, through the Phantom's joints and back."""
+"""Poses and forces of other devices, converted to the Phantom's joints and back."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from sim.devices.driver import DriverFault
 from sim.devices.virtual_arm import SKEWED, WEAKEST, least_gain, quaternion_of, skewness, tip_force, write_pose
 
 
-def test_the_pose_comes_back_from_the_angles() -> None:
+def test_forward_kinematics_of_written_angles_gives_the_pose() -> None:
     rng = np.random.default_rng(1)
     for _ in range(300):
         p = rng.uniform(-0.06, 0.06, 3)
@@ -24,7 +24,7 @@ def test_the_pose_comes_back_from_the_angles() -> None:
 
 
 @pytest.mark.parametrize("angle", [None, 1e-9, 0.1, 2.0, np.pi - 1e-7, np.pi])
-def test_quaternions_are_scipy_s_also_at_half_a_turn(angle) -> None:
+def test_quaternions_equal_scipy_also_at_half_a_turn(angle) -> None:
     rng = np.random.default_rng(2)
     for k in range(300):
         axis = np.eye(3)[k] if k < 3 else rng.normal(size=3)
@@ -37,7 +37,7 @@ def test_quaternions_are_scipy_s_also_at_half_a_turn(angle) -> None:
         assert skewness(rotation.as_matrix()) < 1e-14
 
 
-def test_the_force_is_the_one_that_the_torques_were_made_of() -> None:
+def test_tip_force_inverts_joint_torques_and_is_limited() -> None:
     rng = np.random.default_rng(3)
     for _ in range(300):
         reading, force = np.zeros(9), rng.uniform(-3.0, 3.0, 3)
@@ -45,13 +45,13 @@ def test_the_force_is_the_one_that_the_torques_were_made_of() -> None:
         theta = tuple(reading[3:6])
         torque = tuple(np.add(joint_torques(theta, tuple(force)), gravity_torques(theta)))
         np.testing.assert_allclose(tip_force(theta, torque, 100.0), force, atol=1e-12)
-        cut = tip_force(theta, torque, 1.0)
-        assert np.linalg.norm(cut) <= 1.0 + 1e-12
-        np.testing.assert_allclose(np.cross(cut, force), 0.0, atol=1e-12)
+        limited = tip_force(theta, torque, 1.0)
+        assert np.linalg.norm(limited) <= 1.0 + 1e-12
+        np.testing.assert_allclose(np.cross(limited, force), 0.0, atol=1e-12)
 
 
-def test_the_closed_form_is_what_linear_algebra_finds_wherever_the_arm_is() -> None:
-    rng, weak = np.random.default_rng(4), 0
+def test_closed_form_force_and_gain_equal_linear_algebra_over_the_workspace() -> None:
+    rng, singular = np.random.default_rng(4), 0
     for _ in range(2000):
         theta, torque = tuple(rng.uniform(-1.6, 1.6, 3)), rng.normal(size=3)
         j = np.array(jacobian(theta))
@@ -59,22 +59,22 @@ def test_the_closed_form_is_what_linear_algebra_finds_wherever_the_arm_is() -> N
         assert least_gain(theta) == pytest.approx(least, abs=1e-15)
         expected = np.linalg.solve(j.T, torque - gravity_torques(theta)) if least >= WEAKEST else np.zeros(3)
         np.testing.assert_allclose(tip_force(theta, tuple(torque), 1e9), expected, rtol=1e-12, atol=1e-12)
-        weak += least < WEAKEST
-    assert 100 < weak < 1900
+        singular += least < WEAKEST
+    assert 100 < singular < 1900
 
 
-def test_on_the_turret_s_axis_there_is_no_force() -> None:
+def test_force_is_zero_on_the_turret_axis() -> None:
     assert tip_force((0.0, np.pi / 2.0, 0.0), (1.0, 1.0, 1.0), 10.0) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("torque", [1e153, 1e160, 1e308, np.inf, np.nan])
-def test_no_torque_however_large_makes_a_force_that_is_none_or_too_large(torque: float) -> None:
+def test_force_is_finite_and_limited_for_huge_torques(torque: float) -> None:
     force = tip_force((0.1, 0.2, 0.3), (torque, -torque, torque), 8.5)
     assert np.linalg.norm(force) <= 8.5 * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("p", [[0.0, 0.0, 5.0], [0.0, -0.6, 0.0]])
-def test_where_no_phantom_can_be_is_a_fault(p) -> None:
+def test_unreachable_point_is_a_fault(p) -> None:
     reading = np.ones(9)
     with pytest.raises(DriverFault) as refused:
         write_pose(reading, np.array(p), np.eye(3))
@@ -83,7 +83,7 @@ def test_where_no_phantom_can_be_is_a_fault(p) -> None:
     np.testing.assert_array_equal(reading, np.ones(9))
 
 
-def test_a_pose_that_is_not_finite_is_a_fault() -> None:
+def test_pose_that_is_not_finite_is_a_fault() -> None:
     with pytest.raises(DriverFault) as refused:
         write_pose(np.zeros(9), np.array([0.0, np.nan, 0.0]), np.eye(3))
     assert refused.value.fault is Fault.READING_NOT_FINITE
@@ -102,7 +102,7 @@ NO_ROTATIONS = {
 
 
 @pytest.mark.parametrize("name", NO_ROTATIONS)
-def test_an_orientation_that_is_no_rotation_is_a_fault(name) -> None:
+def test_orientation_that_is_no_rotation_is_a_fault(name) -> None:
     reading = np.ones(9)
     with pytest.raises(DriverFault) as refused:
         write_pose(reading, np.zeros(3), NO_ROTATIONS[name])
@@ -111,7 +111,7 @@ def test_an_orientation_that_is_no_rotation_is_a_fault(name) -> None:
     np.testing.assert_array_equal(reading, np.ones(9))
 
 
-def test_an_orientation_that_was_rounded_is_taken() -> None:
+def test_rounded_rotation_matrix_is_accepted() -> None:
     reading, exact = np.zeros(9), np.zeros(9)
     write_pose(reading, np.zeros(3), np.round(TURN, 4))
     write_pose(exact, np.zeros(3), TURN)

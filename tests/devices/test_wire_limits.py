@@ -1,4 +1,4 @@
-"""Whatever a field asks for and a person requests, the bytes that go over the wire are within the limits."""
+"""The bytes sent to a device stay within the limits whatever the field commands and the person requests."""
 
 import struct
 import zlib
@@ -18,19 +18,19 @@ from sim.devices.hdapi import HdapiDevice
 from sim.devices.hid import HidPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker
 from tests.devices.firmware import Firmware, FirmwareHandle
-from tests.devices.mocks import BehindDhd, BehindHd, mock_dhd, mock_hd, three
-from tests.devices.rig import FirmwareBehind, Linkage, LockStep
+from tests.devices.mocks import DhdBackend, HdBackend, mock_dhd, mock_hd, motor_force
+from tests.devices.rig import FirmwareBackend, Linkage, LockStep
 from tests.sim.bare_servos import follow_program
 from tests.sim.hardware.emulation import gated_servo
 
 T = 1e-3
-GAINS = (1234.5, 67.8)  # found by their values among the field's parameters
-ROUNDED = 1e-4  # [N] that half a micronewton metre at each shaft is at the tip
+GAINS = (1234.5, 67.8)  # of the spring and the damper; located by value among the field's parameters
+ROUNDED = 1e-4  # [N], effect at the tip of rounding by half a micronewton metre at each shaft
 LIMITS = {"ramp": 0.02, "quiet": 2e-3, "small": 2.0}
 
 
-class Watched(FirmwareHandle):
-    """The firmware's handle, and all output reports that went through it."""
+class RecordingHandle(FirmwareHandle):
+    """The firmware's handle, which keeps all output reports."""
 
     def __init__(self, firmware: Firmware):
         super().__init__(firmware)
@@ -42,7 +42,7 @@ class Watched(FirmwareHandle):
 
 
 def output(report: bytes) -> tuple[bool, np.ndarray]:
-    """Whether the motors are on, and the joints' torques [N m], by the places that the protocol's page tells."""
+    """Whether the motors are on, and the joint torques [N m], decoded as the protocol's page describes."""
     assert len(report) == 64
     assert report[0] == 2
     assert zlib.crc32(report[:60]) == struct.unpack_from("<I", report, 60)[0]
@@ -50,7 +50,7 @@ def output(report: bytes) -> tuple[bool, np.ndarray]:
 
 
 def tip_force(ticker: Ticker, torque: np.ndarray) -> np.ndarray:
-    """What torques of the joints are at the tip beyond the linkage's weight, as far as it is balanced [N]."""
+    """Force at the tip [N] of joint torques, less those that balance the linkage's weight."""
     theta = tuple(ticker.parts.servo.device.memory[:3])
     weight = ticker.gated.gate[GATE_SHARE] * np.array(gravity_torques(theta))
     return np.linalg.solve(np.array(jacobian(theta)).T, torque - weight)
@@ -60,10 +60,10 @@ def servo(driver, gate: Gate) -> tuple[GatedServo, np.ndarray]:
     program = follow_program(*GAINS)
     parts = gated_servo(driver, program=program)._replace(gate=gate)
     params = parts.servo.field.params
-    (places,) = np.nonzero(np.isin(params, GAINS))
-    assert len(places) == 2
-    params[places] = 300.0, 4.0
-    return parts, places
+    (indices,) = np.nonzero(np.isin(params, GAINS))
+    assert len(indices) == 2
+    params[indices] = 300.0, 4.0
+    return parts, indices
 
 
 gains = st.sampled_from([0.0, 4.0, 300.0, 1e4, 1e12, -1e5, np.nan, np.inf]) | st.floats(-1e6, 1e6)
@@ -80,19 +80,19 @@ def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
     firmware_library, sequence, permitted, dead_man
 ) -> None:
     firmware = Firmware(firmware_library)
-    handle = Watched(firmware)
-    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+    handle = RecordingHandle(firmware)
+    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBackend(firmware, handle, Linkage()))
     gate = Gate(T, permitted=permitted, dead_man=dead_man, **LIMITS)
-    parts, places = servo(driver, gate)
+    parts, indices = servo(driver, gate)
     ticker, number, last = Ticker(parts), 0, np.zeros(3)
-    for changed, request, switch, kicked, times in sequence:
+    for changed, request, switch, slip, times in sequence:
         firmware.sensors.pressed = int(switch)
         if changed is not None:
-            parts.servo.field.params[places] = changed
+            parts.servo.field.params[indices] = changed
         for k in range(times):
             handle.sent.clear()
-            if kicked:
-                firmware.zero[k % 3] += kicked  # somebody pulls, or an encoder slips
+            if slip:
+                firmware.zero[k % 3] += slip  # somebody pulls, or the encoder slips
             ticker.tick(number, request if k == 0 else NO_REQUEST)
             number += 1
             assert handle.sent
@@ -113,16 +113,18 @@ def test_no_sequence_of_commands_sends_a_torque_beyond_the_limits(
                 last = force
 
 
-def test_such_sequences_do_reach_the_motors(firmware_library) -> None:
-    """Else the property would hold of a device that is never on."""
+def test_random_sequences_can_reach_the_motors(firmware_library) -> None:
+    """Otherwise the property would hold for a device that is never on."""
     firmware = Firmware(firmware_library)
-    handle = Watched(firmware)
-    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
-    parts, places = servo(driver, Gate(T, permitted=True, dead_man=False, force=1.0, small=10.0, ramp=0.02, quiet=2e-3))
+    handle = RecordingHandle(firmware)
+    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBackend(firmware, handle, Linkage()))
+    parts, indices = servo(
+        driver, Gate(T, permitted=True, dead_man=False, force=1.0, small=10.0, ramp=0.02, quiet=2e-3)
+    )
     ticker, forces = Ticker(parts), []
     for k in range(300):
         if k == 100:
-            parts.servo.field.params[places] = 2e4, 0.0
+            parts.servo.field.params[indices] = 2e4, 0.0
         ticker.tick(k, ARM if k == 0 else NO_REQUEST)
         on, torque = output(handle.sent[-1])
         forces.append(np.linalg.norm(tip_force(ticker, torque)) if on else 0.0)
@@ -130,21 +132,21 @@ def test_such_sequences_do_reach_the_motors(firmware_library) -> None:
 
 
 @pytest.mark.parametrize("kind", ["hdapi", "dhd"])
-def test_a_library_is_sent_what_the_gate_lets_through_also_while_it_is_ramped_in(kind: str, tmp_path) -> None:
+def test_vendor_library_receives_the_gated_force_also_during_the_ramp(kind: str, tmp_path) -> None:
     if kind == "hdapi":
-        behind = BehindHd(mock_hd(tmp_path), Linkage())
-        device = HdapiDevice(behind.library, clock=lambda: behind.linkage.ticks * 1e-3)
+        backend = HdBackend(mock_hd(tmp_path), Linkage())
+        device = HdapiDevice(backend.library, clock=lambda: backend.linkage.ticks * 1e-3)
     else:
-        behind = BehindDhd(mock_dhd(tmp_path), Linkage())
-        device = DhdDevice(behind.library, clock=lambda: behind.linkage.ticks * 1e-3)
-    driver = LockStep(device, behind)
+        backend = DhdBackend(mock_dhd(tmp_path), Linkage())
+        device = DhdDevice(backend.library, clock=lambda: backend.linkage.ticks * 1e-3)
+    driver = LockStep(device, backend)
     parts, _ = servo(driver, Gate(T, permitted=True, dead_man=False, small=10.0, ramp=0.2, quiet=2e-3))
-    ticker, told, sent = Ticker(parts), [], []
+    ticker, commanded, sent = Ticker(parts), [], []
     for k in range(400):
         ticker.tick(k, ARM if k == 0 else NO_REQUEST)
-        told.append(np.linalg.norm(ticker.gated.force))
-        sent.append(np.linalg.norm(three(behind.library)))
+        commanded.append(np.linalg.norm(ticker.gated.force))
+        sent.append(np.linalg.norm(motor_force(backend.library)))
     driver.close()
     late = kind == "hdapi"  # a force waits for the next callback
-    assert max(told) > 0.5
-    np.testing.assert_allclose(sent[late:], told[: len(told) - late], atol=1e-9)
+    assert max(commanded) > 0.5
+    np.testing.assert_allclose(sent[late:], commanded[: len(commanded) - late], atol=1e-9)

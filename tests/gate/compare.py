@@ -1,9 +1,9 @@
-"""The gate of a change that moves code and no number: short runs of a commit and of this tree, compared bit for bit.
+"""Gate for refactorings: short runs of a commit and of this tree, compared bit for bit.
 
 ``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case
-there and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings
-could not be kept instead: libraries round by processor, and a figure with contacts magnifies that. Cases that need
-another one's recording or map bring it along.
+there and here on this machine, both at once, and compares every channel of the two recordings. Stored hashes of
+recordings would not do: libraries round by processor, and a figure with contacts magnifies the difference. A case that
+needs the recording or map of another one includes that case.
 """
 
 import os
@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-_MAP, _RUN = "MAP", "RUN"  # stand for the file of the lifted map, and the folder of the case "follow", of a tree
-_SCRIPT = "SCRIPT"  # a script of this folder, which is given the folder to write and further arguments
+_MAP, _RUN = "MAP", "RUN"  # placeholders for the lifted map's file and for the folder of the case "follow"
+_SCRIPT = "SCRIPT"  # a script of this folder; its arguments are the output folder and further ones
 _NEEDS = {"lifted": "lift", "lifted-rivers": "lift", "reproduce": "follow", "replay": "follow"}
 
 CASES = {
@@ -53,9 +53,9 @@ CASES = {
 
 
 def command(case: str, folder: Path) -> list[str]:
-    """What runs a case in a tree, and writes into the case's own folder."""
-    places = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
-    first, *others = (places.get(word, word) for word in CASES[case].split())
+    """Command that runs a case and writes into the case's own folder."""
+    substitutes = {_MAP: str(folder / "map.npz"), _RUN: str(folder / "follow")}
+    first, *others = (substitutes.get(word, word) for word in CASES[case].split())
     out = str(folder / case)
     if first == _SCRIPT:
         script, *arguments = others
@@ -71,14 +71,14 @@ def command(case: str, folder: Path) -> list[str]:
 
 
 def start(case: str, tree: Path, folder: Path) -> "subprocess.Popen[bytes]":
-    """Begin a case in a tree."""
+    """Start a case in a tree."""
     log = (folder / f"{case}.log").open("wb")
     environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONSAFEPATH": "", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(command(case, folder), cwd=tree, env=environment, stdout=log, stderr=log)
 
 
 def differences(before: Path, after: Path) -> Iterator[str]:
-    """Channels of two recordings that are not the same to the last bit."""
+    """Channels of two recordings that differ in any bit."""
     with h5py.File(before) as old, h5py.File(after) as new:
         for group in ("ticks", "frames"):
             for name in sorted({*old[group], *new[group]} - {"rows"}):
@@ -107,22 +107,22 @@ def gate(commit: str, cases: list[str]) -> int:
             for case in cases:
                 runs = [start(case, place, folder) for place, folder in zip((tree, ROOT), folders, strict=True)]
                 codes = [run.wait() for run in runs]
-                said = [
+                messages = [
                     f"exit code {code} {side}" for code, side in zip(codes, ("before", "after"), strict=True) if code
                 ]
-                if said:
-                    said += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
+                if messages:
+                    messages += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
                 elif case == "reproduce":
-                    said = (
+                    messages = (
                         [] if len({(folder / f"{case}.log").read_text() for folder in folders}) == 1 else ["the text"]
                     )
                 elif case == "lift":
                     with np.load(folders[0] / "map.npz") as was, np.load(folders[1] / "map.npz") as now:
-                        said = [name for name in was.files if was[name].tobytes() != now[name].tobytes()]
+                        messages = [name for name in was.files if was[name].tobytes() != now[name].tobytes()]
                 else:
-                    said = list(differences(*(folder / case / "run.h5" for folder in folders)))
-                print(f"{case}: {'; '.join(said) or 'the same'}", flush=True)
-                failed += [case] if said else []
+                    messages = list(differences(*(folder / case / "run.h5" for folder in folders)))
+                print(f"{case}: {'; '.join(messages) or 'the same'}", flush=True)
+                failed += [case] if messages else []
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", str(tree)], cwd=ROOT, check=True)
     print(f"{len(cases) - len(failed)} of {len(cases)} cases are the same, bit for bit, as on {commit}")

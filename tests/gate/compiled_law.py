@@ -1,4 +1,4 @@
-"""A run with a compiled law of one's own, for the gate: ``python tests/gate/compiled_law.py FOLDER`` records it."""
+"""A run with a user-defined compiled law, for the gate: ``python tests/gate/compiled_law.py FOLDER`` records it."""
 
 import sys
 

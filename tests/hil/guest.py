@@ -1,4 +1,4 @@
-"""Run in a virtual machine by `vm.py`: hidapi as it comes, Linux's own hidraw, and a device of its uhid."""
+"""Run in a virtual machine by `vm.py`: an unmodified hidapi, Linux's hidraw, and a device made through uhid."""
 
 import sys
 import time
@@ -56,9 +56,9 @@ def main(library: str) -> None:
     driver.write(torque, False)
     time.sleep(0.05)
 
-    live = device.live(4.0, 4e-3)
+    run_realtime = device.run_realtime(4.0, 4e-3)
     link = measured_link(driver, 3.0)
-    live.join()
+    run_realtime.join()
     print("link:", *link.lines(), sep="\n  ", flush=True)
     check("readings are lost", link.lost, 0)
     check("readings are refused", link.refused, 0)
@@ -67,20 +67,22 @@ def main(library: str) -> None:
     while driver.read(reading, 0.0):
         pass
 
-    genuine = firmware.tick()
+    valid_report = firmware.tick()
     for size in (40, 63, 70):
-        device.send((genuine + bytes(6))[:size])
-        came: list[bool] = []
-        fault = fault_of(lambda came=came: came.append(driver.read(reading, 0.5)))
+        device.send((valid_report + bytes(6))[:size])
+        readings: list[bool] = []
+        fault = fault_of(lambda readings=readings: readings.append(driver.read(reading, 0.5)))
         # Linux passes a report of another size on, or keeps back one that is short, or cuts one that is long.
-        cut = size > len(genuine) and came == [True]
-        taken = fault == (Fault.REPORT_MALFORMED, float(min(size, len(genuine) + 1)))  # as much as is asked for
-        print(
-            f"    {'a fault' if taken else 'cut to 64 by the kernel' if cut else 'kept back by the kernel'}", flush=True
-        )
-        check(f"{size} bytes are no other reading", taken or cut or came == [False], True)
+        is_truncated = size > len(valid_report) and readings == [True]
+        is_fault = fault == (
+            Fault.REPORT_MALFORMED,
+            float(min(size, len(valid_report) + 1)),
+        )  # capped by the size asked for
+        outcome = "a fault" if is_fault else "cut to 64 by the kernel" if is_truncated else "kept back by the kernel"
+        print(f"    {outcome}", flush=True)
+        check(f"{size} bytes are no other reading", is_fault or is_truncated or readings == [False], True)
     for _ in range(3):
-        device.send(genuine[:20] + bytes([genuine[20] ^ 1]) + genuine[21:])
+        device.send(valid_report[:20] + bytes([valid_report[20] ^ 1]) + valid_report[21:])
     time.sleep(0.05)
     check("three wrong bits", fault_of(lambda: driver.read(reading, 1.0)), (Fault.CHECKSUM_WRONG, 3))
     begin = time.monotonic()

@@ -1,4 +1,4 @@
-"""Compiles, and keeps, what the guest's driver needs: its first reading and command, with hidapi's functions mocked."""
+"""Compiles and caches the kernels of the guest's driver by a first reading and command on a mock of hidapi."""
 
 import ctypes
 import sys

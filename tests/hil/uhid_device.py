@@ -1,4 +1,4 @@
-"""A HID device of the kernel's own, by /dev/uhid, with the reference firmware behind it (linux/uhid.h)."""
+"""A HID device made through /dev/uhid, with the reference firmware behind it (linux/uhid.h)."""
 
 import os
 import struct
@@ -13,14 +13,14 @@ _USB = 3
 
 
 class UhidDevice:
-    """The firmware, as a device that the kernel has."""
+    """The firmware as a device of the kernel."""
 
     def __init__(self, firmware: Firmware, name: str = "Reference", serial: str = "HVF-0001"):
         self.firmware, self.fd, self._lock = firmware, os.open("/dev/uhid", os.O_RDWR), threading.Lock()
-        self._begun: float | None = None  # when its clock was zero, while it goes on by itself
+        self._clock_zero: float | None = None  # when its clock was zero, while it runs in real time
         descriptor = firmware.descriptor()
-        who = (name.encode(), b"uhid", serial.encode(), len(descriptor))
-        head = struct.pack("<I128s64s64sHHIIII", CREATE2, *who, _USB, 0x16C0, 0x0486, 1, 0)
+        identity = (name.encode(), b"uhid", serial.encode(), len(descriptor))
+        head = struct.pack("<I128s64s64sHHIIII", CREATE2, *identity, _USB, 0x16C0, 0x0486, 1, 0)
         os.write(self.fd, head + descriptor.ljust(4096, b"\0"))
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -29,35 +29,35 @@ class UhidDevice:
         os.write(self.fd, struct.pack("<IH", INPUT2, len(report)) + report)
 
     def tick(self, period: float = 1e-3) -> None:
-        """A period passes, and is reported."""
+        """Advance by a period and send the report."""
         with self._lock:
             report = self.firmware.tick(period)
         self.send(report)
 
-    def live(self, seconds: float, period: float = 1e-3) -> threading.Thread:
-        """Tick for a while, in a thread, in real time; what arrives between two ticks is stamped with it too."""
+    def run_realtime(self, seconds: float, period: float = 1e-3) -> threading.Thread:
+        """Tick for a while in a thread, in real time, which also stamps what arrives between two ticks."""
 
         def run() -> None:
             begin, k = time.monotonic(), 0
-            self._begun = begin - 1e-6 * self.firmware.sensors.time_us
+            self._clock_zero = begin - 1e-6 * self.firmware.sensors.time_us
             while k * period < seconds:
                 k += 1
                 time.sleep(max(0.0, begin + k * period - time.monotonic()))
                 with self._lock:
-                    self._look_at_clock()
+                    self._update_clock()
                 self.tick(0.0)
-            self._begun = None
+            self._clock_zero = None
 
         thread = threading.Thread(target=run)
         thread.start()
         return thread
 
-    def _look_at_clock(self) -> None:
-        if self._begun is not None:
-            self.firmware.sensors.time_us = round(1e6 * (time.monotonic() - self._begun))
+    def _update_clock(self) -> None:
+        if self._clock_zero is not None:
+            self.firmware.sensors.time_us = round(1e6 * (time.monotonic() - self._clock_zero))
 
     def unplug(self) -> None:
-        """The device goes."""
+        """Remove the device."""
         os.write(self.fd, struct.pack("<I", DESTROY))
 
     def _listen(self) -> None:
@@ -67,12 +67,12 @@ class UhidDevice:
             if kind == OUTPUT:
                 (size,) = struct.unpack_from("<H", event, 4 + 4096)
                 with self._lock:
-                    self._look_at_clock()
+                    self._update_clock()
                     self.firmware.take(event[4 : 4 + size])
             elif kind == GET_REPORT:
                 number, report = struct.unpack_from("<IB", event, 4)
-                told = self.firmware.feature(report)
-                os.write(self.fd, struct.pack("<IIHH", GET_REPLY, number, 0 if told else 5, len(told)) + told)
+                feature = self.firmware.feature(report)
+                os.write(self.fd, struct.pack("<IIHH", GET_REPLY, number, 0 if feature else 5, len(feature)) + feature)
             elif kind == SET_REPORT:
                 number, _, _, size = struct.unpack_from("<IBBH", event, 4)
                 with self._lock:

@@ -1,6 +1,6 @@
 """`make hil-vm`: the HID driver on Linux's own hidraw, in a virtual machine whose kernel has uhid.
 
-Says that it skips, and why, where something is missing: it needs qemu-system-x86_64, busybox-static, a C compiler, and
+Skips with a message where something is missing: it needs qemu-system-x86_64, busybox-static, a C compiler, and
 either a kernel with modules in /boot and /lib/modules, or apt-get to fetch Debian's (some 70 MB, kept in runs/hil-vm).
 The guest sees this machine's files and changes none. An emulated processor would compile for a quarter of an hour, so
 the driver's units are compiled here beforehand, for any processor of the kind (`tests.hil.rehearsal`).
@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.devices.firmware import COMPILER, ROOT, compiled
+from tests.devices.firmware import COMPILER, ROOT, compile_c
 
 FOLDER = ROOT / "runs" / "hil-vm"
 MODULES = ("virtio_pci", "9pnet_virtio", "9p", "hid-generic", "uhid")
@@ -34,7 +34,7 @@ poweroff -f
 
 
 class MissingError(Exception):
-    """What this machine has not, and how to get it."""
+    """Something is missing on this machine; says how to get it."""
 
 
 def kernel() -> tuple[Path, Path]:
@@ -74,7 +74,7 @@ def _fetch(into: Path) -> None:
 
 
 def initramfs(busybox: str, modules: Path, library: Path) -> Path:
-    """What the kernel begins with: busybox, the modules, and the script that goes on to this machine's files."""
+    """Initial file system: busybox, the modules, and the script that continues on this machine's files."""
     tree = FOLDER / "initramfs"
     shutil.rmtree(tree, ignore_errors=True)
     for name in ("bin", "proc", "sys", "dev", "host", f"lib/modules/{modules.name}"):
@@ -99,7 +99,7 @@ def initramfs(busybox: str, modules: Path, library: Path) -> Path:
 
 
 def main() -> int:
-    """Exit code 0 if the guest passed, or something is missing here; 1 if it failed."""
+    """Exit code 0 if the guest passed or something is missing here, 1 if it failed."""
     qemu, busybox = shutil.which("qemu-system-x86_64"), shutil.which("busybox")
     FOLDER.mkdir(parents=True, exist_ok=True)
     try:
@@ -112,7 +112,10 @@ def main() -> int:
         print(f"hil-vm: skipped: {missing}", file=sys.stderr)
         return 0
     firmware = ROOT / "firmware" / "hvf_hid.c"
-    library, mock = compiled(FOLDER, firmware), compiled(FOLDER, ROOT / "tests" / "devices" / "mock_hidapi.c", firmware)
+    library, mock = (
+        compile_c(FOLDER, firmware),
+        compile_c(FOLDER, ROOT / "tests" / "devices" / "mock_hidapi.c", firmware),
+    )
     subprocess.run(
         [sys.executable, "-m", "tests.hil.rehearsal", mock], cwd=ROOT, env=os.environ | ANY_PROCESSOR, check=True
     )
@@ -122,17 +125,17 @@ def main() -> int:
         "-append", "console=ttyS0 quiet panic=-1",
         "-virtfs", "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap",
     ]  # fmt: skip
-    said = FOLDER / "said.txt"
-    with said.open("wb") as out:
+    log = FOLDER / "guest.txt"
+    with log.open("wb") as out:
         try:
             subprocess.run(
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, timeout=SECONDS, check=False
             )
         except subprocess.TimeoutExpired:
-            print(f"hil-vm: the guest had not ended after {SECONDS} s; what it said until then:", file=sys.stderr)
-    told = said.read_text(errors="replace")
-    print(told[-6000:])
-    return 0 if "hil-vm: passed" in told else 1
+            print(f"hil-vm: the guest had not ended after {SECONDS} s; its output until then:", file=sys.stderr)
+    text = log.read_text(errors="replace")
+    print(text[-6000:])
+    return 0 if "hil-vm: passed" in text else 1
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Servos of a device and a FOLLOW field with no clips behind them, which are quick to compile."""
+"""Servos of a device and a FOLLOW field without clips, which compile quickly."""
 
 import numpy as np
 
@@ -70,12 +70,12 @@ def run(servo: Servo, n: int, first: int = 0) -> tuple[TickLog, FrameLog]:
 
 @entry_point
 def pass_period(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: np.ndarray) -> None:
-    """A servo period of a simulated Phantom whose motors somebody else has set."""
+    """Advance a simulated Phantom, whose motors the caller has set, by a servo period."""
     advance(plant, port, user, t, False, applied)
 
 
-class Stepped:
-    """A simulated Phantom called from Python: read, then write, once a period."""
+class SteppedPhantom:
+    """A simulated Phantom stepped from Python: read, then write, once per period."""
 
     def __init__(self, world: World, arm: Arm | None = None, cutoff: float = CUTOFF):
         self.device = simulated_phantom(phantom_port(world.model, world.data, world.config.servo_period, cutoff),
@@ -92,10 +92,10 @@ class Stepped:
         self.ticks += 1
 
 
-class Driver:
-    """What stands behind an `Exchange` here: a second simulated Phantom, whose encoders and motors it is wired to.
+class SimulatedDriver:
+    """Driver of an `Exchange` with a second simulated Phantom as its hardware.
 
-    Its clock runs on whether the servo does or not, and its motors go off when a command gets too old.
+    Its clock runs whether the servo does or not, and its motors go off when a command gets too old.
     """
 
     def __init__(self, device: Exchange, arm: Arm | None = None, start: np.ndarray = START):
@@ -120,7 +120,7 @@ class Driver:
         r[READING_SEQUENCE] += 1.0
 
     def write(self) -> None:
-        """Apply the command that is valid, and let a period pass."""
+        """Apply the command if it is still valid, and advance by a period."""
         valid_torque(self.device.command, self.device.silence, self.clock, self.torque)
         self.plant.ctrl[list(self.phantom.port.motor)] = self.torque
         pass_period(self.plant, self.phantom.port, self.phantom.user, self.clock, self._applied)

@@ -1,4 +1,4 @@
-"""A hand that each of several rivers has from a moment on, and that glides over from one to the next."""
+"""A hand that glides from one river to the next at given moments."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ GLIDE = 0.3  # [s], half of it before the moment
 def gliding_hand(
     curves: list[Trajectory], lap: float, rivers: tuple[tuple[float, int], ...], t: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stylus poses and rows of a trace at moments t [s]; the first river has it until another of `rivers` does."""
+    """Stylus poses and trace rows at moments t [s]; it begins in river 0 and changes at each (moment, river)."""
     river, share = np.zeros(len(t)), np.zeros((len(curves), len(t)))
     share[0] = 1.0
     for moment, number in rivers:

@@ -8,7 +8,7 @@ from sim.body.clip_motion import clip_motion
 
 
 def _wandering_clip(closing: bool) -> Clip:
-    """A smooth motion of every joint that walks on and turns left; it closes after a second, or is cut short before."""
+    """A smooth motion of every joint that walks and turns left; closed after a second, or cut short before."""
     model, phase = figure_model(), 2 * np.pi * np.arange(61) / 60
     poses = np.empty((61, N_POSE))
     for k, p in enumerate(phase):
@@ -40,13 +40,13 @@ def test_velocities_and_accelerations_are_derivatives_of_the_poses(closing):
         np.testing.assert_allclose(here.accelerations[k], central, atol=2e-3)
 
 
-def test_a_motion_passes_through_its_frames():
+def test_motion_passes_through_the_clip_frames():
     clip = _wandering_clip(closing=True)
     motion = clip_motion(clip, np.arange(60) / 60)
     np.testing.assert_allclose(motion.poses, clip.poses[:60], atol=1e-9)
 
 
-def test_a_closing_clip_goes_on_lap_after_lap():
+def test_closed_clip_continues_over_laps():
     clip = _wandering_clip(closing=True)
     times = np.array([0.3, 1.3, 2.3])
     motion = clip_motion(clip, times)
@@ -57,14 +57,14 @@ def test_a_closing_clip_goes_on_lap_after_lap():
     np.testing.assert_allclose(motion.velocities[0, 3:], motion.velocities[2, 3:], atol=1e-8)
 
 
-def test_an_open_clip_holds_its_last_pose():
+def test_open_clip_holds_its_last_pose():
     clip = _wandering_clip(closing=False)
     motion = clip_motion(clip, np.array([0.0, 5.0]))
     np.testing.assert_allclose(np.abs(motion.poses[1]), np.abs(clip.poses[-1]), atol=1e-9)
     assert np.abs(motion.velocities[1]).max() < 1e-9
 
 
-def test_a_single_frame_is_a_motion_at_rest():
+def test_single_frame_is_a_motion_at_rest():
     motion = clip_motion(Clip(rest_pose()[None], 60.0, "still"), np.array([0.0, 1.0]))
     np.testing.assert_allclose(motion.poses, np.tile(rest_pose(), (2, 1)), atol=1e-12)
     assert np.abs(motion.accelerations).max() < 1e-9

@@ -6,7 +6,7 @@ from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 
 
 def _random_problem(rng):
-    """Cones at random points under a body, scaled as the figure's control does, and a demand near body weight."""
+    """Cones at random points under a body, scaled as in the figure's control, and a wrench near body weight."""
     n = int(rng.integers(1, 11))
     edges = np.empty((N_EDGES * n, 6))
     for i in range(n):
@@ -22,7 +22,7 @@ def _solve(edges, share, wrench, guess):
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_forces_are_those_of_non_negative_least_squares(seed):
+def test_forces_equal_non_negative_least_squares(seed):
     edges, share, wrench = _random_problem(np.random.default_rng(seed))
     force, residual, steps = _solve(edges, share, wrench, np.zeros(6))
     stacked = np.vstack((edges.T, np.diag(1 / np.sqrt(share))))
@@ -32,7 +32,7 @@ def test_forces_are_those_of_non_negative_least_squares(seed):
     assert steps < 30
 
 
-def test_a_guess_changes_the_work_and_not_the_answer():
+def test_warm_start_changes_the_step_count_but_not_the_forces():
     rng = np.random.default_rng(1)
     edges, share, wrench = _random_problem(rng)
     cold = _solve(edges, share, wrench, np.zeros(6))
@@ -43,7 +43,7 @@ def test_a_guess_changes_the_work_and_not_the_answer():
     assert warm[2] <= 1
 
 
-def test_a_point_without_share_bears_nothing():
+def test_point_without_share_bears_no_force():
     edges, share, wrench = _random_problem(np.random.default_rng(4))
     share[:N_EDGES] = 0.0
     force, _, _ = _solve(edges, share, wrench, np.zeros(6))
@@ -51,14 +51,14 @@ def test_a_point_without_share_bears_nothing():
     assert force.sum() > 0.0
 
 
-def test_the_ground_only_pushes():
+def test_ground_forces_only_push():
     edges, share, _ = _random_problem(np.random.default_rng(5))
     force, residual, _ = _solve(edges, share, np.array([0, 0, -1.0, 0, 0, 0]), np.zeros(6))
     assert np.all(force >= 0.0)
     assert residual[2] <= -1.0 + 1e-6
 
 
-def test_edges_are_wrenches_on_the_cone():
+def test_cone_edges_are_wrenches_on_the_friction_cone():
     point, friction, edges = np.array([0.2, -0.1, -0.9]), 0.7, np.empty((N_EDGES, 6))
     cone_edges(point, friction, edges)
     np.testing.assert_allclose(edges[:, 3:], np.cross(point, edges[:, :3]), atol=1e-15)

@@ -45,7 +45,7 @@ def _moving(seed):
     return model, data, figure, pose, 0.05 * rng.normal(size=57), 0.5 * rng.normal(size=57)
 
 
-def test_rotation_error_and_turning_are_those_of_rotations():
+def test_rotation_error_and_rotated_vector_equal_scipy():
     rng = np.random.default_rng(0)
     for _ in range(50):
         a, b = Rotation.random(random_state=rng), Rotation.random(random_state=rng)
@@ -57,7 +57,7 @@ def test_rotation_error_and_turning_are_those_of_rotations():
 
 
 def _imbalance(model, data, figure):
-    """Generalised force that the planned motion needs beyond what motors, ground and residual are planned to give."""
+    """Generalised force of the planned motion, less those planned for motors, ground and residual."""
     s, M, J = figure.state, np.empty((57, 57)), np.empty((3, 57))
     mujoco.mj_fullM(model, data, M)
     given = np.zeros(57)
@@ -71,14 +71,14 @@ def _imbalance(model, data, figure):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_plan_obeys_the_equations_of_motion(seed):
+def test_planned_motion_obeys_the_equations_of_motion(seed):
     model, data, figure, pose, v_r, a_r = _moving(seed)
     figure.update(pose, v_r, a_r)
     assert figure.state.force[:, 2].sum() > 300.0
     np.testing.assert_allclose(_imbalance(model, data, figure), 0.0, atol=1e-6 * figure.state.weight)
 
 
-def test_planned_forces_lie_within_friction():
+def test_planned_forces_lie_within_the_friction_cone():
     _, _, figure, pose, v_r, a_r = _moving(5)
     figure.update(pose, v_r, a_r)
     force = figure.state.force
@@ -86,7 +86,7 @@ def test_planned_forces_lie_within_friction():
     assert np.all(np.hypot(force[:, 0], force[:, 1]) <= 0.9 * force[:, 2] + 1e-9)
 
 
-def test_legs_bring_loaded_feet_to_rest():
+def test_leg_accelerations_bring_loaded_feet_to_rest():
     model, data, figure, _, _, a = _moving(2)
     plain, s, offset, response = a.copy(), figure.state, np.empty(N_LEG), np.empty((N_LEG, 6))
     figure.update(data.qpos.copy(), STILL, STILL)
@@ -109,7 +109,7 @@ def test_legs_bring_loaded_feet_to_rest():
         assert np.linalg.norm(J @ a - settling) < 0.05 * np.linalg.norm(J @ plain - settling)
 
 
-def test_the_leg_follows_the_root_as_its_response_says():
+def test_stance_response_is_linear_in_the_root_acceleration():
     _, data, figure, _, _, a = _moving(4)
     s, ones = figure.state, np.ones(4)
     figure.update(data.qpos.copy(), STILL, STILL)
@@ -122,7 +122,7 @@ def test_the_leg_follows_the_root_as_its_response_says():
     np.testing.assert_allclose(moved - offset, response @ change, atol=1e-9)
 
 
-def test_standing_takes_no_help_and_the_ground_bears_the_weight():
+def test_standing_needs_no_residual_and_ground_bears_the_weight():
     model, data, figure, pose = _figure()
     total = 0.0
     for k in range(1000):
@@ -136,7 +136,7 @@ def test_standing_takes_no_help_and_the_ground_bears_the_weight():
     assert np.all(np.abs(data.ctrl) <= torque_limit())
 
 
-def test_a_shove_is_recovered_from():
+def test_figure_recovers_from_a_shove():
     model, data, figure, pose = _figure()
     chest = model.body(PREFIX + BODIES[2]).id
     for k in range(4000):
@@ -147,7 +147,7 @@ def test_a_shove_is_recovered_from():
     assert np.linalg.norm(data.qpos[:3] - pose[:3]) < 0.02
 
 
-def test_a_flying_reference_gets_no_help_at_all():
+def test_flying_reference_gets_no_residual_or_contact_force():
     model, data, figure, pose = _figure(height=0.5)
     start = data.subtree_com[1].copy()
     v_r, a_r = np.zeros(57), np.zeros(57)
@@ -162,7 +162,7 @@ def test_a_flying_reference_gets_no_help_at_all():
     np.testing.assert_allclose(data.subtree_com[1] - start, [0, 0, -0.5 * 9.81 * 0.1**2], atol=5e-4)
 
 
-def test_a_standing_reference_cannot_hold_a_falling_figure():
+def test_standing_reference_does_not_support_a_falling_figure():
     _, data, figure, pose = _figure(height=0.3)
     pose[2] -= 0.3
     figure.update(pose, STILL, STILL)
@@ -170,11 +170,11 @@ def test_a_standing_reference_cannot_hold_a_falling_figure():
     assert figure.state.report[REPORT_SUPPORT] == 0.0
 
 
-def test_the_residual_stays_within_its_bounds():
+def test_residual_stays_within_its_bounds():
     gains = FigureGains(force_bound=0.05, moment_bound=0.01)
     _, data, figure, pose = _figure(gains=gains)
     far = pose.copy()
-    far[0] += 0.4  # nearer than what counts as a fall
+    far[0] += 0.4  # less than what counts as a fall
     figure.update(far, STILL, STILL)
     weight = figure.state.weight
     assert np.linalg.norm(data.qfrc_applied[:3]) <= 0.05 * weight * (1 + 1e-9)
@@ -182,7 +182,7 @@ def test_the_residual_stays_within_its_bounds():
     assert np.linalg.norm(data.qfrc_applied[:3]) > 0.0
 
 
-def test_a_saturated_motor_keeps_its_limit_and_its_joint_gives_way():
+def test_saturated_motor_keeps_its_limit_and_its_joint_yields():
     model, data, figure, pose = _figure()
     a_r, elbow = np.zeros(57), 6 + 3 * JOINTS.index("left_elbow")
     a_r[elbow + 2] = 450.0
@@ -194,14 +194,14 @@ def test_a_saturated_motor_keeps_its_limit_and_its_joint_gives_way():
     np.testing.assert_allclose(_imbalance(model, data, figure), 0.0, atol=0.1)
 
 
-def test_a_world_without_the_figure_is_refused():
+def test_world_without_the_figure_is_refused():
     model = floor_world(TrackingConfig())
     with pytest.raises(SimError, match="no figure with the prefix 'ghost/'"):
         Figure(model, mujoco.MjData(model), figure_model(), "ghost/")
 
 
 @pytest.mark.parametrize("gains", [{"joint_rate": -1.0}, {"root_rate": np.nan}, {"lift_time": 0.0}])
-def test_gains_that_make_no_sense_are_refused(gains):
+def test_invalid_gains_are_refused(gains):
     model = floor_world(TrackingConfig())
     with pytest.raises(SimError, match=next(iter(gains))):
         Figure(model, mujoco.MjData(model), figure_model(), PREFIX, FigureGains(**gains))

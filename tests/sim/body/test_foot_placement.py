@@ -1,4 +1,4 @@
-"""Where the feet of a figure go whose root strays in flight."""
+"""Placement of the feet of a figure whose root deviates in flight."""
 
 from pathlib import Path
 
@@ -28,17 +28,17 @@ def _in_flight():
     return pose
 
 
-def _astray(pose, shift, turn):
+def _displaced(pose, shift, turn):
     """The pose with its root moved [m] and turned [deg]."""
     moved = pose.copy()
     moved[:3] += shift
-    there = Rotation.from_quat(pose[3:7], scalar_first=True)
-    moved[3:7] = (Rotation.from_euler("xyz", turn, degrees=True) * there).as_quat(scalar_first=True)
+    rotation = Rotation.from_quat(pose[3:7], scalar_first=True)
+    moved[3:7] = (Rotation.from_euler("xyz", turn, degrees=True) * rotation).as_quat(scalar_first=True)
     return moved
 
 
-def _planned(pose, velocity, reference, reach):
-    """Accelerations of all joints that are planned in a state, for a reference at rest."""
+def _planned_acceleration(pose, velocity, reference, reach):
+    """Planned joint accelerations in a state, for a reference at rest."""
     model = floor_world(TrackingConfig())
     data = mujoco.MjData(model)
     figure = Figure(model, data, figure_model(), "figure/", FigureGains(placement_reach=reach))
@@ -48,9 +48,9 @@ def _planned(pose, velocity, reference, reach):
     return figure.state.acceleration[6:].copy()
 
 
-def _added(pose, velocity, reference, reach=1.0):
-    """What the placement of feet adds to them, in all 57 degrees of freedom."""
-    planned = [_planned(pose, velocity, reference, some) for some in (reach, 0.0)]
+def _placement_acceleration(pose, velocity, reference, reach=1.0):
+    """What foot placement adds to the planned accelerations, in all 57 degrees of freedom."""
+    planned = [_planned_acceleration(pose, velocity, reference, value) for value in (reach, 0.0)]
     return np.concatenate((np.zeros(6), planned[0] - planned[1]))
 
 
@@ -69,60 +69,60 @@ def _soles(pose, change=None):
 @pytest.mark.parametrize(
     ("shift", "turn"), [((0.02, -0.03, 0.01), (0, 0, 0)), ((0, 0, 0), (2, -3, 4)), ((0.03, 0, 0), (3, 2, -2))]
 )
-def test_feet_in_flight_go_over_their_places_whatever_the_root_does(shift, turn):
+def test_feet_in_flight_keep_their_places_under_a_displaced_root(shift, turn):
     reference = _in_flight()
-    pose = _astray(reference, shift, turn)
-    change = _added(pose, np.zeros(57), reference) / OMEGA**2
-    away = _soles(pose) - _soles(reference)
-    left = _soles(pose, change) - _soles(reference)
-    assert np.linalg.norm(left[:, :2]) < 0.1 * np.linalg.norm(away[:, :2])
+    pose = _displaced(reference, shift, turn)
+    change = _placement_acceleration(pose, np.zeros(57), reference) / OMEGA**2
+    before = _soles(pose) - _soles(reference)
+    unplaced = _soles(pose, change) - _soles(reference)
+    assert np.linalg.norm(unplaced[:, :2]) < 0.1 * np.linalg.norm(before[:, :2])
 
 
-def test_they_go_at_the_rate_at_which_the_root_strays():
+def test_feet_in_flight_compensate_the_drift_velocity_of_the_root():
     reference, velocity = _in_flight(), np.zeros(57)
     velocity[:6] = 0.1, -0.05, 0.2, 0.1, 0.2, -0.3
-    rate = _added(reference, velocity, reference) / (2.0 * OMEGA)
+    rate = _placement_acceleration(reference, velocity, reference) / (2.0 * OMEGA)
     seconds = 1e-4
     drift = (_soles(reference, seconds * velocity) - _soles(reference)) / seconds
-    left = (_soles(reference, seconds * (velocity + rate)) - _soles(reference)) / seconds
-    assert np.linalg.norm(left[:, :2]) < 0.1 * np.linalg.norm(drift[:, :2])
+    unplaced = (_soles(reference, seconds * (velocity + rate)) - _soles(reference)) / seconds
+    assert np.linalg.norm(unplaced[:, :2]) < 0.1 * np.linalg.norm(drift[:, :2])
 
 
-def test_feet_are_displaced_by_no_more_than_their_reach():
+def test_foot_displacement_is_limited_by_the_placement_reach():
     reference = _in_flight()
-    pose, still, reach = _astray(reference, (0.4, 0.0, 0.0), (0, 0, 0)), np.zeros(57), 0.02
-    moved = _soles(pose, _added(pose, still, reference, reach) / OMEGA**2) - _soles(pose)
+    pose, still, reach = _displaced(reference, (0.4, 0.0, 0.0), (0, 0, 0)), np.zeros(57), 0.02
+    moved = _soles(pose, _placement_acceleration(pose, still, reference, reach) / OMEGA**2) - _soles(pose)
     np.testing.assert_allclose(moved[:, 0], -reach, rtol=0.1)
 
 
-def test_a_figure_at_its_reference_is_left_as_it_is():
+def test_figure_at_its_reference_gets_no_placement():
     pose = _in_flight()
-    np.testing.assert_array_equal(_added(pose, np.zeros(57), pose), 0.0)
+    np.testing.assert_array_equal(_placement_acceleration(pose, np.zeros(57), pose), 0.0)
 
 
 @pytest.mark.parametrize("turn", [(180, 0, 0), (0, 100, 0)])
-def test_in_a_somersault_feet_that_are_not_under_the_root_are_left_as_they_are(turn):
-    reference = _astray(_in_flight(), (0, 0, 1.0), turn)
-    pose = _astray(reference, (0.03, 0.02, 0), (0, 0, 0))
-    np.testing.assert_array_equal(_added(pose, np.zeros(57), reference), 0.0)
+def test_feet_not_under_the_root_are_not_placed(turn):
+    reference = _displaced(_in_flight(), (0, 0, 1.0), turn)
+    pose = _displaced(reference, (0.03, 0.02, 0), (0, 0, 0))
+    np.testing.assert_array_equal(_placement_acceleration(pose, np.zeros(57), reference), 0.0)
 
 
 @pytest.mark.slow
-def test_a_somersault_is_not_disturbed():
-    """Up to its landing at 1.67 s, which takes all that its legs have with placed feet and without."""
+def test_placement_does_not_disturb_a_somersault():
+    """Up to its landing at 1.67 s, where the legs saturate with and without placement."""
     clip = embedded("backflip")
-    placed, left = (
+    placed, unplaced = (
         track(clip, 1.65, TrackingConfig(gains=FigureGains(placement_reach=reach)))
         for reach in (FigureGains().placement_reach, 0.0)
     )
     for measure in ("joint_error", "root_error_max"):
-        assert getattr(placed, measure) < 1.3 * getattr(left, measure)
+        assert getattr(placed, measure) < 1.3 * getattr(unplaced, measure)
     assert placed.joint_error < 0.5
     assert placed.root_error_max < 0.01
 
 
 @pytest.mark.slow
-def test_a_capture_that_jumps_again_and_again_does_not_fall():
+def test_repeated_captured_jumps_do_not_fall():
     file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
@@ -132,16 +132,16 @@ def test_a_capture_that_jumps_again_and_again_does_not_fall():
 
 
 @pytest.mark.slow
-def test_placed_feet_lower_what_a_series_of_jumps_lacks():
+def test_placement_lowers_the_residual_of_repeated_jumps():
     file = MOCAP / "animated_drawings" / "jumping.bvh"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
     clip = prepared_clips([file])[0].clip
-    placed, left = (
+    placed, unplaced = (
         track(clip, 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))
         for reach in (FigureGains().placement_reach, 0.0)
     )
     # 7.1 to 9.1 %, and 9.7 to 11.8 %, from starts that differ by 0.2 mm; shares of 0.73 to 0.80.
     assert not placed.falls
     assert placed.stance.force_rms < 0.1
-    assert placed.stance.force_rms < 0.85 * left.stance.force_rms
+    assert placed.stance.force_rms < 0.85 * unplaced.stance.force_rms

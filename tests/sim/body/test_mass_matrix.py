@@ -7,7 +7,7 @@ from sim.body.mass_matrix import inertia, inertial_force, mass_matrix
 from sim.world.world import World
 
 
-def test_the_figures_mass_matrix_is_the_worlds_to_the_last_bit():
+def test_mass_matrix_and_inertial_force_equal_mujoco_bit_for_bit():
     world, random = World(), np.random.default_rng(3)
     world.data.qpos += 0.3 * random.normal(size=world.model.nq)
     mujoco.mj_normalizeQuat(world.model, world.data.qpos)

@@ -26,7 +26,7 @@ def _squats() -> Clip:
     return Clip(poses, 60.0, "squats")
 
 
-def test_a_feasible_motion_needs_no_help():
+def test_feasible_motion_needs_no_residual():
     result = track(_squats(), 2.5)
     assert result.joint_error < 1.0
     assert result.root_error_max < 0.005
@@ -37,7 +37,7 @@ def test_a_feasible_motion_needs_no_help():
     assert result.warnings == 0
 
 
-def test_the_residual_of_a_clip_that_is_not_repeated_is_not_diluted_by_the_time_it_is_held():
+def test_residual_of_an_open_clip_is_not_diluted_by_holding_its_end():
     # A third of a kick that lacks some 10 % of weight.
     angry = embedded("angry")
     part = Clip(angry.poses[: angry.n_frames // 3], angry.fps, "part of angry")
@@ -47,21 +47,21 @@ def test_the_residual_of_a_clip_that_is_not_repeated_is_not_diluted_by_the_time_
     assert long.seconds == pytest.approx(short.seconds + 3.0, abs=0.01)
 
 
-def test_the_figure_holds_a_push_up():
-    """Its palms are where load is planned for: what else of a hand touched the floor would hold them above it."""
+def test_figure_holds_a_push_up():
+    """Load is planned at the palms; they stay on the floor, as nothing else of the hand touches it first."""
     result = track(held(61), 1.0)
     assert result.falls == ()
     assert result.stance.force_rms < 0.02
     assert result.root_error_max < 0.01
 
 
-def test_light_and_tall_figures_squat_too():
+def test_lighter_figure_tracks_squats():
     result = track(_squats(), 1.0, TrackingConfig(mass=50.0))
     assert result.joint_error < 1.0
     assert result.stance.force_max < 0.01
 
 
-def test_the_walk_stays_within_its_figures():
+def test_walk_stays_within_error_and_residual_bounds():
     result = track(embedded("walk"), 4.0)
     assert result.joint_error <= 5.0
     assert result.root_error_max <= 0.05
@@ -71,7 +71,7 @@ def test_the_walk_stays_within_its_figures():
     assert result.warnings == 0
 
 
-def test_the_run_flies_without_help():
+def test_run_flies_without_residual():
     motion = tracked_motion(embedded("run"), 3.0, TrackingConfig())
     result = report(motion)
     assert result.flight_seconds > 0.2
@@ -82,7 +82,7 @@ def test_the_run_flies_without_help():
     assert result.root_error_max <= 0.05
 
 
-def test_a_foot_that_swings_low_over_the_floor_is_not_held_to_it():
+def test_low_swinging_foot_is_not_taken_for_stance():
     # Backwards and slowly, the walk's heels skim the floor at 5 mm and 1 to 2 m/s.
     walk = embedded("walk")
     clip = Clip(walk.poses[::-1], 0.65 * walk.fps, "walk backwards")
@@ -94,8 +94,8 @@ def test_a_foot_that_swings_low_over_the_floor_is_not_held_to_it():
 
 
 @pytest.mark.parametrize("name", embedded_names())
-def test_every_embedded_clip_goes_through_the_physics(name):
-    """The backflip until it lands, after which it may fall: what it does then is chance."""
+def test_every_embedded_clip_is_tracked_within_bounds(name):
+    """The backflip only until it lands: whether it falls afterwards is chance."""
     result = track(embedded(name), 1.65 if name == "backflip" else 2.0)
     assert result.warnings == 0
     assert result.residual_in_flight == 0.0
@@ -106,24 +106,24 @@ def test_every_embedded_clip_goes_through_the_physics(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", embedded_names())
-def test_ten_seconds_of_every_embedded_clip(name):
+def test_every_embedded_clip_is_tracked_for_ten_seconds(name):
     result = track(embedded(name), 10.0)
     assert result.warnings == 0
     assert result.residual_in_flight == 0.0
-    if name != "backflip":  # nothing steers a flight, so that one of several flips in a row may end in a fall
+    if name != "backflip":  # flight is not controlled, so one of several flips in a row may end in a fall
         assert result.joint_error < 10.0
         assert result.root_error < 0.05
 
 
-def test_an_infeasible_motion_shows_in_the_residual():
+def test_infeasible_motion_shows_in_the_residual():
     glide = _squats()
     poses = np.tile(glide.poses[0], (121, 1))
-    poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, feet and all
+    poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, with its feet
     result = track(Clip(poses, 60.0, "glide"), 1.5)
     assert result.stance.force_rms > 0.05 or result.root_error > 0.05
 
 
-def test_the_same_motion_tracks_the_same_every_time():
+def test_repeated_tracking_is_identical():
     first, second = (tracked_motion(_squats(), 0.5, TrackingConfig()) for _ in range(2))
     np.testing.assert_array_equal(first.poses, second.poses)
     np.testing.assert_array_equal(first.reports, second.reports)
@@ -132,11 +132,11 @@ def test_the_same_motion_tracks_the_same_every_time():
 @pytest.mark.parametrize(
     ("arguments", "message"), [({"physics_step": 0.0}, "physics step"), ({"control_steps": 0}, "control every 0")]
 )
-def test_steps_that_make_no_sense_are_refused(arguments, message):
+def test_invalid_step_sizes_are_refused(arguments, message):
     with pytest.raises(SimError, match=message):
         TrackingConfig(**arguments)
 
 
-def test_no_time_is_refused():
+def test_negative_duration_is_refused():
     with pytest.raises(SimError, match=r"-1\.0 s of tracking"):
         track(_squats(), -1.0)

@@ -12,14 +12,14 @@ from sim.compilation.c_function import address_for_c, address_of, call_int, call
 from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import number_at
 from sim.compilation.python_clock import clock_for_c, seconds
-from tests.devices.firmware import compiled
+from tests.devices.firmware import compile_c
 
 head, hidden_head = struct_heads(False), struct_heads(True)
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory) -> ctypes.CDLL:
-    return ctypes.CDLL(str(compiled(tmp_path_factory.mktemp("c"), Path(__file__).parent / "c_functions.c")))
+    return ctypes.CDLL(str(compile_c(tmp_path_factory.mktemp("c"), Path(__file__).parent / "c_functions.c")))
 
 
 @njit
@@ -44,14 +44,14 @@ def twice(place: int) -> np.uint32:
     return np.uint32(2.0 * number_at(place))
 
 
-def test_arguments_go_by_value_whatever_their_types(library) -> None:
+def test_arguments_of_all_types_are_passed_by_value(library) -> None:
     assert call_total(address_of(library.total), np.array([30_000.0])) == -3 + 200 + 7 + 1000 + 30_000 + 100_000
     call_keep(address_of(library.keep))
     library.kept_numbers.restype = ctypes.POINTER(ctypes.c_double)
     assert library.kept_numbers()[:3] == [-2.0, -4.0, -6.0]
 
 
-def test_a_struct_s_first_number_is_found_in_registers_and_behind_a_hidden_pointer(library) -> None:
+def test_first_struct_field_is_returned_in_registers_and_by_hidden_pointer(library) -> None:
     assert codes(address_of(library.give), address_of(library.give_hidden)) == (0xC0DE, 0xC0DE)
 
 
@@ -61,7 +61,7 @@ def test_c_calls_a_compiled_function(library) -> None:
     assert library.ask(address_for_c(twice, types.uint32(types.intp)), numbers.ctypes.data) == 42
 
 
-def test_python_s_clock_is_the_same_in_c_and_any_other_is_asked() -> None:
+def test_compiled_clock_equals_perf_counter_and_other_clocks_are_called() -> None:
     clock = clock_for_c(time.perf_counter)
     assert seconds(address_of(clock)) > 0.0  # compiled
     before = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Code generation left to the unit: the same results, errors and addresses, and no symbol undefined."""
+"""Code generation deferred to the unit: the same results, errors and addresses, and no undefined symbols."""
 
 import gc
 import itertools
@@ -21,7 +21,7 @@ VECTOR = types.Array(types.float64, 1, "C")
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
 
 
@@ -43,29 +43,29 @@ def _factorial(n):
 
 
 @njit
-def _all_of_it(x, out):
+def _combined(x, out):
     work = np.empty(3)
     work[:] = x[:3]
     out[0] = _twice_halved(work.sum()) + math.sin(x[0]) + _factorial(5)
     out[1] = min(x[0], x[1]) ** 3
 
 
-def test_it_is_at_work_with_the_version_that_is_pinned():
+def test_install_succeeds_for_the_pinned_numba_version():
     assert install()
     assert any(numba.__version__.startswith(version + ".") for version in TESTED)
     pinned = Path(deferred_codegen.__file__).parents[2] / "pyproject.toml"
     assert '"numba>=0.68,<0.69"' in pinned.read_text(encoding="utf-8")
 
 
-def test_flags_are_told_apart_as_numba_does():
+def test_flags_compare_and_hash_as_in_numba():
     install()
-    kinds = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
-    for a, b in itertools.product([kind() for kind in kinds], repeat=2):
+    constructors = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
+    for a, b in itertools.product([kind() for kind in constructors], repeat=2):
         # What numba's own `values` would give: every option's property.
-        told, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
-        assert list(a.values().items()) == list(told.items())
-        assert (a == b) == (told == others)
-        assert hash(a) == hash(tuple(sorted(told)))
+        options, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
+        assert list(a.values().items()) == list(options.items())
+        assert (a == b) == (options == others)
+        assert hash(a) == hash(tuple(sorted(options)))
     assert _with("fastmath", True) != Flags()
     assert Flags() != "flags"
 
@@ -76,7 +76,7 @@ def _with(name, value):
     return flags
 
 
-def test_garbage_is_collected_as_before_once_a_function_is_compiled_or_is_not():
+def test_gc_threshold_is_restored_after_compilation_and_after_its_failure():
     before = gc.get_threshold()
     njit(lambda x: x + 1)(2)
     assert gc.get_threshold() == before
@@ -85,14 +85,14 @@ def test_garbage_is_collected_as_before_once_a_function_is_compiled_or_is_not():
     assert gc.get_threshold() == before
 
 
-def test_another_version_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch):
+def test_untested_numba_version_is_left_unpatched(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(deferred_codegen, "TESTED", ("0.1",))
     assert not install()
 
 
 @pytest.mark.slow
-def test_a_unit_has_no_undefined_symbol_and_its_parts_are_not_emitted():
-    result = njit(_all_of_it.py_func).get_compile_result(types.void(VECTOR, VECTOR))
+def test_unit_has_no_undefined_symbols_and_its_parts_are_deferred():
+    result = njit(_combined.py_func).get_compile_result(types.void(VECTOR, VECTOR))
     assert isinstance(result.library, UnitLibrary)
     assert not result.library.deferred
     assert not undefined_symbols(result.library._final_module)
@@ -101,13 +101,13 @@ def test_a_unit_has_no_undefined_symbol_and_its_parts_are_not_emitted():
     assert undefined_symbols(part.library._final_module)
 
 
-def test_results_are_those_of_python():
+def test_results_equal_those_of_python():
     out, x = np.empty(2), np.array([0.3, 0.2, 0.5])
-    njit(_all_of_it.py_func)(x, out)
+    njit(_combined.py_func)(x, out)
     np.testing.assert_allclose(out, [0.25 + math.sin(0.3) + 120.0, 0.2**3], rtol=1e-15)
 
 
-def test_a_part_can_be_called_from_python_and_by_others_later():
+def test_part_of_a_unit_is_callable_from_python_and_other_functions():
     @njit
     def user(x):
         return _halved(x) + 1.0
@@ -123,7 +123,7 @@ def test_recursion_works_alone_and_within_a_unit():
     assert _factorial(5) == 120
 
 
-def test_an_error_in_a_part_reaches_python():
+def test_exception_in_a_part_reaches_python():
     with pytest.raises(ValueError, match="negative"):
         njit(lambda x: _twice_halved(x))(-1.0)
 
@@ -151,11 +151,11 @@ for t in np.linspace(0.0, 25.0, 200):
 
 
 @pytest.mark.slow
-def test_a_law_gives_what_plain_numba_gives_to_the_last_bit():
+def test_law_equals_plain_numba_bit_for_bit():
     root = Path(deferred_codegen.__file__).parent.parent
-    told = [
+    options = [
         subprocess.run([sys.executable, "-c", _PLAIN, way], check=True, capture_output=True, text=True, cwd=root).stdout
         for way in ("plain", "deferred")
     ]
-    assert len(told[0]) > 10_000
-    assert told[0] == told[1]
+    assert len(options[0]) > 10_000
+    assert options[0] == options[1]

@@ -1,4 +1,4 @@
-"""Units of compiled code: a run compiles what it uses, the next process finds it, and every path gives the same."""
+"""Units of compiled code: a run compiles what it uses, later processes load it, and all call paths agree."""
 
 import os
 import pickle
@@ -35,7 +35,7 @@ ARM = default_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
 
 
-def test_a_map_and_a_law_are_linked_by_the_addresses_of_their_kernels():
+def test_maps_and_laws_are_linked_by_kernel_address():
     stages, laws = linked_stages(ARM.compiled().stages), law_units((FIELD + FIELD).limited(2.0))
     assert kernels_of(stages) == (robot_arm_map,)
     assert len(laws) == 1
@@ -44,14 +44,14 @@ def test_a_map_and_a_law_are_linked_by_the_addresses_of_their_kernels():
     np.testing.assert_array_equal(linked_stages(ARM.compiled().stages), stages)
 
 
-def test_a_map_from_another_process_has_the_kernels_of_this_one():
+def test_unpickled_map_has_the_same_kernels():
     walk = embedded("walk")
-    made = expressive_figure(Cylindrical([(walk.poses, walk.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
-    copied = pickle.loads(pickle.dumps(made))
+    haptic_map = expressive_figure(Cylindrical([(walk.poses, walk.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
+    copied = pickle.loads(pickle.dumps(haptic_map))
     assert kernels_of(copied.compiled().stages) == (cylindrical_map, express)
 
 
-def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
+def test_map_called_by_address_equals_python_bit_for_bit():
     compiled, rng = ARM.compiled(), np.random.default_rng(1)
     points = np.hstack((rng.uniform(-0.05, 0.05, (20, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))))
     poses = np.empty((20, ARM.nq))
@@ -59,7 +59,7 @@ def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
     np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
 
 
-def test_a_unit_answers_python_too():
+def test_linked_unit_is_also_called_from_python():
     linked_stages(ARM.compiled().stages)
     kernel: Any = robot_arm_map
     units = list(kernel.overloads)
@@ -69,24 +69,24 @@ def test_a_unit_answers_python_too():
     assert kernel._cache.cache_path == str(cache_folder())
 
 
-def test_a_derivative_by_its_kernel_s_address_is_that_of_python_to_the_last_bit():
+def test_derivative_called_by_address_equals_python_bit_for_bit():
     for place in np.random.default_rng(2).uniform(-0.05, 0.05, (5, 3)):
         x = np.append(place, [1.0, 0.0, 0.0, 0.0])
         np.testing.assert_array_equal(map_derivative(ARM, x), ARM.jacobian(x))
 
 
-def test_a_field_kept_on_disk_is_the_field_of_python_to_the_last_bit():
+def test_field_loaded_from_disk_equals_python_bit_for_bit():
     program, units = (FIELD + FIELD).limited(2.0), law_units(FIELD)
-    named, other, wrench, same = program.fresh_memory(), program.fresh_memory(), np.empty(6), np.empty(6)
+    named, other, wrench, linked_wrench = program.fresh_memory(), program.fresh_memory(), np.empty(6), np.empty(6)
     for t in np.linspace(0.0, 4.0, 50):
         hand = HandState.at((0.05 * np.cos(t), 0.04 * np.sin(t), 0.01), (0.1, 0.0, 0.0), t).vector()
         evaluate(*program.compiled(), named, hand, wrench)
-        evaluate(units, program.ops, program.params, other, hand, same)
-        np.testing.assert_array_equal(same, wrench)
+        evaluate(units, program.ops, program.params, other, hand, linked_wrench)
+        np.testing.assert_array_equal(linked_wrench, wrench)
         np.testing.assert_array_equal(other, named)
 
 
-def test_what_is_not_compiled_is_an_error_and_no_crash():
+def test_unlinked_map_or_law_is_an_error_and_not_a_crash():
     stages, params, memory, _ = ARM.compiled()
     with pytest.raises(ControllerError, match="map is not compiled; its stages are not linked"):
         evaluate_map(stages, params, np.zeros(7), memory, np.empty(ARM.nq))
@@ -107,16 +107,16 @@ print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values())
 
 
 @pytest.mark.slow
-def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
+def test_next_process_loads_the_unit_also_from_a_copy_of_the_sources(tmp_path):
     here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
     for package in ("models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
-    told = [
+    outputs = [
         subprocess.run(
             [sys.executable, "-c", _PROCESS], check=True, capture_output=True, text=True, cwd=sources,
             env=os.environ | {"HVF_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(sources)},
         ).stdout.split()
         for sources in (here, here, copy)
     ]  # fmt: skip
-    assert [row[:2] for row in told] == [["0", "1"], ["1", "0"], ["1", "0"]]
-    assert [Path(row[2]).parents[2] for row in told] == [here, here, copy]
+    assert [row[:2] for row in outputs] == [["0", "1"], ["1", "0"], ["1", "0"]]
+    assert [Path(row[2]).parents[2] for row in outputs] == [here, here, copy]

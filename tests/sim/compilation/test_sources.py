@@ -1,4 +1,4 @@
-"""Hash of what a module is made of: other after a change of code that it reaches, and after no other."""
+"""Hash of a module's sources: changes with the code that the module reaches, and with nothing else."""
 
 import shutil
 from collections.abc import Iterator
@@ -23,37 +23,37 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sources_hash.cache_clear()
 
 
-def hashed() -> str:
+def fresh_hash() -> str:
     sources_hash.cache_clear()
     return sources_hash(MODULE)
 
 
-def edited(tree: Path, name: str, text: str) -> str:
+def hash_after_edit(tree: Path, name: str, text: str) -> str:
     with (tree / name).open("a", encoding="utf-8") as file:
         file.write(text)
-    return hashed()
+    return fresh_hash()
 
 
-def test_a_change_in_what_a_module_imports_however_far_is_another_hash(tree: Path) -> None:
-    before = hashed()
-    own = edited(tree, "controllers/haptic_map/cylindrical.py", "\nAGAIN = 1\n")
-    assert own != before
-    assert edited(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != own
+def test_change_in_a_direct_or_transitive_import_changes_the_hash(tree: Path) -> None:
+    before = fresh_hash()
+    after_own_edit = hash_after_edit(tree, "controllers/haptic_map/cylindrical.py", "\nAGAIN = 1\n")
+    assert after_own_edit != before
+    assert hash_after_edit(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != after_own_edit
 
 
-def test_a_comment_a_docstring_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
-    before = hashed()
-    assert edited(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
-    assert edited(tree, "controllers/rotations.py", '\n"""Words that stand alone."""\n') == before
-    assert edited(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
+def test_comments_docstrings_and_unrelated_modules_leave_the_hash(tree: Path) -> None:
+    before = fresh_hash()
+    assert hash_after_edit(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
+    assert hash_after_edit(tree, "controllers/rotations.py", '\n"""Words that stand alone."""\n') == before
+    assert hash_after_edit(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
 
 
-def test_what_is_kept_of_files_gives_the_same_hash_and_nothing_kept_or_nonsense_does_no_harm(tree: Path) -> None:
-    first = hashed()
-    (kept,) = (tree / "cache").rglob("code.json")
-    assert hashed() == first
-    for nonsense in ("[1, 2", "7.5", "[[1]]"):
-        kept.write_text(nonsense, encoding="utf-8")
-        assert hashed() == first
-    kept.unlink()
-    assert hashed() == first
+def test_hash_is_the_same_with_a_stored_corrupt_or_missing_cache_file(tree: Path) -> None:
+    first = fresh_hash()
+    (cache_file,) = (tree / "cache").rglob("code.json")
+    assert fresh_hash() == first
+    for invalid in ("[1, 2", "7.5", "[[1]]"):
+        cache_file.write_text(invalid, encoding="utf-8")
+        assert fresh_hash() == first
+    cache_file.unlink()
+    assert fresh_hash() == first

@@ -1,4 +1,4 @@
-"""Units on disk: compiled once, found by the next process and by several at once, and never believed when damaged."""
+"""Units on disk: compiled once, shared between processes, and recompiled when damaged."""
 
 import os
 import shutil
@@ -51,7 +51,7 @@ def _compiled(kernel) -> int:
     return sum(kernel.stats.cache_misses.values())
 
 
-def test_a_unit_is_compiled_once(folder: Path):
+def test_unit_is_compiled_once(folder: Path):
     first, second, other = _kernel(2.0), _kernel(2.0), _kernel(3.0)
     assert [first(4.0), second(4.0), other(4.0)] == [8.0, 8.0, 12.0]
     assert [_compiled(kernel) for kernel in (first, second, other)] == [1, 0, 1]
@@ -59,32 +59,32 @@ def test_a_unit_is_compiled_once(folder: Path):
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", None])
-def test_a_damaged_file_is_not_believed(folder: Path, damage: bytes | None):
+def test_damaged_file_is_recompiled(folder: Path, damage: bytes | None):
     _kernel(2.0)(4.0)
     (path,) = folder.glob("*.unit")
     content = path.read_bytes()
     path.write_bytes(content[:-7] + b"changed" if damage is None else damage)
     assert not is_sound(path)
-    again = _kernel(2.0)
-    assert again(4.0) == 8.0
-    assert _compiled(again) == 1
+    reloaded = _kernel(2.0)
+    assert reloaded(4.0) == 8.0
+    assert _compiled(reloaded) == 1
     assert is_sound(path)
 
 
-def test_a_file_that_is_whole_and_holds_something_else_is_not_believed(folder: Path):
+def test_intact_file_without_a_unit_is_recompiled(folder: Path):
     _kernel(2.0)(4.0)
     (path,) = folder.glob("*.unit")
     unit_cache._write(path, b"no pickle")
     assert _kernel(2.0)(4.0) == 8.0
 
 
-def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_unwritable_cache_folder_is_tolerated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "file"))
     assert _kernel(2.0)(4.0) == 8.0
 
 
-def test_many_writers_leave_one_whole_file(tmp_path: Path):
+def test_concurrent_writers_leave_one_intact_file(tmp_path: Path):
     path, contents = tmp_path / "a.unit", [bytes([i]) * 100_000 for i in range(32)]
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda content: unit_cache._write(path, content), contents))
@@ -93,7 +93,7 @@ def test_many_writers_leave_one_whole_file(tmp_path: Path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_only_what_was_not_used_in_months_is_removed(tmp_path: Path):
+def test_only_units_unused_for_months_are_removed(tmp_path: Path):
     old, new, foreign = tmp_path / "old.unit", tmp_path / "new.unit", tmp_path / "old.kept"
     for path in (old, new, foreign):
         path.touch()
@@ -105,7 +105,7 @@ def test_only_what_was_not_used_in_months_is_removed(tmp_path: Path):
     assert foreign.exists()
 
 
-def test_flush_removes_the_units_of_a_function_and_of_no_other(folder: Path):
+def test_flush_removes_only_the_units_of_its_function(folder: Path):
     @entry_point
     def single(x):
         return x
@@ -116,7 +116,7 @@ def test_flush_removes_the_units_of_a_function_and_of_no_other(folder: Path):
     assert [path.name.split("-")[0].split(".")[-1] for path in folder.glob("*.unit")] == ["single"]
 
 
-def test_what_holds_an_address_is_compiled_each_time(folder: Path):
+def test_kernel_that_holds_an_address_is_not_cached(folder: Path):
     @njit
     def factorial(n):
         return n * factorial(n - 1) if n > 1 else 1
@@ -126,7 +126,7 @@ def test_what_holds_an_address_is_compiled_each_time(folder: Path):
             assert entry_point(lambda n: factorial(5) + n)(1) == 121
 
 
-def test_an_entry_point_within_another_is_a_part_of_it(folder: Path):
+def test_nested_entry_point_is_compiled_into_its_caller(folder: Path):
     inner = _kernel(2.0)
 
     @njit
@@ -140,7 +140,7 @@ def test_an_entry_point_within_another_is_a_part_of_it(folder: Path):
 
 
 def _misses(sources: Path, cache: Path) -> list[int]:
-    """Units that a process compiles which loads both toys: `force` and `other`."""
+    """Number of units a process compiles that loads both toy kernels, `force` and `other`."""
     process = subprocess.run(
         [sys.executable, "-P", "-c", _LOAD], check=True, capture_output=True, text=True, cwd=sources,
         env=os.environ | {"HVF_CACHE_DIR": str(cache), "PYTHONPATH": f"{sources}{os.pathsep}{ROOT}"},
@@ -149,7 +149,7 @@ def _misses(sources: Path, cache: Path) -> list[int]:
 
 
 @pytest.mark.slow
-def test_a_process_compiles_what_a_change_reaches_and_nothing_else(tmp_path: Path):
+def test_source_change_recompiles_only_what_reaches_it(tmp_path: Path):
     shutil.copy(TOYS, tmp_path)
     copy, cache = tmp_path / TOYS.name, tmp_path / "cache"
     source = copy.read_text(encoding="utf-8")
@@ -163,13 +163,13 @@ def test_a_process_compiles_what_a_change_reaches_and_nothing_else(tmp_path: Pat
     assert _misses(tmp_path, cache) == [0, 0]
 
 
-def test_what_is_loaded_gives_what_was_compiled_to_the_last_bit(folder: Path):
+def test_loaded_unit_equals_the_compiled_one_bit_for_bit(folder: Path):
     def root(x, y):
         y[0] = np.sqrt(x[0] + x[1] * x[1]) if x[0] > 0.0 else np.nan
 
-    x, made, loaded = np.array([0.3, 0.7]), np.empty(1), np.empty(1)
-    entry_point(root)(x, made)
-    again = entry_point(root)
-    again(x, loaded)
-    assert _compiled(again) == 0
-    assert made.tobytes() == loaded.tobytes()
+    x, compiled, loaded = np.array([0.3, 0.7]), np.empty(1), np.empty(1)
+    entry_point(root)(x, compiled)
+    reloaded = entry_point(root)
+    reloaded(x, loaded)
+    assert _compiled(reloaded) == 0
+    assert compiled.tobytes() == loaded.tobytes()

@@ -1,4 +1,4 @@
-"""The key of a unit: other for all that its code is made of, the same for everything else."""
+"""The key of a unit: changes with everything that determines its code, and with nothing else."""
 
 import dis
 import sys
@@ -33,7 +33,7 @@ VECTOR = types.Array(types.float64, 1, "C")
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch):
-    """Keys of the toy's `force` and `other`, after its source was changed."""
+    """Keys of the toy kernels `force` and `other` after a change of their source."""
 
     def of(old: str = "", new: str = "") -> tuple[str, str]:
         assert old in SOURCE
@@ -58,9 +58,9 @@ def keys(monkeypatch: pytest.MonkeyPatch):
         ("def other", "def one_more(x: float) -> float:\n    return x\n\n\n@njit\ndef other"),
         ("x: float, out: list[float]", "x, out"),
     ],
-    ids=["comment", "no docstring", "docstring", "function more", "annotation"],
+    ids=["comment", "no docstring", "docstring", "another function", "annotation"],
 )
-def test_what_does_not_change_the_code_does_not_change_the_key(keys, old: str, new: str):
+def test_changes_without_effect_on_code_leave_the_key(keys, old: str, new: str):
     assert keys(old, new) == keys()
 
 
@@ -74,9 +74,9 @@ def test_what_does_not_change_the_code_does_not_change_the_key(keys, old: str, n
         ("@njit\ndef stretch", "@njit(fastmath=True)\ndef stretch"),
         ("    stiffness: float\n    rest: float", "    rest: float\n    stiffness: float"),
     ],
-    ids=["constant", "its type", "called function", "own code", "options", "fields of a tuple"],
+    ids=["constant", "constant's type", "called function", "own code", "options", "tuple fields"],
 )
-def test_what_changes_the_code_changes_the_key_of_what_reaches_it_only(keys, old: str, new: str):
+def test_code_changes_alter_only_the_keys_of_functions_that_reach_them(keys, old: str, new: str):
     (force, other), (force_now, other_now) = keys(), keys(old, new)
     assert force_now != force
     assert other_now == other
@@ -94,7 +94,7 @@ def _scaled(scale: object):
     return kernel
 
 
-def test_a_closure_s_variable_is_part_of_the_key():
+def test_closure_variable_is_part_of_the_key():
     one, same, two = (unit_key(_scaled(scale).py_func, (types.float64,), {}) for scale in (1.0, 1.0, 2.0))
     assert one == same != two
     assert unit_key(_scaled(_scaled(1.0)).py_func, (), {}) != unit_key(_scaled(_scaled(2.0)).py_func, (), {})
@@ -103,7 +103,7 @@ def test_a_closure_s_variable_is_part_of_the_key():
     assert unit_key(_scaled(array.copy()).py_func, (), {}) == first != unit_key(_scaled(array + 1.0).py_func, (), {})
 
 
-def test_types_of_arguments_and_options_are_part_of_the_key():
+def test_argument_types_and_options_are_part_of_the_key():
     function = _scaled(1.0).py_func
     keys = {
         unit_key(function, arguments, options)
@@ -116,12 +116,12 @@ def test_types_of_arguments_and_options_are_part_of_the_key():
 @pytest.mark.parametrize(
     "value", [object(), [1.0], {1.0}, np.array([None]), Fraction(1, 2), np.random.default_rng(1), [].append]
 )
-def test_what_no_key_can_be_made_of_is_an_error(value: object):
+def test_closure_value_without_a_key_is_an_error(value: object):
     with pytest.raises(UnknownIngredient, match="scale"):
         unit_key(_scaled(value).py_func, (types.float64,), {})
 
 
-def test_a_lent_tuple_is_described_by_its_fields():
+def test_lent_tuple_is_described_by_its_fields():
     pair, swapped = (typeof(namedtuple("Pair", names)(1.0, 2.0)) for names in ("a b", "b a"))
     described = [describe_type(kind) for kind in (pair, Lent(pair), Lent(swapped))]
     assert described[0] in described[1]
@@ -137,8 +137,8 @@ def test_unknown_types_and_names_are_errors():
         unit_key(namespace["wrong"], (), {})  # pyright: ignore[reportArgumentType]
 
 
-def test_the_same_parts_in_another_place_are_another_key():
-    def made(first, second):
+def test_order_of_called_functions_is_part_of_the_key():
+    def difference(first, second):
         @njit
         def kernel(x):
             return first(x) - second(x)
@@ -146,10 +146,10 @@ def test_the_same_parts_in_another_place_are_another_key():
         return kernel
 
     one, two = _scaled(1.0), _scaled(2.0)
-    assert unit_key(made(one, two).py_func, (), {}) != unit_key(made(two, one).py_func, (), {})
+    assert unit_key(difference(one, two).py_func, (), {}) != unit_key(difference(two, one).py_func, (), {})
 
 
-def test_numba_s_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):
+def test_numba_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):
     from sim.compilation import unit_key as module
 
     before = unit_key(_scaled(1.0).py_func, (), {})
@@ -159,14 +159,14 @@ def test_numba_s_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):
     module._platform.cache_clear()
 
 
-def test_everything_that_a_run_compiles_has_a_key_of_its_own():
+def test_keys_of_all_kernels_of_a_run_differ():
     given = [(run_block, ())] + [(kernel, LAW_ARGUMENTS) for kernel in LAWS]
     given += [(kernel, MAP_ARGUMENTS) for kernel in MAPS]
     keys = {unit_key(function.py_func, arguments, {}) for function, arguments in given}  # pyright: ignore
     assert len(keys) == len(given)
 
 
-def test_a_law_is_no_part_of_the_loop_and_the_loop_none_of_a_law():
+def test_loop_does_not_reach_laws_and_laws_do_not_reach_the_loop():
     loop = {f"{f.__module__}.{f.__qualname__}" for f in reached_functions(run_block.py_func)}  # pyright: ignore
     laws = {kernel.__name__ for kernel in LAWS}
     assert not {name.rsplit(".", 1)[1] for name in loop} & laws
@@ -175,14 +175,14 @@ def test_a_law_is_no_part_of_the_loop_and_the_loop_none_of_a_law():
     assert all(name.startswith("controllers.") for name in follow)
 
 
-def test_what_is_chosen_by_the_type_of_a_device_is_part_of_the_loop() -> None:
+def test_kernels_chosen_by_device_type_are_part_of_the_loop() -> None:
     reached = {f"{function.__module__}.{function.__qualname__}" for function in reached_functions(run_block.py_func)}
     for kernel in ("devices.exchange.sense_exchange", "devices.simulated.advance_simulated"):
         assert f"sim.{kernel}" in reached
     assert "controllers.safety.faults.judge_reading" in reached
 
 
-def test_instructions_and_names_are_read_as_python_s_own_module_reads_them() -> None:
+def test_instructions_and_names_are_decoded_as_by_dis() -> None:
     kernels = (run_block, *LAWS, *MAPS)
     for function in {id(f): f for kernel in kernels for f in reached_functions(kernel.py_func)}.values():
         code = function.__code__
@@ -200,7 +200,7 @@ def test_instructions_and_names_are_read_as_python_s_own_module_reads_them() -> 
 FIRST, SECOND = 1.0, 2.0
 
 
-def test_the_first_of_two_globals_in_a_row_is_part_of_the_key() -> None:
+def test_first_of_two_adjacent_globals_is_part_of_the_key() -> None:
     def of_two(first: float) -> str:
         def pair():
             return max(FIRST, SECOND)

@@ -1,4 +1,4 @@
-"""Kernels so small that compiling them takes no time: what the tests of units compile."""
+"""Kernels for the tests of units, so small that they compile quickly."""
 
 from typing import NamedTuple
 

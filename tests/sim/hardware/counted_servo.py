@@ -1,7 +1,7 @@
-"""A servo against the clock whose ticks' calls of the heap are counted: run with `heap_calls.c` preloaded.
+"""A servo whose heap calls per tick are counted: run with `heap_calls.c` preloaded.
 
-With PYTHONMALLOC=malloc what Python takes comes from the same functions as what compiled code, NumPy, MuJoCo and libc
-take, so nothing is hidden in a pool.
+With PYTHONMALLOC=malloc Python allocates through the same functions as compiled code, NumPy, MuJoCo and libc, so that
+no allocation is hidden in a pool.
 """
 
 import ctypes
@@ -35,7 +35,7 @@ from sim.hardware.servo_process import (
 )
 from sim.hardware.shared import Ring, SharedNumbers
 from tests.devices.firmware import calibration, identity
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo
 
 WARM, TICKS = 500.0, 2000.0
 
@@ -74,7 +74,7 @@ class Reports:
 
 
 class Frames:
-    """A mock of HDAPI, whose thread goes on by itself: a turn that follows in time on one with a sample has to wait."""
+    """A mock of HDAPI, whose thread runs by itself: the tick after one with a sample waits for the next sample."""
 
     def __init__(self, library: str):
         self.hd = HDAPI.load(library)
@@ -112,13 +112,13 @@ DEVICES = {"packets": Packets, "HID": Reports, "HDAPI": Frames, "DHD": Poses}
 
 
 class CountedServo(ServoProcess):
-    """Counts after tick `WARM`, but for what the device does between two turns, and orders its end `TICKS` later."""
+    """Counts from tick `WARM` on, except what the device does between two ticks, and stops `TICKS` later."""
 
     def __init__(self, device: Packets | Reports | Frames | Poses):
         self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
         _, reports = multiprocessing.get_context("spawn").Pipe(duplex=False)
         self.device, self.order = device, np.zeros(ORDER_SIZE)
-        self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **AT_ONCE))
+        self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **UNRAMPED_GATE))
         self.order[[ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST]] = 1.0, 1.0, ARM
         self.orders.write(self.order)
         self.heap = ctypes.CDLL(None)

@@ -1,4 +1,4 @@
-"""Gated servos of an emulated Phantom and a FOLLOW field with no clips behind them."""
+"""Gated servos of an emulated Phantom and a FOLLOW field without clips."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from controllers.safety.faults import Fault
 from controllers.safety.gate import Gate
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
-from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_THETA, exchange
+from sim.devices.exchange import READING_CLOCK, READING_THETA, exchange
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker, columns
 from sim.users.hand.arm import Arm
@@ -15,7 +15,7 @@ from sim.world.linkage import Linkage
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, follow_program
 
 PERIOD = 1e-3
-AT_ONCE = {"ramp": PERIOD, "quiet": PERIOD, "small": 10.0, "force": 8.5, "slew": 5000.0}
+UNRAMPED_GATE = {"ramp": PERIOD, "quiet": PERIOD, "small": 10.0, "force": 8.5, "slew": 5000.0}
 
 
 def gated_servo(driver=None, linkage: Linkage | None = None, arm: Arm | None = None, program=None, holds: float = 0.0,
@@ -34,18 +34,18 @@ def run(ticker: Ticker, n: int, first: int = 0, request: int = NO_REQUEST) -> di
     return columns(np.array(rows))
 
 
-def active(ticker: Ticker, n: int = 150) -> int:
+def activate(ticker: Ticker, n: int = 150) -> int:
     run(ticker, n, request=ARM)
     return n
 
 
-class Broken:
-    """A driver through which faults are ordered: `read` and `write` pass until one is due."""
+class FaultyDriver:
+    """A driver that injects faults: `read` and `write` are passed on until one is set."""
 
     def __init__(self, driver: EmulatedPhantom):
         self.driver, self.identity, self.telemetry = driver, driver.identity, driver.telemetry
         self.read_fault = self.write_fault = None
-        self.spoil = lambda reading: None
+        self.tamper = lambda reading: None
         self.silent, self.let_go_calls, self.last = 0, 0, np.zeros(3)
 
     def read(self, reading, timeout) -> bool:
@@ -55,7 +55,7 @@ class Broken:
             self.silent -= 1
             return False
         new = self.driver.read(reading, timeout)
-        self.spoil(reading)
+        self.tamper(reading)
         return new
 
     def write(self, torque, enable) -> None:
@@ -72,29 +72,25 @@ class Broken:
         self.driver.close()
 
 
-def nan_in(place: int, value: float):
-    def spoil(reading) -> None:
-        reading[place] = value
+def overwrite(index: int, value: float):
+    def tamper(reading) -> None:
+        reading[index] = value
 
-    return spoil
+    return tamper
 
 
-def jump(axis: int):
-    def spoil(reading) -> None:
+def jump_joint(axis: int):
+    def tamper(reading) -> None:
         reading[READING_THETA + axis] += 0.4
 
-    return spoil
+    return tamper
 
 
 def clock_back(reading) -> None:
     reading[READING_CLOCK] -= 3.0
 
 
-def _frozen_sequence(reading) -> None:
-    reading[READING_SEQUENCE] = 100.0
-
-
-PLACES = (READING_CLOCK, *range(READING_THETA, READING_THETA + 6))
+READING_INDICES = (READING_CLOCK, *range(READING_THETA, READING_THETA + 6))
 DRIVER_FAULTS = (
     (Fault.UNPLUGGED, 0.0), (Fault.CHECKSUM_WRONG, 3.0), (Fault.SEQUENCE_BACK, 2.0), (Fault.OVER_TEMPERATURE, 95.0),
     (Fault.DEVICE_RESET, 0.0), (Fault.VERSION_WRONG, 9.0), (Fault.REPORT_MALFORMED, 63.0), (Fault.DEVICE_REPORTED, 7.0),

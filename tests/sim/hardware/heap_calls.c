@@ -1,5 +1,5 @@
-/* Counts what threads take from the heap, each while its window is open; preloaded before glibc, whose functions it
- * calls. */
+/* Counts heap allocations of each thread between heap_open() and heap_close(); preloaded before glibc, whose functions
+ * it calls. */
 #include <stddef.h>
 
 extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t);

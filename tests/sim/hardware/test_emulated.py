@@ -1,4 +1,4 @@
-"""The device that is real to the software: its hand, and what it does when commands stay out."""
+"""The emulated device: its hand, and its behaviour without commands."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def tip(device: EmulatedPhantom) -> np.ndarray:
     return np.array(forward_kinematics(tuple(reading[READING_THETA : READING_THETA + 3])))
 
 
-def test_a_hand_takes_the_stylus_where_it_is_when_the_motors_go_off() -> None:
+def test_hand_catches_the_stylus_where_it_is_when_motors_go_off() -> None:
     device = EmulatedPhantom(SceneConfig(servo_period=PERIOD, physics_step=PERIOD), START, holds=0.01)
     begin = tip(device)
     for _ in range(150):
@@ -38,7 +38,7 @@ def test_a_hand_takes_the_stylus_where_it_is_when_the_motors_go_off() -> None:
 
 
 @pytest.mark.parametrize("step", [1.25e-4, 5e-4, 1e-3])
-def test_a_delay_of_a_servo_period_is_the_command_before_whatever_the_physics_step(step: float) -> None:
+def test_delay_of_a_servo_period_applies_the_previous_command_at_any_physics_step(step: float) -> None:
     scene = SceneConfig(servo_period=PERIOD, physics_step=step)
     late, prompt = (EmulatedPhantom(scene, START, Linkage(delay=delay), holds=0.0) for delay in (PERIOD, 0.0))
     torques = 0.05 * np.random.default_rng(1).standard_normal((40, 3))

@@ -1,4 +1,4 @@
-"""A servo behind a gate is the simulation's run where all is well, and lets go within two ticks where it is not."""
+"""A servo behind a gate: equal to the simulation without faults, motors off within two ticks after a fault."""
 
 import numpy as np
 import pytest
@@ -13,34 +13,34 @@ from sim.world.linkage import Linkage
 from tests.sim.bare_servos import bare_servo, device_world, follow_program, simulated
 from tests.sim.bare_servos import run as run_bare
 from tests.sim.hardware.emulation import (
-    AT_ONCE,
     DRIVER_FAULTS,
     PERIOD,
-    PLACES,
-    Broken,
-    active,
+    READING_INDICES,
+    UNRAMPED_GATE,
+    FaultyDriver,
+    activate,
     clock_back,
     gated_servo,
-    jump,
-    nan_in,
+    jump_joint,
+    overwrite,
     run,
 )
 
 
-def test_follow_through_a_driver_is_the_simulation_s_run_within_a_millimetre() -> None:
+def test_follow_through_a_driver_matches_simulation_within_1_mm() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
     servo.device.faults[FAULT_RAMP] = 0.0
-    pure, _ = run_bare(servo, 6000)
-    driven = run(Ticker(gated_servo(**AT_ONCE)), 6000, request=ARM)
+    simulated_ticks, _ = run_bare(servo, 6000)
+    driven = run(Ticker(gated_servo(**UNRAMPED_GATE)), 6000, request=ARM)
     assert not driven["fault"].any()
-    apart = np.linalg.norm(driven["p"] - pure.hand[:, 1:4], axis=1)
-    travelled = np.linalg.norm(np.diff(pure.hand[:, 1:4], axis=0), axis=1).sum()
+    apart = np.linalg.norm(driven["p"] - simulated_ticks.hand[:, 1:4], axis=1)
+    travelled = np.linalg.norm(np.diff(simulated_ticks.hand[:, 1:4], axis=0), axis=1).sum()
     assert travelled > 0.3
     assert np.sqrt(np.mean(apart**2)) < 1e-3
 
 
-def test_from_arming_to_active_the_force_is_ramped_in_and_a_hand_that_lets_go_is_led() -> None:
+def test_force_ramps_in_from_arming_to_active_and_guides_a_released_stylus() -> None:
     ticker = Ticker(gated_servo(holds=1.5, small=5.0))
     rows = run(ticker, 4000, request=ARM)
     assert not rows["fault"].any()
@@ -61,46 +61,46 @@ def test_disarmed_motors_are_off() -> None:
     assert not rows["state"].any()
 
 
-def test_disarming_lets_go_in_its_tick() -> None:
-    ticker = Ticker(gated_servo(**AT_ONCE))
-    first = active(ticker)
+def test_disarming_switches_off_in_the_same_tick() -> None:
+    ticker = Ticker(gated_servo(**UNRAMPED_GATE))
+    first = activate(ticker)
     assert columns(ticker.row[None])["torque"].any()
     rows = run(ticker, 20, first, DISARM)
     assert not rows["torque"].any()
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("index", READING_INDICES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_reading_that_is_no_number(place: int, bad: float) -> None:
-    assert_lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
+def test_reading_that_is_not_finite_is_a_fault(index: int, bad: float) -> None:
+    assert_fault_releases("tamper", overwrite(index, bad), Fault.READING_NOT_FINITE)
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_joint_that_jumps(axis: int) -> None:
-    assert_lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
+def test_joint_jump_is_a_fault(axis: int) -> None:
+    assert_fault_releases("tamper", jump_joint(axis), Fault.RATE_IMPOSSIBLE)
 
 
-def test_a_clock_that_goes_back() -> None:
-    assert_lets_go("spoil", clock_back, Fault.CLOCK_BACK)
+def test_clock_that_goes_back_is_a_fault() -> None:
+    assert_fault_releases("tamper", clock_back, Fault.CLOCK_BACK)
 
 
 @pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
-@pytest.mark.parametrize("where", ["read_fault", "write_fault"])
-def test_a_fault_that_the_driver_tells(fault: Fault, value: float, where: str) -> None:
-    assert_lets_go(where, (fault, value), fault)
+@pytest.mark.parametrize("operation", ["read_fault", "write_fault"])
+def test_driver_fault_is_latched(fault: Fault, value: float, operation: str) -> None:
+    assert_fault_releases(operation, (fault, value), fault)
 
 
-@pytest.mark.parametrize("stalled", [5, 50, 500])
-def test_a_device_that_stalls_for_five_periods_or_more(stalled: int) -> None:
-    assert_lets_go("silent", stalled, Fault.READING_STALE, within=8)
+@pytest.mark.parametrize("periods", [5, 50, 500])
+def test_stall_of_five_periods_or_more_is_a_fault(periods: int) -> None:
+    assert_fault_releases("silent", periods, Fault.READING_STALE, within=8)
 
 
-@pytest.mark.parametrize("stalled", [1, 3, 4])
-def test_a_device_that_stalls_for_less_than_five_periods_is_no_fault(stalled: int) -> None:
-    broken = Broken(gated_servo(**AT_ONCE).driver)
-    ticker = Ticker(gated_servo(broken, **AT_ONCE))
-    first = active(ticker)
-    broken.silent = stalled
+@pytest.mark.parametrize("periods", [1, 3, 4])
+def test_stall_of_less_than_five_periods_is_no_fault(periods: int) -> None:
+    faulty = FaultyDriver(gated_servo(**UNRAMPED_GATE).driver)
+    ticker = Ticker(gated_servo(faulty, **UNRAMPED_GATE))
+    first = activate(ticker)
+    faulty.silent = periods
     rows = run(ticker, 100, first)
     assert not rows["fault"].any()
     assert rows["force"][-1].any()
@@ -108,30 +108,30 @@ def test_a_device_that_stalls_for_less_than_five_periods_is_no_fault(stalled: in
 
 @pytest.mark.parametrize("part", ["limiter", "tank", "params"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_memory_or_a_field_that_is_no_number(part: str, bad: float) -> None:
+def test_memory_or_parameters_that_are_not_finite_are_a_fault(part: str, bad: float) -> None:
     faults = {"limiter": Fault.LIMITER_NOT_FINITE, "tank": Fault.TANK_NOT_FINITE, "params": Fault.FORCE_NOT_FINITE}
-    parts = gated_servo(program=follow_program(), **AT_ONCE)
+    parts = gated_servo(program=follow_program(), **UNRAMPED_GATE)
     ticker = Ticker(parts)
-    first = active(ticker)
+    first = activate(ticker)
     getattr(parts.servo.field, part)[0 if part != "params" else slice(None)] = bad
     assert_faulted(ticker, first, faults[part])
 
 
-def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
-    """Order a fault of the driver: the motors go off within so many ticks, and the fault stays until it is cleared."""
-    driver = gated_servo(**AT_ONCE).driver
+def assert_fault_releases(attribute: str, failure, fault: Fault, within: int = 2) -> None:
+    """A fault of the driver switches the motors off within some ticks and stays latched until it is cleared."""
+    driver = gated_servo(**UNRAMPED_GATE).driver
     assert isinstance(driver, EmulatedPhantom)
-    broken = Broken(driver)
-    ticker = Ticker(gated_servo(broken, **AT_ONCE))
-    first = active(ticker)
+    faulty = FaultyDriver(driver)
+    ticker = Ticker(gated_servo(faulty, **UNRAMPED_GATE))
+    first = activate(ticker)
     assert ticker.state is State.ACTIVE
-    setattr(broken, attribute, order)
+    setattr(faulty, attribute, failure)
     assert_faulted(ticker, first, fault, within)
-    assert not broken.last.any() or attribute == "write_fault"
-    assert broken.let_go_calls > 0
+    assert not faulty.last.any() or attribute == "write_fault"
+    assert faulty.let_go_calls > 0
     if attribute in ("read_fault", "write_fault"):
-        setattr(broken, attribute, None)
-    broken.spoil, broken.silent = (lambda reading: None), 0
+        setattr(faulty, attribute, None)
+    faulty.tamper, faulty.silent = (lambda reading: None), 0
     rows = run(ticker, 30, first + 30, ARM)
     assert not rows["torque"].any()
     assert ticker.fault is not None
@@ -154,25 +154,25 @@ def assert_faulted(ticker: Ticker, first: int, fault: Fault, within: int = 2) ->
     assert all(np.isfinite(rows[name]).all() for name in ("force", "torque", "p", "v"))
 
 
-def test_encoder_offsets_are_taken_off_once_also_where_no_reading_came() -> None:
+def test_encoder_offsets_are_subtracted_once_also_without_new_readings() -> None:
     offset = (0.01, -0.02, 0.005)
-    parts = gated_servo(linkage=Linkage(offset=offset), **AT_ONCE)
+    parts = gated_servo(linkage=Linkage(offset=offset), **UNRAMPED_GATE)
     ticker = Ticker(GatedServo(*parts[:4], np.array(offset)))
-    plain = Ticker(gated_servo(**AT_ONCE))
+    plain = Ticker(gated_servo(**UNRAMPED_GATE))
     a, b = run(ticker, 300, request=ARM), run(plain, 300, request=ARM)
     np.testing.assert_allclose(a["theta"], b["theta"], atol=3e-4)
-    broken = Broken(parts.driver)
-    again = Ticker(GatedServo(parts.servo, parts.world, broken, parts.gate, np.array(offset)))
+    faulty = FaultyDriver(parts.driver)
+    again = Ticker(GatedServo(parts.servo, parts.world, faulty, parts.gate, np.array(offset)))
     run(again, 2)
     before = again.row.copy()
-    broken.silent = 3
+    faulty.silent = 3
     run(again, 3, 2)
     np.testing.assert_array_equal(columns(before[None])["theta"], columns(again.row[None])["theta"])
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])
-def test_a_loop_that_is_too_stiff_is_quieted_and_the_hand_is_led_all_the_same(stiffness: float, damping: float) -> None:
-    """Far beyond the certificate's boundary: without the detector they shake the hand until they are too fast."""
+def test_unstable_loop_is_damped_by_the_detector_and_still_guides(stiffness: float, damping: float) -> None:
+    """Far beyond the certificate's boundary: without the detector the loop shakes the hand until it is too fast."""
     program = follow_program(stiffness, damping)
     bare = Ticker(gated_servo(program=program, holds=2.0, small=10.0, dead_man=False,
                               oscillation=OscillationDetector(PERIOD, turns=1e9)))  # fmt: skip
@@ -186,14 +186,14 @@ def test_a_loop_that_is_too_stiff_is_quieted_and_the_hand_is_led_all_the_same(st
     assert rows["distance"][-1000:].max() < 5e-3
 
 
-def test_only_an_exchange_can_be_gated() -> None:
+def test_servo_without_exchange_is_refused() -> None:
     world = device_world()
     parts = gated_servo()._replace(servo=bare_servo(world, simulated(world)))
     with pytest.raises(SimError, match="expected an Exchange"):
         Ticker(parts)
 
 
-def test_a_linkage_that_cannot_be_is_refused() -> None:
+def test_invalid_linkage_is_refused() -> None:
     with pytest.raises(SimError, match="must not be negative"):
         Linkage(coulomb=(-1.0, 0.0, 0.0))
     with pytest.raises(SimError, match="rotors have to give"):

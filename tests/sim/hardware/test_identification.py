@@ -1,7 +1,7 @@
-"""What is hidden in a simulated device is found, each quantity within its interval.
+"""Identification finds the hidden parameters of a simulated device, each within its interval.
 
-``HVF_DRAWS=50`` draws fifty devices in place of one; then nine of ten have to be within all of their intervals, and the
-intervals neither too narrow nor too wide.
+With ``HVF_DRAWS=50`` fifty devices are drawn in place of one; nine of ten have to lie within all of their intervals,
+and the intervals must be neither too narrow nor too wide.
 """
 
 import os
@@ -19,14 +19,14 @@ from sim.errors import SimError
 from sim.hardware.gated_servo import Ticker
 from sim.hardware.identification import NAMES, WINDOW, Identified, Motion, identify_linkage, motions_of
 from sim.world.linkage import Linkage
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo, run
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo, run
 
 LAPS = (8.0, 5.0, 3.0)
 INERTIA = np.array([3.6e-3, 2.4e-3, 0.93e-3])  # of the linkage at θ = 0
 
 
-def drawn(rng: np.random.Generator) -> tuple[Linkage, float]:
-    """A linkage, and by how much its heavy bars are heavier than published."""
+def random_linkage(rng: np.random.Generator) -> tuple[Linkage, float]:
+    """A random linkage, and by what fraction its heavy bars are heavier than published."""
     return Linkage(
         coulomb=tuple(rng.uniform(0.5, 2.0, 3) * PREMIUM_1_5.coulomb_friction),
         viscous=tuple(rng.uniform(0.3, 4.0, 3) * PREMIUM_1_5.viscous_friction),
@@ -43,13 +43,13 @@ def curve(lap: float) -> Trajectory:
     return Trajectory(np.linspace(0.0, lap, 97), points, periodic=True)
 
 
-def moved(linkage: Linkage, heavier: float, along: Trajectory) -> Motion:
+def simulated_motion(linkage: Linkage, extra_mass: float, along: Trajectory) -> Motion:
     program = Follow(along, k_r=300.0, b_d=8.0).program()
-    parts = gated_servo(linkage=linkage, program=program, **AT_ONCE)
+    parts = gated_servo(linkage=linkage, program=program, **UNRAMPED_GATE)
     model = parts.driver.world.model
     for name, arm, axes in (("be", PREMIUM_1_5.l5, (0, 1)), ("df", PREMIUM_1_5.l6, (0, 2))):
         bar = model.body(f"phantom/{name}").id
-        more = heavier * model.body_mass[bar]
+        more = extra_mass * model.body_mass[bar]
         model.body_mass[bar] += more
         model.body_inertia[bar, axes] -= more * arm**2  # published inertias are about the pivots
     ticker = Ticker(parts)
@@ -59,40 +59,40 @@ def moved(linkage: Linkage, heavier: float, along: Trajectory) -> Motion:
     return motion
 
 
-def truth(linkage: Linkage, heavier: float) -> np.ndarray:
+def true_values(linkage: Linkage, extra_mass: float) -> np.ndarray:
     p = PREMIUM_1_5
-    second = GRAVITY * (p.l1 * p.m_a + (1.0 + heavier) * p.l5 * p.m_be + 0.5 * p.l1 * p.m_c)
-    third = GRAVITY * (0.5 * p.l2 * p.m_a + p.l3 * p.m_c - (1.0 + heavier) * p.l6 * p.m_df)
+    second = GRAVITY * (p.l1 * p.m_a + (1.0 + extra_mass) * p.l5 * p.m_be + 0.5 * p.l1 * p.m_c)
+    third = GRAVITY * (0.5 * p.l2 * p.m_a + p.l3 * p.m_c - (1.0 + extra_mass) * p.l6 * p.m_df)
     known = *linkage.coulomb, *linkage.viscous, *linkage.inertia, linkage.delay, *linkage.offset[1:]
     return np.array([*known, second, third])
 
 
-def recorded(seed: int) -> tuple[list[Motion], np.ndarray]:
-    """Motions of a device, and what is true of it."""
-    linkage, heavier = drawn(np.random.default_rng(seed))
-    return [moved(linkage, heavier, curve(lap)) for lap in LAPS], truth(linkage, heavier)
+def motions_and_truth(seed: int) -> tuple[list[Motion], np.ndarray]:
+    """Motions of a device, and its true parameters."""
+    linkage, extra_mass = random_linkage(np.random.default_rng(seed))
+    return [simulated_motion(linkage, extra_mass, curve(lap)) for lap in LAPS], true_values(linkage, extra_mass)
 
 
 def identified(seed: int) -> tuple[Identified, np.ndarray]:
-    """What is found of a device, and what is true of it."""
-    motions, hidden = recorded(seed)
+    """Identified and true parameters of a device."""
+    motions, hidden = motions_and_truth(seed)
     return identify_linkage(motions), hidden
 
 
 @pytest.fixture(scope="module")
-def record() -> tuple[list[Motion], np.ndarray]:
-    return recorded(7)
+def device_motions() -> tuple[list[Motion], np.ndarray]:
+    return motions_and_truth(7)
 
 
 @pytest.fixture(scope="module")
-def found(record) -> tuple[Identified, np.ndarray]:
-    motions, hidden = record
+def identification(device_motions) -> tuple[Identified, np.ndarray]:
+    motions, hidden = device_motions
     return identify_linkage(motions), hidden
 
 
 @pytest.mark.slow
-def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_intervals(found) -> None:
-    draws = [found, *(identified(8000 + k) for k in range(int(os.environ.get("HVF_DRAWS", "1")) - 1))]
+def test_hidden_parameters_are_within_their_intervals(identification) -> None:
+    draws = [identification, *(identified(8000 + k) for k in range(int(os.environ.get("HVF_DRAWS", "1")) - 1))]
     shares = np.abs([(f.values - hidden) / f.margins for f, hidden in draws])
     within = int(np.sum(shares.max(axis=1) <= 1.0))
     # An interval of one parameter alone is two thirds as wide: 1.96 standard errors in place of 2.91.
@@ -107,8 +107,8 @@ def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_interv
 
 
 @pytest.mark.slow
-def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
-    result, hidden = found
+def test_intervals_are_narrow_enough_to_be_useful(identification) -> None:
+    result, hidden = identification
     margins = dict(zip(NAMES, result.margins, strict=True))
     assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.001
     assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.04 * PREMIUM_1_5.viscous_friction[0]
@@ -118,31 +118,31 @@ def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
 
 
 @pytest.mark.slow
-def test_a_torque_that_is_not_in_the_equations_widens_the_intervals_and_is_covered_by_them(record, found) -> None:
-    """A ripple of one percent of the friction, the same again in every lap, which no average takes out."""
-    motions, hidden = record
+def test_unmodelled_torque_widens_the_intervals_that_then_cover_the_errors(device_motions, identification) -> None:
+    """A ripple of one percent of the friction that repeats in every lap, so that averaging does not remove it."""
+    motions, hidden = device_motions
     rippled = [
         m._replace(torque=m.torque + 0.01 * hidden[:3] * np.sin(12.0 * m.theta + [0.3, 1.0, 2.0])) for m in motions
     ]
     result = identify_linkage(rippled)
     errors = np.abs(result.values - hidden)
-    assert np.any(errors > found[0].margins)
+    assert np.any(errors > identification[0].margins)
     assert np.all(errors < result.margins)
 
 
 @pytest.mark.slow
-def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_up() -> None:
-    """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
-    linkage, heavier = drawn(np.random.default_rng(5000))
+def test_motion_that_leaves_the_delay_unidentifiable_is_refused() -> None:
+    """Two slow laps round a saddle: the fit runs to the largest delay of its model."""
+    linkage, extra_mass = random_linkage(np.random.default_rng(5000))
     s = np.linspace(0.0, 2.0 * np.pi, 97)
     points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.03 * np.sin(2.0 * s)], axis=1)
     points[-1] = points[0]
     saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (8.0, 5.0)]
     with pytest.raises(SimError, match="the end of what is looked for"):
-        identify_linkage([moved(linkage, heavier, saddle) for saddle in saddles])
+        identify_linkage([simulated_motion(linkage, extra_mass, saddle) for saddle in saddles])
 
 
-def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
+def test_motions_are_split_at_gaps_and_short_ones_dropped() -> None:
     n = 4000
     tick, clock, zeros = np.arange(n, dtype=float), np.arange(n) * 1e-3, np.zeros((n, 3))
     tick[1500:] += 3.0
@@ -153,7 +153,7 @@ def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
     assert 3 * WINDOW > 0.19
 
 
-def test_a_device_that_rests_tells_nothing() -> None:
+def test_too_little_or_motionless_data_is_refused() -> None:
     clock, zeros = np.arange(3000) * 1e-3, np.zeros((3000, 3))
     with pytest.raises(SimError, match="expected 56 of each"):
         identify_linkage([Motion(clock, zeros, zeros)])

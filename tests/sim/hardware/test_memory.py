@@ -1,4 +1,4 @@
-"""The servo's loop takes nothing from the heap: not in compiled code, not in the Python that drives it, not in C."""
+"""The servo loop allocates nothing on the heap: neither in compiled code nor in Python nor in C."""
 
 import os
 import subprocess
@@ -19,11 +19,11 @@ from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker
-from tests.devices.firmware import ROOT, compiled
-from tests.sim.hardware.emulation import AT_ONCE
+from tests.devices.firmware import ROOT, compile_c
+from tests.sim.hardware.emulation import UNRAMPED_GATE
 
 HERE, DEVICES = Path(__file__).parent, ROOT / "tests" / "devices"
-BEHIND = {
+LIBRARY_SOURCES = {
     "packets": (),
     "HID": (DEVICES / "mock_hidapi.c", ROOT / "firmware" / "hvf_hid.c"),
     "HDAPI": (DEVICES / "mock_hd.c",),
@@ -37,59 +37,59 @@ RUNS = {
     "bunny": RunConfig(mode=modes.Bunny()),
     "rivers": RunConfig(mode=modes.Rivers()),
     "stretch": RunConfig(mode=modes.Stretch()),
-    "all that FOLLOW can have": RunConfig(mode=RESTRICTED, map=maps.Cylindrical(expressive=True)),
-    "walls of a composite": RunConfig(mode=modes.Follow(walls=modes.JointWalls()), map=maps.Composite()),
+    "FOLLOW with all options": RunConfig(mode=RESTRICTED, map=maps.Cylindrical(expressive=True)),
+    "joint walls of a composite": RunConfig(mode=modes.Follow(walls=modes.JointWalls()), map=maps.Composite()),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
-@pytest.mark.parametrize("device", BEHIND)
-def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(device: str, tmp_path: Path) -> None:
-    """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself, in the servo or a vendor's thread."""
-    library = compiled(tmp_path, HERE / "heap_calls.c")
+@pytest.mark.parametrize("device", LIBRARY_SOURCES)
+def test_servo_loop_makes_no_heap_calls_in_2000_ticks(device: str, tmp_path: Path) -> None:
+    """Counts calls of Python, numba, NumPy, MuJoCo and libc, in the servo and in a vendor's thread."""
+    library = compile_c(tmp_path, HERE / "heap_calls.c")
     environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
-    behind = [str(compiled(tmp_path, *BEHIND[device]))] if BEHIND[device] else []
-    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", device, *behind]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    state, calls, calls_of_a_thousand_numbers = said.stdout.split()
-    assert state == State.ACTIVE.name, said.stderr
+    libraries = [str(compile_c(tmp_path, *LIBRARY_SOURCES[device]))] if LIBRARY_SOURCES[device] else []
+    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", device, *libraries]
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    state, calls, calls_of_a_thousand_numbers = result.stdout.split()
+    assert state == State.ACTIVE.name, result.stderr
     assert int(calls) == 0
-    assert int(calls_of_a_thousand_numbers) > 1000  # the counter counts
+    assert int(calls_of_a_thousand_numbers) > 1000  # the counter works
 
 
-class Aside(EmulatedPhantom):
-    """A device whose time passes between two ticks, where nothing is counted."""
+class UncountedDevice(EmulatedPhantom):
+    """A device that is simulated between two ticks, where nothing is counted."""
 
-    asked = np.zeros(3), False
+    pending_command = np.zeros(3), False
 
     def read(self, reading: Array, timeout: float) -> bool:
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
-        self.asked = torque, enable
+        self.pending_command = torque, enable
 
     def pass_tick(self, reading: Array) -> None:
-        super().write(*self.asked)
+        super().write(*self.pending_command)
         super().read(reading, 0.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_no_field_that_a_device_can_be_given_takes_memory(name: str) -> None:
+def test_fields_of_hardware_runs_allocate_nothing(name: str) -> None:
     config = resolved(RUNS[name])
     session, period = session_of(served(config)), config.clock.servo_period
-    driver = Aside(SceneConfig(servo_period=period), start_of(session), holds=0.0)
-    gate = Gate(period, permitted=True, dead_man=False, **AT_ONCE)
-    ticker, taken = Ticker(GatedServo(session.servo, session.world, driver, gate, np.zeros(3))), 0
+    driver = UncountedDevice(SceneConfig(servo_period=period), start_of(session), holds=0.0)
+    gate = Gate(period, permitted=True, dead_man=False, **UNRAMPED_GATE)
+    ticker, allocations = Ticker(GatedServo(session.servo, session.world, driver, gate, np.zeros(3))), 0
     _nrt_python.memsys_enable_stats()
     try:
         for k in range(1500):
             driver.pass_tick(session.servo.device.reading)
             before = rtsys.get_allocation_stats().alloc
             ticker.tick(float(k), ARM if k == 0 else NO_REQUEST)
-            taken += rtsys.get_allocation_stats().alloc - before
+            allocations += rtsys.get_allocation_stats().alloc - before
     finally:
         _nrt_python.memsys_disable_stats()
     assert ticker.state is State.ACTIVE
-    assert taken == 0
+    assert allocations == 0

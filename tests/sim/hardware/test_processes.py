@@ -1,6 +1,6 @@
-"""Kill or freeze whom you like: the servo goes on, or lets go; and what was recorded can be read.
+"""Processes of a hardware run, killed or frozen: the servo continues or lets go, and the recording stays readable.
 
-Those that no busy machine disturbs are `slow`, the others `processes`.
+Tests that a busy machine cannot disturb are `slow`, the others `processes`.
 """
 
 import contextlib
@@ -30,55 +30,57 @@ from sim.hardware.recorder_process import RecordingJob, record_rows
 from sim.hardware.servo_process import Ended, ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
-from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
+from tests.sim.hardware.process_factories import PERIOD, emulated_device, servo_over_packets, servo_with_own_device
 
-CLOCK = ServoClock(late=20.0, heartbeat=20.0)
-"""So long that a busy machine makes no fault of its own; a test of lateness or silence has a clock of its own."""
-LATE, SILENT = 0.2, 0.6
+LENIENT_CLOCK = ServoClock(late=20.0, heartbeat=20.0)
+"""Limits so long that a busy machine causes no fault; tests of lateness or silence set their own."""
+LATE_LIMIT, HEARTBEAT_LIMIT = 0.2, 0.6
 
 
 def job(path: Path) -> RecordingJob:
     return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD))
 
 
-def until(run: HardwareRun, what: Callable[[RunStatus], bool], seconds: float = 60.0) -> RunStatus:
+def wait_until(run: HardwareRun, condition: Callable[[RunStatus], bool], seconds: float = 60.0) -> RunStatus:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        look = run.poll()
-        if what(look):
-            return look
+        status = run.poll()
+        if condition(status):
+            return status
         time.sleep(0.01)
     raise AssertionError(f"not within {seconds} s: {run.poll()}")
 
 
-def active(run: HardwareRun) -> None:
-    """Arm, again where this machine was too busy to be in time."""
+def activate(run: HardwareRun) -> None:
+    """Arm; repeatedly where this machine was too busy to be in time."""
     for _ in range(5):
         run.request(ARM)
-        look = until(run, lambda look: look.state in (State.ACTIVE, State.FAULT))
-        if look.state is State.ACTIVE and np.any(until(run, lambda look: bool(look.row["force"].any())).row["torque"]):
+        status = wait_until(run, lambda status: status.state in (State.ACTIVE, State.FAULT))
+        if status.state is State.ACTIVE and np.any(
+            wait_until(run, lambda status: bool(status.row["force"].any())).row["torque"]
+        ):
             return
         run.request(CLEAR)
-        until(run, lambda look: look.state is State.DISARMED)
-    raise AssertionError(f"never active: {look.fault.words(look.value)}")
+        wait_until(run, lambda status: status.state is State.DISARMED)
+    raise AssertionError(f"never active: {status.fault.words(status.value)}")
 
 
 @contextlib.contextmanager
-def running(path: Path | None = None, clock: ServoClock = CLOCK) -> Iterator[HardwareRun]:
-    with HardwareRun(in_process, PERIOD, clock, job(path) if path else None) as run:
+def running(path: Path | None = None, clock: ServoClock = LENIENT_CLOCK) -> Iterator[HardwareRun]:
+    with HardwareRun(servo_with_own_device, PERIOD, clock, job(path) if path else None) as run:
         run.start()
-        active(run)
+        activate(run)
         yield run
 
 
-def assert_goes_on(run: HardwareRun, ticks: int = 100) -> None:
+def assert_keeps_running(run: HardwareRun, ticks: int = 100) -> None:
     before = float(run.poll().row["tick"])
-    look = until(run, lambda look: float(look.row["tick"]) > before + ticks)
-    assert (look.state, look.fault) == (State.ACTIVE, Fault.NONE)
+    status = wait_until(run, lambda status: float(status.row["tick"]) > before + ticks)
+    assert (status.state, status.fault) == (State.ACTIVE, Fault.NONE)
 
 
-def assert_whole(path: Path, ended: Ended | None) -> None:
-    """The recording opens, and leaves out missed deadlines only: what the servo ran, where it could still say so."""
+def assert_complete(path: Path, ended: Ended | None) -> None:
+    """The recording opens and lacks only missed deadlines; its length is the servo's count where that is known."""
     with Recording(path) as recording:
         tick, missed, dropped = (recording.channel("ticks", name)[:] for name in ("tick", "missed", "dropped"))
         for name in ("p", "force", "torque", "hand_force"):
@@ -90,8 +92,8 @@ def assert_whole(path: Path, ended: Ended | None) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_with_a_recorder_says_nothing_on_its_error_stream(tmp_path: Path) -> None:
-    """Neither while it runs, nor when its three processes end."""
+def test_run_with_a_recorder_writes_nothing_to_stderr(tmp_path: Path) -> None:
+    """Neither during the run nor when its three processes end."""
     script = (
         "import pathlib, sys; from tests.sim.hardware.test_processes import running\n"
         "with running(pathlib.Path(sys.argv[1])) as run: print(run.stop().ticks)"
@@ -104,18 +106,18 @@ def test_a_run_with_a_recorder_says_nothing_on_its_error_stream(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Path) -> None:
+def test_recorder_frozen_and_killed_costs_only_rows(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
         assert run.recorder is not None
-        until(run, lambda look: look.recorded is not None and look.recorded.rows > 200)
+        wait_until(run, lambda status: status.recorded is not None and status.recorded.rows > 200)
         os.kill(run.recorder.pid, signal.SIGSTOP)
-        assert_goes_on(run)
+        assert_keeps_running(run)
         os.kill(run.recorder.pid, signal.SIGCONT)
-        look = until(run, lambda look: look.recorded is not None and look.recorded.rows > 400)
-        assert look.recorded.dropped == 0
+        status = wait_until(run, lambda status: status.recorded is not None and status.recorded.rows > 400)
+        assert status.recorded.dropped == 0
         os.kill(run.recorder.pid, signal.SIGKILL)
-        assert_goes_on(run)
+        assert_keeps_running(run)
         assert run.poll().recorded is not None
         assert not run.poll().recorded.alive
         ended = run.stop()
@@ -130,13 +132,13 @@ def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Pa
 
 
 @pytest.mark.processes
-def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_recording_of_a_run_is_complete_and_counts_missed_deadlines(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
-        assert_goes_on(run, 200)
+        assert_keeps_running(run, 200)
         ended = run.stop()
     assert ended is not None
-    assert_whole(path, ended)
+    assert_complete(path, ended)
     with Recording(path) as recording:
         ticks = recording.channel("ticks", "tick")[:]
         assert recording.channel("ticks", "missed")[-1] == ended.missed
@@ -146,52 +148,52 @@ def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> Non
     assert ended.descriptors == 0
 
 
-def bystander(status: SharedNumbers, began: SharedNumbers) -> None:
-    """Reads the servo's row as a page does, until whoever started it is gone."""
+def read_as_page(status: SharedNumbers, started: SharedNumbers) -> None:
+    """Reads the servo's row as a page does, until its parent has ended."""
     row, parent = np.zeros(ROW_SIZE), os.getppid()
     while os.getppid() == parent:
         status.read(row)
-        began.write(np.ones(1))
+        started.write(np.ones(1))
         time.sleep(1.0 / 60.0)
 
 
 @pytest.mark.slow
-def test_a_page_that_is_frozen_and_killed_is_not_waited_for(tmp_path: Path) -> None:
+def test_servo_does_not_wait_for_a_frozen_or_killed_page(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    began, seen = SharedNumbers(1), np.zeros(1)
+    started, seen = SharedNumbers(1), np.zeros(1)
     context = multiprocessing.get_context("spawn")
     with running(path) as run:
-        page = context.Process(target=bystander, args=(run.status, began), daemon=True)
+        page = context.Process(target=read_as_page, args=(run.status, started), daemon=True)
         page.start()
-        until(run, lambda look: began.read(seen) and seen[0] > 0.0)
+        wait_until(run, lambda status: started.read(seen) and seen[0] > 0.0)
         assert page.pid is not None
         for sent in (signal.SIGSTOP, signal.SIGKILL):
             os.kill(page.pid, sent)
-            assert_goes_on(run)
+            assert_keeps_running(run)
         page.join()
         ended = run.stop()
-    began.close()
-    assert_whole(path, ended)
+    started.close()
+    assert_complete(path, ended)
 
 
-def limited(size: int, *arguments) -> None:
-    """A recorder whose disk is full at so many bytes."""
+def record_with_size_limit(size: int, *arguments) -> None:
+    """A recorder whose file may not grow beyond a size [bytes], as on a full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
     record_rows(*arguments)
 
 
 @pytest.mark.processes
-def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
+def test_full_disk_ends_the_recording_but_not_the_run(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    with HardwareRun(in_process, PERIOD, CLOCK, job(path)) as run:
+    with HardwareRun(servo_with_own_device, PERIOD, LENIENT_CLOCK, job(path)) as run:
         assert run.recorder is not None
-        run.recorder._target = functools.partial(limited, 1_000_000)
+        run.recorder._target = functools.partial(record_with_size_limit, 1_000_000)
         run.start()
-        active(run)
-        look = until(run, lambda look: look.recorded is not None and look.recorded.error != 0)
-        assert not look.recorded.alive
-        assert_goes_on(run)
+        activate(run)
+        status = wait_until(run, lambda status: status.recorded is not None and status.recorded.error != 0)
+        assert not status.recorded.alive
+        assert_keeps_running(run)
     with Recording(path) as recording:
         ticks = recording.channel("ticks", "tick")[:]
         assert 100 < len(ticks) < 2000
@@ -199,133 +201,143 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.processes
-def test_controls_that_freeze_are_a_fault_and_controls_that_are_back_can_clear_it(tmp_path: Path) -> None:
+def test_frozen_controls_are_a_fault_that_returning_controls_can_clear(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    with running(path, ServoClock(late=20.0, heartbeat=SILENT)) as run:
-        time.sleep(2.0 * SILENT)
-        look = until(run, lambda look: look.fault is not Fault.NONE)
-        assert look.fault is Fault.CONTROL_LOST
-        assert not look.row["torque"].any()
+    with running(path, ServoClock(late=20.0, heartbeat=HEARTBEAT_LIMIT)) as run:
+        time.sleep(2.0 * HEARTBEAT_LIMIT)
+        status = wait_until(run, lambda status: status.fault is not Fault.NONE)
+        assert status.fault is Fault.CONTROL_LOST
+        assert not status.row["torque"].any()
         time.sleep(0.1)
-        assert until(run, lambda look: True).state is State.FAULT
+        assert wait_until(run, lambda status: True).state is State.FAULT
         run.request(ARM)
-        goes_past(run)
+        wait_for_ticks(run)
         assert run.poll().state is State.FAULT
         run.request(CLEAR)
-        until(run, lambda look: look.state is State.DISARMED)
-        active(run)
+        wait_until(run, lambda status: status.state is State.DISARMED)
+        activate(run)
         ended = run.stop()
-    assert_whole(path, ended)
+    assert_complete(path, ended)
 
 
-def goes_past(run: HardwareRun, ticks: int = 20) -> None:
+def wait_for_ticks(run: HardwareRun, ticks: int = 20) -> None:
     before = float(run.poll().row["tick"])
-    until(run, lambda look: float(look.row["tick"]) > before + ticks)
+    wait_until(run, lambda status: float(status.row["tick"]) > before + ticks)
 
 
 @pytest.mark.processes
 @pytest.mark.parametrize("stall", [0.05, 0.5])
-def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(tmp_path: Path, stall: float) -> None:
-    """A stop of 50 ms is counted where more is allowed; one of 500 ms is a fault where 200 ms are."""
+def test_stopped_servo_misses_deadlines_and_does_not_catch_up(tmp_path: Path, stall: float) -> None:
+    """A stop of 50 ms is counted with a limit above it; one of 500 ms is a fault with a limit of 200 ms."""
     path = tmp_path / "run.h5"
-    with running(path, ServoClock(late=LATE if stall > LATE else 20.0, heartbeat=20.0)) as run:
+    with running(path, ServoClock(late=LATE_LIMIT if stall > LATE_LIMIT else 20.0, heartbeat=20.0)) as run:
         assert run.servo.pid is not None
         begin, before = time.monotonic(), run.poll().row
         os.kill(run.servo.pid, signal.SIGSTOP)
         time.sleep(stall)
         os.kill(run.servo.pid, signal.SIGCONT)
-        goes_past(run, round(stall / PERIOD) + 20)
+        wait_for_ticks(run, round(stall / PERIOD) + 20)
         after = run.poll().row
         assert after["missed"] - before["missed"] >= stall / PERIOD - 2
         ran = after["tick"] - before["tick"] - (after["missed"] - before["missed"])
         assert ran <= (time.monotonic() - begin - stall) / PERIOD + 5
-        if stall <= LATE:
+        if stall <= LATE_LIMIT:
             assert Fault(int(after["fault"])) is Fault.NONE
         else:
             assert Fault(int(after["fault"])) is Fault.SERVO_LATE
             assert not after["torque"].any()
         ended = run.stop()
-    assert_whole(path, ended)
+    assert_complete(path, ended)
 
 
 @pytest.mark.slow
-def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed(tmp_path: Path) -> None:
+def test_device_watchdog_releases_when_the_servo_is_stopped_or_killed(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown, seen = SharedNumbers(SHOWN_SIZE), np.zeros(SHOWN_SIZE)
     context = multiprocessing.get_context("spawn")
-    hosted = context.Process(target=host_device, args=(device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True)
-    hosted.start()
+    device_process = context.Process(
+        target=host_device, args=(emulated_device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True
+    )
+    device_process.start()
 
     def pushes() -> bool:
         shown.read(seen)
         return bool(seen[SHOWN_TORQUE : SHOWN_TORQUE + 3].any())
 
     try:
-        with HardwareRun(functools.partial(over_packets, ours), PERIOD, ServoClock(LATE, 20.0), job(path)) as run:
+        with HardwareRun(
+            functools.partial(servo_over_packets, ours), PERIOD, ServoClock(LATE_LIMIT, 20.0), job(path)
+        ) as run:
             run.start()
             assert run.servo.pid is not None
             for signals in ((signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL,)):
-                active(run)
-                until(run, lambda look: pushes())
+                activate(run)
+                wait_until(run, lambda status: pushes())
                 trips = seen[SHOWN_TRIPS]
                 os.kill(run.servo.pid, signals[0])
-                until(run, lambda look: not pushes(), 2.0)
+                wait_until(run, lambda status: not pushes(), 2.0)
                 assert seen[SHOWN_TRIPS] > trips
-                until(run, lambda look: not look.alive)
-                for back in signals[1:]:
-                    time.sleep(2.0 * LATE)
-                    os.kill(run.servo.pid, back)
-                    look = until(run, lambda look: look.fault is not Fault.NONE)
-                    assert look.fault in (Fault.SERVO_LATE, Fault.READING_STALE)  # the latter if just before
+                wait_until(run, lambda status: not status.alive)
+                for resumed in signals[1:]:
+                    time.sleep(2.0 * LATE_LIMIT)
+                    os.kill(run.servo.pid, resumed)
+                    status = wait_until(run, lambda status: status.fault is not Fault.NONE)
+                    # Stale readings if it was stopped just before one.
+                    assert status.fault in (Fault.SERVO_LATE, Fault.READING_STALE)
                     assert not pushes()
                     run.request(CLEAR)
-                    until(run, lambda look: look.state is State.DISARMED)
+                    wait_until(run, lambda status: status.state is State.DISARMED)
             assert run.stop() is None
-        assert_whole(path, None)
+        assert_complete(path, None)
     finally:
-        hosted.kill()
-        hosted.join()
+        device_process.kill()
+        device_process.join()
         shown.close()
         ours.close()
         theirs.close()
 
 
 @pytest.mark.processes
-def test_a_device_that_is_gone_is_a_fault(tmp_path: Path) -> None:
+def test_killed_device_is_a_fault(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
     context = multiprocessing.get_context("spawn")
-    hosted = context.Process(target=host_device, args=(device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True)
-    hosted.start()
+    device_process = context.Process(
+        target=host_device, args=(emulated_device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True
+    )
+    device_process.start()
     theirs.close()
     try:
-        with HardwareRun(functools.partial(over_packets, ours), PERIOD, CLOCK, job(path)) as run:
+        with HardwareRun(functools.partial(servo_over_packets, ours), PERIOD, LENIENT_CLOCK, job(path)) as run:
             run.start()
             ours.close()
-            active(run)
-            hosted.kill()
+            activate(run)
+            device_process.kill()
 
-            def gone(look: RunStatus) -> bool:
-                if look.fault is Fault.READING_STALE:  # a process that is killed is silent before its socket closes
+            def is_unplugged(status: RunStatus) -> bool:
+                if status.fault is Fault.READING_STALE:  # a killed process is silent before its socket closes
                     run.request(CLEAR)
-                return look.fault is Fault.UNPLUGGED
+                return status.fault is Fault.UNPLUGGED
 
-            assert not until(run, gone).row["torque"].any()
+            assert not wait_until(run, is_unplugged).row["torque"].any()
             ended = run.stop()
-        assert_whole(path, ended)
+        assert_complete(path, ended)
     finally:
-        hosted.kill()
-        hosted.join()
+        device_process.kill()
+        device_process.join()
         shown.close()
 
 
-def refuses() -> None:
+def open_missing_device() -> None:
     raise SimError("no such device; expected one that is plugged in")
 
 
 @pytest.mark.processes
-def test_a_device_that_cannot_be_opened_is_said_in_its_own_words() -> None:
-    with HardwareRun(refuses, PERIOD, CLOCK) as run, pytest.raises(SimError, match="no such device"):
+def test_error_on_opening_a_device_reaches_the_controls() -> None:
+    with (
+        HardwareRun(open_missing_device, PERIOD, LENIENT_CLOCK) as run,
+        pytest.raises(SimError, match="no such device"),
+    ):
         run.start()

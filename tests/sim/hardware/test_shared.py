@@ -1,4 +1,4 @@
-"""What processes share is whole or not there, and a ring that is not emptied says how much is gone."""
+"""Memory shared by processes: no partial values, and a ring that counts the rows it lost."""
 
 import multiprocessing
 import pickle
@@ -13,21 +13,21 @@ from sim.hardware.shared import Ring, SharedNumbers
 
 @pytest.fixture
 def numbers() -> Iterator[SharedNumbers]:
-    made = SharedNumbers(64)
-    yield made
-    made.close()
+    shared = SharedNumbers(64)
+    yield shared
+    shared.close()
 
 
 @pytest.fixture
 def ring() -> Iterator[Ring]:
-    made = Ring(8, 2)
-    yield made
-    made.close()
+    shared = Ring(8, 2)
+    yield shared
+    shared.close()
 
 
-def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
+def test_reader_never_sees_a_partial_write(numbers: SharedNumbers) -> None:
     other, stop, seen = pickle.loads(pickle.dumps(numbers)), threading.Event(), np.zeros(64)
-    numbers.write(seen)  # compiled before anybody reads
+    numbers.write(seen)  # compile before anybody reads
 
     def write() -> None:
         k = 0
@@ -50,14 +50,14 @@ def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
     assert len(values) > 1
 
 
-def test_a_writer_that_was_killed_in_a_write_is_told_of(numbers: SharedNumbers) -> None:
+def test_write_of_a_killed_writer_is_not_read(numbers: SharedNumbers) -> None:
     into = np.zeros(64)
     assert numbers.read(into)
     numbers.count[0] += 1
     assert not numbers.read(into)
 
 
-def test_a_ring_gives_every_row_once_in_order(ring: Ring) -> None:
+def test_ring_returns_every_row_once_in_order(ring: Ring) -> None:
     for k in range(5):
         ring.append(np.array([k, -k]))
     rows, lost = ring.take()
@@ -69,18 +69,18 @@ def test_a_ring_gives_every_row_once_in_order(ring: Ring) -> None:
     assert (len(ring.take()[0]), lost) == (0, 0)
 
 
-def test_a_ring_that_was_not_emptied_in_time_counts_what_is_gone(ring: Ring) -> None:
+def test_ring_overflow_counts_lost_rows(ring: Ring) -> None:
     for k in range(30):
         ring.append(np.array([k, 0.0]))
     rows, lost = ring.take()
-    np.testing.assert_array_equal(rows[:, 0], range(23, 30))  # one place is where the next row is being written
+    np.testing.assert_array_equal(rows[:, 0], range(23, 30))  # one slot is reserved for the next row
     assert lost == 23
     ring.append(np.array([30.0, 0.0]))
     rows, lost = ring.take()
     assert (rows[0, 0], lost) == (30.0, 0)
 
 
-def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ring, capfd) -> None:
+def test_process_that_ends_without_closing_writes_nothing_to_stderr(numbers, ring, capfd) -> None:
     child = multiprocessing.get_context("spawn").Process(target=len, args=((numbers, ring),))
     child.start()
     child.join()
@@ -88,7 +88,7 @@ def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ri
     assert capfd.readouterr().err == ""
 
 
-def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_given(ring: Ring) -> None:
+def test_rows_overwritten_during_take_are_counted_and_not_returned(ring: Ring) -> None:
     for k in range(7):
         ring.append(np.array([k, 0.0]))
     copied = ring.numbers

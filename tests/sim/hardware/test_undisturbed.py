@@ -1,4 +1,4 @@
-"""Ctrl-C does not reach the processes of a run, from the moment at which they start."""
+"""Ctrl-C does not reach the processes of a run from their start on."""
 
 import multiprocessing
 import signal
@@ -10,7 +10,7 @@ def report_blocked(answer) -> None:
     answer.send(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
 
 
-def test_a_process_starts_with_the_interrupt_blocked_and_its_parent_goes_on_with_it_unblocked() -> None:
+def test_process_starts_with_sigint_blocked_and_parent_keeps_it_unblocked() -> None:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=report_blocked, args=(theirs,), daemon=True)

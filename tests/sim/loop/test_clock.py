@@ -9,7 +9,7 @@ from sim.loop.clock import RealTime
 
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A wall clock that only sleeping and the test itself move."""
+    """A wall clock that only `sleep` and the test advance."""
     now = [100.0]
 
     def sleep(seconds: float) -> None:
@@ -20,14 +20,14 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_a_fast_simulation_waits_for_the_wall_clock(wall: list[float]) -> None:
+def test_fast_simulation_waits_for_the_wall_clock(wall: list[float]) -> None:
     clock = RealTime()
     for k in range(5):
         clock.wait_until(0.1 * k)
     assert wall[0] == pytest.approx(100.4)
 
 
-def test_a_late_simulation_is_neither_waited_for_nor_hurried(wall: list[float]) -> None:
+def test_late_simulation_neither_waits_nor_catches_up(wall: list[float]) -> None:
     clock = RealTime()
     clock.wait_until(0.0)
     wall[0] += 3.0

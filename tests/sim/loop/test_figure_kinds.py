@@ -1,4 +1,4 @@
-"""A figure in the physics, one that is only shown, and none: what is recorded, read and drawn of each."""
+"""Physical figure, kinematic figure and none: what is recorded, read and drawn of each."""
 
 import time
 from pathlib import Path
@@ -33,39 +33,41 @@ def logged(session: Session, n: int):
     return ticks, frames
 
 
-def test_the_world_without_a_figure_is_the_first_part_of_the_one_with_it() -> None:
+def test_model_without_figure_is_the_first_part_of_the_one_with_it() -> None:
     scene = run_config().scene
-    whole, device = world_model(scene), device_world_model(scene)
-    assert int(whole.joint(FIGURE + "root").qposadr[0]) == device.nq
-    assert [whole.joint(j).name for j in range(device.njnt)] == [device.joint(j).name for j in range(device.njnt)]
+    figure_model, device_model = world_model(scene), device_world_model(scene)
+    assert int(figure_model.joint(FIGURE + "root").qposadr[0]) == device_model.nq
+    assert [figure_model.joint(j).name for j in range(device_model.njnt)] == [
+        device_model.joint(j).name for j in range(device_model.njnt)
+    ]
 
 
-def test_a_figure_that_is_only_shown_is_where_the_animation_has_it() -> None:
+def test_kinematic_figure_shows_the_reference() -> None:
     physical, shown = session_of("physical"), session_of("kinematic")
-    (ticks, frames), (same, others) = logged(physical, 1000), logged(shown, 1000)
+    (ticks, frames), (shown_ticks, shown_frames) = logged(physical, 1000), logged(shown, 1000)
     # Two solvers round differently, and encoders count.
-    np.testing.assert_allclose(same.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
-    np.testing.assert_allclose(others.reference[:, 7:], frames.reference[:, 7:], atol=0.02)
-    assert others.qpos.shape == frames.qpos.shape
-    np.testing.assert_array_equal(others.qpos[:, -75:], others.reference)
-    assert np.abs(np.diff(others.reference, axis=0)).max() > 1e-3
-    assert not same.residual.any()
+    np.testing.assert_allclose(shown_ticks.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
+    np.testing.assert_allclose(shown_frames.reference[:, 7:], frames.reference[:, 7:], atol=0.02)
+    assert shown_frames.qpos.shape == frames.qpos.shape
+    np.testing.assert_array_equal(shown_frames.qpos[:, -75:], shown_frames.reference)
+    assert np.abs(np.diff(shown_frames.reference, axis=0)).max() > 1e-3
+    assert not shown_ticks.residual.any()
 
 
-def test_without_a_figure_the_stylus_goes_as_with_one() -> None:
-    (ticks, _), (same, frames) = logged(session_of("physical"), 1000), logged(session_of("none"), 1000)
-    np.testing.assert_allclose(same.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
+def test_stylus_motion_is_the_same_without_a_figure() -> None:
+    (ticks, _), (shown_ticks, frames) = logged(session_of("physical"), 1000), logged(session_of("none"), 1000)
+    np.testing.assert_allclose(shown_ticks.hand[:, 1:4], ticks.hand[:, 1:4], atol=2e-4)
     assert frames.reference.shape[1] == 0
     assert frames.qpos.shape[1] == device_world_model(run_config().scene).nq
 
 
-def test_a_kind_that_there_is_not_is_refused() -> None:
+def test_unknown_kind_is_refused() -> None:
     with pytest.raises(SimError, match="'ghost'; expected one of physical, kinematic, none"):
         World(kind="ghost")  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("kind", ["kinematic", "none"])
-def test_its_recording_is_measured_and_drawn(kind: str, tmp_path: Path) -> None:
+def test_recording_without_physical_figure_is_measured_and_drawn(kind: str, tmp_path: Path) -> None:
     session = session_of(kind, 1.5, user="push")
     summary = record(session, tmp_path, to_dict(session.config), 1.5, time.perf_counter(), Console(quiet=True))
     write_animations(tmp_path, session)
@@ -82,7 +84,7 @@ def test_its_recording_is_measured_and_drawn(kind: str, tmp_path: Path) -> None:
         assert set(recording.groups["frames"]) == names
 
 
-def test_a_fault_is_said_first_and_recorded(tmp_path: Path) -> None:
+def test_fault_is_recorded_and_reported_first_in_the_summary(tmp_path: Path) -> None:
     session = session_of("none")
     session.servo.field.limiter[0] = np.nan
     summary = record(session, tmp_path, to_dict(session.config), 1.0, time.perf_counter(), Console(quiet=True))

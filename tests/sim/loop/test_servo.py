@@ -1,4 +1,4 @@
-"""The compiled tick: what the sensors tell, what the motors do, and that a run is a pure function of its inputs."""
+"""The compiled tick: sensors, motors, and runs that depend only on their inputs."""
 
 import ctypes
 import sys
@@ -26,7 +26,7 @@ from sim.users.hand.arm import Arm
 from sim.world.encoders import PEAK_TORQUE
 from sim.world.phantom_port import actuate, phantom_port, sense, sense_in_motion, true_motion
 from sim.world.world import World, phantom_angles
-from tests.sim.bare_servos import Stepped, bare_servo, device_world, simulated
+from tests.sim.bare_servos import SteppedPhantom, bare_servo, device_world, simulated
 
 CLIPS = ("cheer", "angry")
 CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
@@ -42,13 +42,13 @@ def session_of(clips: tuple, config: RunConfig = CONFIG) -> Session:
 
 
 def run_logged(session: Session, n: int, replay: bool = False, ticks=None):
-    made, frames = make_logs(session.servo, n)
-    ticks = made if ticks is None else ticks
+    fresh, frames = make_logs(session.servo, n)
+    ticks = fresh if ticks is None else ticks
     run_block(session.servo, 0, n, replay, ticks, frames)
     return ticks, frames
 
 
-def test_the_encoders_tell_the_tip_to_a_few_hundredths_of_a_millimetre() -> None:
+def test_sensed_tip_position_is_within_encoder_resolution() -> None:
     world = World()
     for p in ([0.03, 0.02, 0.04], [-0.05, 0.03, -0.02], [0.0, -0.06, 0.05]):
         world.reset(np.array(p), rest_pose())
@@ -71,7 +71,7 @@ def quaternion_of(matrix: np.ndarray) -> np.ndarray:
     return quaternion
 
 
-def test_the_motors_get_the_transposed_jacobian_of_the_force_and_the_weight_of_the_linkage() -> None:
+def test_motor_torques_are_transposed_jacobian_times_force_plus_gravity() -> None:
     world = World()
     world.reset(np.array([0.02, -0.03, 0.04]), rest_pose())
     port = phantom_port(world.model, world.data, 1e-3, 150.0)
@@ -84,7 +84,7 @@ def test_the_motors_get_the_transposed_jacobian_of_the_force_and_the_weight_of_t
     np.testing.assert_array_equal(world.data.ctrl[list(port.motor)], port.torque)
 
 
-def test_the_motors_never_get_more_than_their_peak_torque() -> None:
+def test_motor_torques_are_limited_to_peak_torque() -> None:
     world = World()
     world.reset(np.array([0.02, -0.03, 0.04]), rest_pose())
     port = phantom_port(world.model, world.data, 1e-3, 150.0)
@@ -94,19 +94,19 @@ def test_the_motors_never_get_more_than_their_peak_torque() -> None:
     assert np.any(np.abs(port.torque) == PEAK_TORQUE)
 
 
-def test_a_stylus_without_force_floats() -> None:
-    """Gravity compensation: it stays within a tenth of a millimetre for half a second."""
+def test_stylus_without_force_floats() -> None:
+    """Gravity compensation keeps it within a tenth of a millimetre for half a second."""
     world = World()
     start = np.array([0.03, 0.02, 0.02])
     world.reset(start, rest_pose())
-    phantom = Stepped(world)
+    phantom = SteppedPhantom(world)
     for _ in range(500):
         state = phantom.read()
         phantom.write(np.zeros(3))
     assert np.linalg.norm(state.p - start) < 1e-4
 
 
-def test_a_recorded_run_replays_to_the_same_states_bit_for_bit(clips: tuple) -> None:
+def test_recorded_run_replays_bit_for_bit(clips: tuple) -> None:
     first, second = session_of(clips), session_of(clips)
     ticks, frames = run_logged(first, 400)
     _, again = run_logged(second, 400, replay=True, ticks=ticks)
@@ -115,7 +115,7 @@ def test_a_recorded_run_replays_to_the_same_states_bit_for_bit(clips: tuple) -> 
     np.testing.assert_array_equal(frames.qpos, again.qpos)
 
 
-def test_a_run_is_a_pure_function_of_configuration_and_seed(clips: tuple) -> None:
+def test_run_depends_only_on_configuration_and_seed(clips: tuple) -> None:
     def trace(seed: int) -> dict:
         config = run_config(clips=CLIPS, seconds=0.2, seed=seed)
         ticks, _ = run_logged(wire(config, clips), 200)
@@ -127,8 +127,8 @@ def test_a_run_is_a_pure_function_of_configuration_and_seed(clips: tuple) -> Non
     assert not np.array_equal(first["p"], other["p"])
 
 
-def test_blocks_do_not_show(clips: tuple) -> None:
-    """A run in one block and the same run in pieces are the same to the last bit."""
+def test_block_size_does_not_change_the_result(clips: tuple) -> None:
+    """A run in one block and in several blocks are equal bit for bit."""
     whole, pieces = session_of(clips), session_of(clips)
     run_logged(whole, 400)
     blocks: list[int] = []
@@ -137,13 +137,13 @@ def test_blocks_do_not_show(clips: tuple) -> None:
     np.testing.assert_array_equal(whole.world.data.qpos, pieces.world.data.qpos)
 
 
-def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: tuple) -> None:
-    """Read, evaluate, limit, write from Python: the same stylus, but for what the figure does to the solver."""
+def test_device_called_from_python_matches_the_compiled_loop(clips: tuple) -> None:
+    """Read, evaluate, limit and write from Python: the same stylus, except for the figure's effect on the solver."""
     compiled, stepped = session_of(clips), session_of(clips)
     ticks, _ = run_logged(compiled, 300)
     arm = Arm(pushes=CONFIG.user.pushes)
     field = stepped.servo.field
-    phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
+    phantom, path = SteppedPhantom(stepped.world, arm, CONFIG.device.cutoff), []
     sense_in_motion(phantom.device.port)
     for _ in range(300):
         hand = phantom.read().vector()
@@ -154,12 +154,12 @@ def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: t
     np.testing.assert_allclose(np.array(path), ticks.hand[:, 1:4], atol=1e-4)
 
 
-def test_a_physics_step_that_does_not_divide_the_servo_period_is_refused() -> None:
+def test_physics_step_that_does_not_divide_the_servo_period_is_refused() -> None:
     with pytest.raises(ValueError, match=r"0\.0003 s does not divide the servo period 0\.001 s"):
         World(SceneConfig(physics_step=3e-4))
 
 
-def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
+def test_servo_period_of_several_physics_steps_is_simulated(clips: tuple) -> None:
     config = run_config(clips=CLIPS, seconds=0.1, servo_period=2e-3, physics_step=5e-4)
     session = wire(config, clips)
     run_logged(session, 50)
@@ -168,12 +168,12 @@ def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
 
 
 @pytest.mark.parametrize("p", [[0.5, 0.0, 0.0], [0.0, 0.0, 0.6], [0.15, 0.0, 0.0]])
-def test_a_point_the_phantom_cannot_reach_is_refused_with_the_numbers(p: list[float]) -> None:
+def test_unreachable_point_is_refused_with_its_coordinates(p: list[float]) -> None:
     with pytest.raises(SimError, match=rf"{p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}"):
         phantom_angles(np.array(p))
 
 
-def test_ctrl_c_that_a_callback_of_the_tick_could_not_catch_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_swallowed_by_a_c_callback_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted() -> None:
         raise KeyboardInterrupt
 
@@ -183,7 +183,7 @@ def test_ctrl_c_that_a_callback_of_the_tick_could_not_catch_ends_the_run(monkeyp
     world, before = device_world(), sys.unraisablehook
     loop = Loop(bare_servo(world, simulated(world)), world)
     monkeypatch.setattr("sim.loop.loop.run_block", block)
-    for go_on in (lambda: loop.run(0.1), loop.step):
+    for advance in (lambda: loop.run(0.1), loop.step):
         with pytest.raises(KeyboardInterrupt):
-            go_on()
+            advance()
     assert sys.unraisablehook is before

@@ -1,4 +1,4 @@
-"""A recording keeps what it was given, whole or killed, and never overwrites another."""
+"""A recording keeps all data, also of a killed run, and never overwrites another."""
 
 import json
 import random
@@ -19,7 +19,7 @@ from sim.recording.unclosed import lookup3
 CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
 GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
 
-# Writes rows that hold their own number, and says after each block how many there are.
+# Writes rows that hold their own number, and prints after each block how many there are.
 WRITER = """
 import sys
 from pathlib import Path
@@ -44,12 +44,12 @@ def block(start: int, n: int) -> dict[str, np.ndarray]:
     return {name: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (n, *s)) for name, s in CHANNELS.items()}
 
 
-def numbered(channel) -> bool:
+def holds_row_numbers(channel) -> bool:
     rows = channel[:]
     return bool(np.all(rows == np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1))))
 
 
-def test_everything_given_is_read_back_bit_for_bit(tmp_path):
+def test_everything_written_is_read_back_bit_for_bit(tmp_path):
     rng = np.random.default_rng(1)
     t, p, applied = rng.normal(size=777), rng.normal(size=(777, 3)), rng.normal(size=(777, 2, 3))
     curve = rng.normal(size=(50, 3))
@@ -78,23 +78,23 @@ def test_everything_given_is_read_back_bit_for_bit(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_run_killed_while_it_writes_opens_and_has_lost_less_than_a_second(tmp_path, seed):
+def test_killed_run_opens_and_has_lost_less_than_a_second(tmp_path, seed):
     path = tmp_path / "run.h5"
     with subprocess.Popen([sys.executable, "-c", WRITER, str(path), "-1"], stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
         writer.stdout.readline()
         time.sleep(random.Random(seed).uniform(0.0, 0.3))
         writer.kill()
-        said = [20, *map(int, writer.stdout.read().split(b"\n")[:-1])][-1]
+        message = [20, *map(int, writer.stdout.read().split(b"\n")[:-1])][-1]
     with Recording(path) as recording:
         ticks = recording.groups["ticks"]
-        assert said - len(ticks["t"]) <= CHUNK_SECONDS * 1000 <= 1000
-        assert all(numbered(channel) for channel in ticks.values())
+        assert message - len(ticks["t"]) <= CHUNK_SECONDS * 1000 <= 1000
+        assert all(holds_row_numbers(channel) for channel in ticks.values())
         assert not recording.complete
 
 
-# Kills a writer N times, from the moment its file appears until after it is closed, and reads each file in a process
-# of its own, since HDF5 waits for ever on a structure that is torn.
+# Kills a writer N times between the appearance of its file and its closing, and reads each file in a separate process,
+# since HDF5 hangs on a torn structure.
 KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
@@ -135,14 +135,14 @@ print(lost)
 
 
 @pytest.mark.slow
-def test_no_moment_of_a_kill_spoils_a_recording(tmp_path):
+def test_kill_at_any_moment_leaves_a_readable_recording(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", KILLER, str(tmp_path), "150"], capture_output=True, check=True, text=True, timeout=300
     )
     assert done.stdout.split() == ["0"]
 
 
-def test_structures_of_the_file_do_not_cross_pages(tmp_path):
+def test_hdf5_structures_do_not_cross_pages(tmp_path):
     """A write that crosses a page can be torn by a kill; the signatures of HDF5's structures show where they begin."""
     sizes = {b"OHDR": 130, b"EAHD": 70, b"EAIB": 100, b"EADB": 150}
     with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {"xml": "x" * 30000}) as recorder:
@@ -154,7 +154,7 @@ def test_structures_of_the_file_do_not_cross_pages(tmp_path):
     assert all(begin // PAGE == (begin + size) // PAGE for begin, size in begins)
 
 
-def test_an_exception_keeps_all_rows_and_marks_the_recording_as_incomplete(tmp_path):
+def test_exception_keeps_all_rows_and_marks_the_recording_incomplete(tmp_path):
     def run():
         with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
             recorder.append("ticks", block(0, 333))
@@ -167,7 +167,7 @@ def test_an_exception_keeps_all_rows_and_marks_the_recording_as_incomplete(tmp_p
         assert recording.summary is None
 
 
-def test_rows_that_were_not_counted_are_not_read(tmp_path):
+def test_rows_beyond_the_row_count_are_not_read(tmp_path):
     path = tmp_path / "run.h5"
     with Recorder(path, {}, 1, GROUPS, {}) as recorder:
         recorder.append("ticks", block(0, 500))
@@ -185,7 +185,7 @@ def test_rows_that_were_not_counted_are_not_read(tmp_path):
         (lambda file: file["ticks/rows"].__setitem__(0, 501), r"ticks/\w+ has 500 rows, ticks/rows says 501"),
     ],
 )
-def test_a_whole_recording_whose_channels_have_other_lengths_than_it_says_is_damaged(tmp_path, alter, message):
+def test_complete_recording_with_inconsistent_channel_lengths_is_damaged(tmp_path, alter, message):
     path = tmp_path / "run.h5"
     with Recorder(path, {}, 1, GROUPS, {}) as recorder:
         recorder.append("ticks", block(0, 500))
@@ -196,12 +196,12 @@ def test_a_whole_recording_whose_channels_have_other_lengths_than_it_says_is_dam
         Recording(path)
 
 
-def test_a_running_recording_can_be_read(tmp_path):
+def test_running_recording_is_readable(tmp_path):
     with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
         recorder.append("ticks", block(0, 600))
         with Recording(tmp_path / "run.h5") as recording:
             assert len(recording.groups["ticks"]["p"]) == 500
-            assert numbered(recording.groups["ticks"]["p"])
+            assert holds_row_numbers(recording.groups["ticks"]["p"])
 
 
 def test_rows_can_be_flushed_at_any_moment(tmp_path):
@@ -214,11 +214,11 @@ def test_rows_can_be_flushed_at_any_moment(tmp_path):
             with Recording(tmp_path / "run.h5") as recording:
                 ticks = recording.groups["ticks"]
                 assert len(ticks["t"]) == start
-                assert all(numbered(channel) for channel in ticks.values())
+                assert all(holds_row_numbers(channel) for channel in ticks.values())
 
 
 def test_memory_does_not_grow_with_the_run(tmp_path):
-    """Fifty times the rows may cost a few megabytes more, not the hundred that they occupy."""
+    """Fifty times as many rows cost a few megabytes more, not the hundred that they occupy."""
     script = """
 import sys
 from pathlib import Path
@@ -240,7 +240,7 @@ print(peak_memory_mb() - early)
     assert float(result.stdout) < 10.0
 
 
-def test_an_existing_file_is_refused_and_left_alone(tmp_path):
+def test_existing_file_is_refused_and_left_alone(tmp_path):
     (tmp_path / "run.h5").write_text("precious")
     with pytest.raises(RecordingError, match=r"run\.h5: exists"):
         Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {})
@@ -248,7 +248,7 @@ def test_an_existing_file_is_refused_and_left_alone(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_a_header_that_cannot_be_written_leaves_nothing_behind(tmp_path):
+def test_failed_header_leaves_no_file(tmp_path):
     with pytest.raises(TypeError):
         Recorder(tmp_path / "run.h5", {"gain": object()}, 1, GROUPS, {})
     assert list(tmp_path.iterdir()) == []
@@ -263,7 +263,7 @@ def test_a_header_that_cannot_be_written_leaves_nothing_behind(tmp_path):
         ("ticks", {"applied": np.zeros((4, 2, 3))}, r"/ticks/applied: shape is \(4, 2, 3\); expected \(5, 2, 3\)"),
     ],
 )
-def test_blocks_of_another_shape_than_announced_are_refused(tmp_path, group, change, message):
+def test_blocks_of_an_undeclared_shape_are_refused(tmp_path, group, change, message):
     with (
         Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder,
         pytest.raises(RecordingError, match=message),
@@ -272,12 +272,12 @@ def test_blocks_of_another_shape_than_announced_are_refused(tmp_path, group, cha
 
 
 @pytest.mark.parametrize(("rate", "channels"), [(0.0, {"t": ()}), (np.nan, {"t": ()}), (1.0, {}), (1.0, {"rows": ()})])
-def test_a_group_without_rate_or_channels_is_refused(rate, channels):
+def test_group_without_rate_or_channels_is_refused(rate, channels):
     with pytest.raises(RecordingError):
         Group(rate, channels)
 
 
-def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
+def test_error_for_a_missing_channel_names_the_recorded_ones(tmp_path):
     with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {"curve": [1.0]}) as recorder:
         recorder.append("ticks", block(0, 5))
     with Recording(tmp_path / "run.h5") as recording:
@@ -299,7 +299,7 @@ def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
             recording.groups["ticks"]["q"]
 
 
-def recorded(path, closed=True):
+def recording_bytes(path, closed=True):
     """A recording of a second, closed or as a kill leaves it."""
     script = WRITER if closed else WRITER.replace("recorder.close", "import os; os._exit")
     subprocess.run([sys.executable, "-c", script, str(path), "1000"], stdout=subprocess.PIPE, check=False, timeout=60)
@@ -319,8 +319,8 @@ def damaged(content):
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_a_file_that_is_cut_or_spoiled_is_read_or_refused_at_once(tmp_path, closed):
-    content = recorded(tmp_path / "whole.h5", closed)
+def test_truncated_or_corrupt_file_is_read_or_refused_without_hanging(tmp_path, closed):
+    content = recording_bytes(tmp_path / "whole.h5", closed)
     refused, began = list[str](), time.perf_counter()
     for k, bytes_of in enumerate(damaged(content)):
         path = tmp_path / f"{k}.h5"
@@ -332,34 +332,34 @@ def test_a_file_that_is_cut_or_spoiled_is_read_or_refused_at_once(tmp_path, clos
         except RecordingError as error:
             refused.append(str(error))
     assert len(refused) > 30
-    assert not [said for said in refused if "\n" in said]
-    assert time.perf_counter() - began < 30.0  # HDF5 alone would wait for ever
+    assert not [message for message in refused if "\n" in message]
+    assert time.perf_counter() - began < 30.0  # HDF5 alone would hang
 
 
-def test_how_much_a_file_lacks_is_said(tmp_path):
-    content = recorded(tmp_path / "run.h5")
+def test_error_for_a_truncated_file_names_both_sizes(tmp_path):
+    content = recording_bytes(tmp_path / "run.h5")
     (tmp_path / "run.h5").write_bytes(content[:20000])
     with pytest.raises(RecordingError, match=rf"run\.h5: .*cut short: 20000 bytes of {len(content)}; expected"):
         Recording(tmp_path / "run.h5")
 
 
-def test_the_hash_of_a_files_head_is_the_published_one():
-    assert lookup3(b"Four score and seven years ago") == 0x17770551  # of lookup3.c itself
+def test_lookup3_hash_equals_published_values():
+    assert lookup3(b"Four score and seven years ago") == 0x17770551  # from lookup3.c itself
     assert lookup3(b"") == 0xDEADBEEF
 
 
-def test_a_full_disk_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path, monkeypatch):
-    room = [10e6]
+def test_full_disk_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path, monkeypatch):
+    free_bytes = [10e6]
 
     def usage(path):
-        return shutil._ntuple_diskusage(int(10e6), 0, int(room[0]))
+        return shutil._ntuple_diskusage(int(10e6), 0, int(free_bytes[0]))
 
     monkeypatch.setattr(shutil, "disk_usage", usage)
 
     def run():
         with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
             for start in range(0, 4000, 500):
-                room[0] = 10e6 - 2e6 * (start // 500)
+                free_bytes[0] = 10e6 - 2e6 * (start // 500)
                 recorder.append("ticks", block(start, 500))
 
     with pytest.raises(
@@ -368,7 +368,7 @@ def test_a_full_disk_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path, 
         run()
     with Recording(tmp_path / "run.h5") as recording:
         assert len(recording.channel("ticks", "t")) == 1500
-        assert all(numbered(channel) for channel in recording.groups["ticks"].values())
+        assert all(holds_row_numbers(channel) for channel in recording.groups["ticks"].values())
 
 
 QUOTA = """
@@ -386,8 +386,8 @@ except DiskFull as error:
 """
 
 
-def test_a_quota_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path):
-    """A limit that the disk does not tell is met while HDF5 writes."""
+def test_file_size_limit_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path):
+    """A limit that is not visible as free space is met while HDF5 writes."""
     done = subprocess.run(
         [sys.executable, "-c", QUOTA, str(tmp_path / "run.h5")], capture_output=True, text=True, timeout=60, check=True
     )
@@ -396,10 +396,10 @@ def test_a_quota_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path):
     with Recording(tmp_path / "run.h5") as recording:
         rows = recording.channel("ticks", "x")
         assert len(rows) >= 500
-        assert numbered(rows)
+        assert holds_row_numbers(rows)
 
 
-def test_what_is_no_recording_is_refused_in_one_line(tmp_path):
+def test_file_that_is_no_recording_is_refused_in_one_line(tmp_path):
     (tmp_path / "text.h5").write_text("no HDF5")
     with h5py.File(tmp_path / "other.h5", "w", libver="latest") as file:
         file["config"] = json.dumps({})

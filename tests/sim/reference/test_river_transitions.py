@@ -1,4 +1,4 @@
-"""From one river's clip to another's: no jump of pose or velocity, feet that step, and the same again."""
+"""Transitions between the clips of rivers: continuous pose and velocity, stepping feet, reproducible."""
 
 from pathlib import Path
 
@@ -43,11 +43,11 @@ def clips_of_rivers() -> RiverClips:
     return RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE))
 
 
-def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.ndarray:
+def _played(clips: RiverClips, blend: float, without_river_between: bool = False) -> np.ndarray:
     """Poses of a hand that glides from river to river, every 8 ms for 7.2 s."""
     t = np.arange(900) * PERIOD
     stylus, traces = gliding_hand(CURVES, LAP, CHANGES, t)
-    for moment, _ in CHANGES if none_between else ():
+    for moment, _ in CHANGES if without_river_between else ():
         traces[(t >= moment - 0.1) & (t < moment), TRACE_RIVER] = -1.0
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, blend, packed_legs(FIGURE))
     poses = np.empty((len(t), 75))
@@ -56,7 +56,7 @@ def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.n
 
 
 def _at_changes(values: np.ndarray) -> np.ndarray:
-    """Largest of rows from three before to three behind each change."""
+    """Largest value in the rows from three before to three after each change."""
     rows = [round((moment + DWELL) / PERIOD) for moment, _ in CHANGES]
     return np.array([values[k - 3 : k + 3].max() for k in rows])
 
@@ -67,10 +67,10 @@ def _rates(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rate[:, 6:].max(axis=1), rate[:, :3].max(axis=1)
 
 
-def test_pose_and_velocity_are_continuous_at_a_change_and_without_inertialisation_they_are_not(clips_of_rivers) -> None:
+def test_pose_and_velocity_are_continuous_only_with_inertialisation(clips_of_rivers) -> None:
     joint, root = _rates(_played(clips_of_rivers, BLEND))
     jumping_joint, jumping_root = _rates(_played(clips_of_rivers, 0.0))
-    # Within what the clips themselves do elsewhere.
+    # Within the range of the clips themselves.
     assert _at_changes(joint).max() < 12.0
     assert _at_changes(root).max() < 2.0
     assert _at_changes(jumping_joint).min() > 60.0
@@ -84,15 +84,15 @@ def test_pose_and_velocity_are_continuous_at_a_change_and_without_inertialisatio
     assert jumping_root.max() > root.max()
 
 
-def test_the_figure_goes_on_where_it_stands(clips_of_rivers) -> None:
+def test_figure_continues_from_its_place_on_the_floor(clips_of_rivers) -> None:
     poses = _played(clips_of_rivers, BLEND)
     ground = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1) / PERIOD
-    # It walked more than a metre before, and is not pulled back.
+    # It has walked before, and is not pulled back.
     assert np.linalg.norm(poses[-1, :2] - poses[0, :2]) > 0.5
     assert ground.max() < 2.0
 
 
-def test_feet_that_touch_the_floor_step_instead_of_sliding(clips_of_rivers) -> None:
+def test_feet_in_contact_step_instead_of_sliding(clips_of_rivers) -> None:
     poses, data = _played(clips_of_rivers, BLEND), mujoco.MjData(FIGURE)
     ids = [FIGURE.geom(name).id for name in FOOT_CONTACTS]
     points = np.empty((len(poses), len(ids), 3))
@@ -113,12 +113,12 @@ def test_feet_that_touch_the_floor_step_instead_of_sliding(clips_of_rivers) -> N
             assert step[first:last, of_side][rows, lowest][low].sum() < 0.02
 
 
-def test_while_no_river_has_the_hand_the_last_clip_plays(clips_of_rivers) -> None:
+def test_last_clip_plays_while_no_river_has_the_hand(clips_of_rivers) -> None:
     np.testing.assert_array_equal(_played(clips_of_rivers, BLEND, True), _played(clips_of_rivers, BLEND))
 
 
-def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
-    """Poses of a hand that is thrown far out of its river at 1.4 s, swings about, comes back, and is taken at 4.5 s."""
+def _played_thrown_out(clips: RiverClips, let_go: bool) -> np.ndarray:
+    """Poses of a hand that is thrown out of its river at 1.4 s, swings about, and is back in a river at 4.5 s."""
     t = np.arange(700) * PERIOD
     away = np.clip((t - 1.4) / 0.3, 0.0, 1.0) * np.clip((4.2 - t) / 0.3, 0.0, 1.0)
     away = away**3 * (10.0 - 15.0 * away + 6.0 * away**2)
@@ -133,23 +133,23 @@ def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
     return poses
 
 
-def test_a_hand_that_leaves_all_rivers_leaves_the_figure_standing(clips_of_rivers) -> None:
-    poses = _thrown(clips_of_rivers, True)
+def test_figure_stands_while_the_hand_is_outside_all_rivers(clips_of_rivers) -> None:
+    poses = _played_thrown_out(clips_of_rivers, True)
     joint, root = _rates(poses)
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
-    # It comes to rest, stands still however the hand swings, and goes on: without a jump of pose or velocity.
+    # It comes to rest, stands still while the hand swings, and continues, without a jump of pose or velocity.
     assert np.abs(np.diff(velocity, axis=0)).max() < 10.0
     still = slice(round(2.1 / PERIOD), round(4.2 / PERIOD))
     assert joint[still].max() < 1e-9
     assert root[still].max() < 1e-9
     assert joint[round(4.8 / PERIOD) :].max() > 0.5
     assert joint[: round(1.4 / PERIOD)].max() > 0.5
-    # A river that keeps such a hand has the figure thrown about: the control.
-    assert _rates(_thrown(clips_of_rivers, False))[0][still].max() > 20.0
+    # Control: if the river keeps such a hand, the figure is thrown about.
+    assert _rates(_played_thrown_out(clips_of_rivers, False))[0][still].max() > 20.0
 
 
-def _in_turns(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
-    """Poses while rivers have the hand in turns, for so long each, from 0.5 s on."""
+def _played_alternating(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
+    """Poses while three rivers have the hand in turn, for `seconds` each, from 0.5 s on."""
     t = np.arange(300) * PERIOD
     traces = np.zeros((len(t), TRACE_SIZE))
     traces[:, TRACE_PHASE] = t % LAP
@@ -160,41 +160,41 @@ def _in_turns(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
     return poses
 
 
-def _jerk(poses: np.ndarray) -> float:
+def _largest_velocity_step(poses: np.ndarray) -> float:
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
     return float(np.abs(np.diff(velocity, axis=0)).max())
 
 
-def test_rivers_that_have_the_hand_in_turns_change_the_clip_once_in_a_blend_time(clips_of_rivers) -> None:
+def test_alternating_rivers_change_the_clip_once_per_blend_time(clips_of_rivers) -> None:
     # The first change comes in the middle of a kick.
-    assert _jerk(_in_turns(clips_of_rivers, 0.06, BLEND)) < 20.0
-    assert _jerk(_in_turns(clips_of_rivers, 0.06, 0.0)) > 60.0
+    assert _largest_velocity_step(_played_alternating(clips_of_rivers, 0.06, BLEND)) < 20.0
+    assert _largest_velocity_step(_played_alternating(clips_of_rivers, 0.06, 0.0)) > 60.0
 
 
-def test_a_river_that_has_the_hand_for_a_moment_changes_no_clip(clips_of_rivers) -> None:
-    alone = _in_turns(clips_of_rivers, 1e3, BLEND)
-    np.testing.assert_array_equal(_in_turns(clips_of_rivers, 0.03, BLEND), alone)
-    assert np.abs(_in_turns(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
+def test_momentary_river_changes_no_clip(clips_of_rivers) -> None:
+    alone = _played_alternating(clips_of_rivers, 1e3, BLEND)
+    np.testing.assert_array_equal(_played_alternating(clips_of_rivers, 0.03, BLEND), alone)
+    assert np.abs(_played_alternating(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
 
 
 @pytest.mark.parametrize("clips", [("squat_dance", "walk", "angry"), ("walk", "run", "squat_dance")])
-def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]) -> None:
+def test_feet_in_contact_do_not_slide_into_a_walk_or_run(clips: tuple[str, ...]) -> None:
     rivers = rivers_that_play(clips)
     for change in drawn_changes(rivers, 18, np.random.default_rng(3 if clips[0] == "squat_dance" else 2), False):
-        # Where a kick went over into a walk that changes feet within the change it was 22 cm.
+        # The hardest case, once 22 cm, is a kick into a walk that changes feet within the change.
         assert change.slide < 0.03
         assert change.depth < 0.003
 
 
 @pytest.mark.parametrize(("first", "second"), [("jump", "angry"), ("angry", "jump")])
-def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, second: str) -> None:
+def test_change_waits_for_landing_or_takeoff(first: str, second: str) -> None:
     names = (first, second, "run")
     rivers = rivers_that_play(names)
     changed = 0
     for moment in np.arange(1.2, 4.2, 0.3):
         poses = played_change(rivers, 0, 1, moment)
         change = measured_change(poses)
-        # Begun in the air, or over into a flight, the root was thrown by up to 5.9 m/s within a step.
+        # Changes that begin in the air or end in a flight threw the root by up to 5.9 m/s within a step.
         assert change.up < 0.3
         assert change.height < 0.28  # the jump's own 0.27
         assert change.slide < 0.03
@@ -203,16 +203,16 @@ def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, seco
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(stops: bool) -> None:
+def test_stance_foot_neither_slides_nor_penetrates_during_changes_and_stops(stops: bool) -> None:
     clips = rivers_that_play(("squat_dance", "cheer", "angry"))
     for change in drawn_changes(clips, 12, np.random.default_rng(3), stops):
-        # Without a foot that stands and phases of rest it was 6 cm, and 50 cm below the floor.
+        # 6 cm of sliding and 50 cm below the floor without a stance foot and rest phases.
         assert change.height < 0.015
         assert change.depth < 0.003
         assert change.slide < 0.03
 
 
-def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
+def test_stopped_figure_is_in_balance_only_with_rest_phases(clips_of_rivers) -> None:
     data, feet = mujoco.MjData(FIGURE), [FIGURE.geom(name).id for name in FOOT_CONTACTS]
     for clips, balanced in ((with_rests(clips_of_rivers, FIGURE), True), (clips_of_rivers, False)):
         missing = []
@@ -229,22 +229,24 @@ def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
 @pytest.mark.parametrize(
     ("clips", "first", "second", "moment"),
     [
-        # The root went down for a leg that was left behind, and no further once it was lost: by up to 5.4 m/s at once.
+        # Here the root once followed a leg left behind and stopped when it was released: up to 5.4 m/s at once.
         (("run", "jump", "walk"), 0, 2, 2.0259264472833878),
         (("run", "jump", "walk"), 2, 0, 3.109084265589373),
         (("spin", "walk", "run"), 1, 2, 1.2860670251158335),
         (("spin", "walk", "run"), 2, 0, 3.065651),
         (("walk", "run", "squat_dance"), 0, 1, 2.1521299148440125),
-        # Knees snapped straight, 68 rad/s within an update, and a leg that folded under its hip flung it round.
+        # Here knees once snapped straight, by 68 rad/s within an update, and a folded leg flung its hip round.
         (("walk", "run", "squat_dance"), 1, 2, 2.734170),
         (("walk", "run", "squat_dance"), 1, 2, 4.134903),
     ],
 )
-def test_no_velocity_leaps_in_a_change(clips: tuple[str, ...], first: int, second: int, moment: float) -> None:
+def test_velocity_is_continuous_in_difficult_changes(
+    clips: tuple[str, ...], first: int, second: int, moment: float
+) -> None:
     rivers = rivers_that_play(clips)
     change = measured_change(played_change(rivers, first, second, moment))
     finer = measured_change(played_change(rivers, first, second, moment, PERIOD / 8.0), PERIOD / 8.0)
-    # A jump would be as large however often one looks.
+    # A discontinuity would not shrink with the time step.
     assert np.all(np.array(finer[3:]) < 0.5 * np.array(change[3:]))
     assert change.over < 0.4
     assert change.up < 0.2
@@ -253,22 +255,22 @@ def test_no_velocity_leaps_in_a_change(clips: tuple[str, ...], first: int, secon
 
 
 @pytest.mark.parametrize(("first", "moment"), [(0, 3.984633), (0, 2.025926), (1, 4.134903), (1, 4.142741)])
-def test_a_hand_that_is_thrown_off_does_not_throw_the_figure(first: int, moment: float) -> None:
+def test_figure_stops_smoothly_when_the_hand_is_thrown_off_the_river(first: int, moment: float) -> None:
     rivers = rivers_that_play(("run", "jump", "walk"))
     stop = measured_change(played_change(rivers, first, None, moment))
-    # Followed until it raced the clip twice over the root leapt by up to 3.7 m/s, and joints by 114 rad/s.
+    # If the hand is followed up to twice the clip's pace, the root leaps by up to 3.7 m/s and joints by 114 rad/s.
     assert stop.over < 1.0
     assert stop.up < 0.5
     assert stop.joint < 32.0
 
 
-def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
+def test_transitions_match_golden_poses(clips_of_rivers) -> None:
     poses = _played(clips_of_rivers, BLEND)[::15]
     np.testing.assert_allclose(poses, np.loadtxt(GOLDEN, delimiter=","), atol=1e-7)
 
 
 if __name__ == "__main__":
-    made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
+    clips = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
     np.savetxt(
-        GOLDEN, _played(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), BLEND)[::15], fmt="%.10g", delimiter=","
+        GOLDEN, _played(RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE)), BLEND)[::15], fmt="%.10g", delimiter=","
     )

@@ -1,4 +1,4 @@
-"""The filter between stylus and figure turns as it moves: no lag at constant acceleration, no bit at rest."""
+"""The filter between stylus and figure: no lag at constant acceleration, exact at rest, also for orientations."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,7 +21,7 @@ def _turn_of(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return q.copy(), np.zeros((2, 3))
 
 
-def test_a_stylus_that_keeps_its_orientation_is_told_to_the_last_bit() -> None:
+def test_constant_orientation_is_returned_bit_for_bit() -> None:
     for measured in RNG.normal(size=(20, 4)):
         measured /= np.linalg.norm(measured)
         q, turning = _turn_of(measured)
@@ -32,7 +32,7 @@ def test_a_stylus_that_keeps_its_orientation_is_told_to_the_last_bit() -> None:
         np.testing.assert_array_equal(turned_on(q, turning, PERIOD), measured)
 
 
-def test_about_one_axis_it_is_the_filter_of_positions() -> None:
+def test_rotation_about_one_axis_equals_the_position_filter() -> None:
     axis = np.array([0.36, -0.48, 0.8])
     angles = 0.3 * np.cumsum(RNG.normal(size=300)) * PERIOD + 0.5 * np.sin(np.arange(300) * 0.05)
     hand = np.zeros((3, 3))
@@ -47,7 +47,7 @@ def test_about_one_axis_it_is_the_filter_of_positions() -> None:
         np.testing.assert_allclose(turning, np.outer(hand[1:, 0], axis), rtol=1e-9, atol=1e-9)
 
 
-def test_a_constant_angular_acceleration_is_followed_without_lag() -> None:
+def test_constant_angular_acceleration_is_followed_without_lag() -> None:
     start, axis = Rotation.from_rotvec([0.4, 0.2, -0.9]), np.array([0.0, 0.6, 0.8])
 
     def orientation(t: float) -> np.ndarray:
@@ -64,7 +64,7 @@ def test_a_constant_angular_acceleration_is_followed_without_lag() -> None:
         assert _angle(np.array(turned_on(q, turning, s)), orientation(t + s)) < 1e-12
 
 
-def test_the_step_of_an_encoder_is_spread_over_several_periods() -> None:
+def test_encoder_step_is_spread_over_several_periods() -> None:
     step = _quaternion(Rotation.from_rotvec([0.0, 0.0, 2e-3]))
     q, turning = _turn_of(np.array([1.0, 0.0, 0.0, 0.0]))
     smooth_turn(q, turning, step, SMOOTHING, PERIOD)
@@ -76,8 +76,8 @@ def test_the_step_of_an_encoder_is_spread_over_several_periods() -> None:
     assert abs(float(q @ q) - 1.0) < 1e-14
 
 
-def test_a_hand_on_a_lap_is_told_the_speed_at_which_it_goes() -> None:
-    # Jerk that turns with the hand: without it the velocity of this lap is 1.6 % short.
+def test_velocity_and_acceleration_of_circular_motion_are_unbiased() -> None:
+    # The filter assumes jerk that turns with the hand: without it the velocity of this lap is 1.6 % too small.
     period, lap = 2e-3, 2.2
     smoothing, rate = float(np.exp(-2.0 * np.pi * 6.0 * period)), 2.0 * np.pi / lap
     hand = np.zeros((3, 3))

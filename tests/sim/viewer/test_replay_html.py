@@ -1,4 +1,4 @@
-"""The replay shows what was recorded, where it was, in one page that asks for nothing else."""
+"""The replay shows the recorded motion in one self-contained page."""
 
 import base64
 import re
@@ -30,7 +30,7 @@ def model():
 
 
 def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02, rivers=None):
-    """A hand on a circle that presses harder with time; a figure that leans and may travel along x."""
+    """Record a hand on a circle that presses harder with time, and a figure that leans and may travel along x."""
     ticks, frames = np.arange(0, seconds, 1e-3), np.arange(0, seconds, 1e-2)
     root = int(model.joint("figure/root").qposadr[0])
     theta1 = int(model.joint("phantom/theta1").qposadr[0])
@@ -56,7 +56,7 @@ def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02, rivers
 
 
 def decoded(page: str) -> dict:
-    """The recording that viser put into the page."""
+    """The recording that viser embedded in the page."""
     found = re.search(r'__VISER_EMBED_DATA__="([^"]+)"', page)
     assert found is not None
     raw = zstandard.ZstdDecompressor().decompress(base64.b64decode(found[1])[8:])
@@ -72,7 +72,7 @@ def decoded(page: str) -> dict:
 
 
 class State:
-    """Where everything is at a time: the messages until then, applied."""
+    """The scene at a time, after all messages until then."""
 
     def __init__(self, content: dict, time: float):
         self.position: dict[str, np.ndarray] = {}
@@ -92,7 +92,7 @@ class State:
 
 
 class References(HTMLParser):
-    """Everything a page would fetch."""
+    """All references that a page would fetch."""
 
     def __init__(self, page: str):
         super().__init__()
@@ -103,7 +103,7 @@ class References(HTMLParser):
         self.found += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
 
 
-def test_bodies_are_drawn_where_they_were(tmp_path, model, capsys):
+def test_bodies_are_drawn_at_their_recorded_positions(tmp_path, model, capsys):
     with record(tmp_path / "run.h5", model) as recording:
         page = replay_html(recording, model)
         state = State(decoded(page), 0.5)
@@ -126,7 +126,7 @@ def test_bodies_are_drawn_where_they_were(tmp_path, model, capsys):
         np.testing.assert_allclose(state.position[f"/ghost/{body}"], GHOST_AT + data.xpos[body], atol=1e-6)
 
 
-def test_the_arrow_starts_at_the_stylus_and_is_as_long_as_the_force_is_large(tmp_path, model):
+def test_force_arrow_starts_at_the_stylus_with_length_proportional_to_the_force(tmp_path, model):
     with record(tmp_path / "run.h5", model) as recording:
         content = decoded(replay_html(recording, model))
         ticks = recording.groups["ticks"]
@@ -141,7 +141,7 @@ def test_the_arrow_starts_at_the_stylus_and_is_as_long_as_the_force_is_large(tmp
     assert State(content, 0.9).visible["/forces/user"] is False
 
 
-def test_the_replay_lasts_as_long_as_the_run_or_as_is_shown_of_it(tmp_path, model, monkeypatch):
+def test_replay_lasts_as_long_as_the_run_or_its_shown_part(tmp_path, model, monkeypatch):
     with record(tmp_path / "run.h5", model) as recording:
         content = decoded(replay_html(recording, model))
         assert content["durationSeconds"] == pytest.approx(1.0, abs=1 / 30)
@@ -151,7 +151,7 @@ def test_the_replay_lasts_as_long_as_the_run_or_as_is_shown_of_it(tmp_path, mode
         assert decoded(replay_html(recording, model))["durationSeconds"] == pytest.approx(0.5)
 
 
-def test_a_figure_that_travels_stays_in_view_and_the_floor_moves_instead(tmp_path, model):
+def test_travelling_figure_stays_in_view_while_the_floor_moves(tmp_path, model):
     with record(tmp_path / "run.h5", model, seconds=3.0, speed=1.5) as recording:
         content = decoded(replay_html(recording, model))
         pelvis = model.body("figure/pelvis").id
@@ -164,7 +164,7 @@ def test_a_figure_that_travels_stays_in_view_and_the_floor_moves_instead(tmp_pat
             assert cells == pytest.approx(round(cells), abs=1e-6)
 
 
-def test_a_hand_that_does_not_move_leaves_no_trail_and_no_nan(tmp_path, model):
+def test_motionless_hand_leaves_no_trail_and_no_nan(tmp_path, model):
     with record(tmp_path / "run.h5", model, still=True) as recording:
         content = decoded(replay_html(recording, model))
     names = {message.get("name", "") for _, message in content["messages"]}
@@ -186,7 +186,7 @@ def meshes(page: str) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
     return found
 
 
-def test_every_river_is_drawn_with_its_tube_where_it_is_and_in_a_colour_of_its_own(tmp_path, model):
+def test_every_river_is_drawn_with_its_tube_in_its_own_colour(tmp_path, model):
     curves = np.stack([CIRCLE + np.array([0.0, 0.0, height]) for height in (0.0, 0.01, 0.03)])
     rivers = {"river_names": "low\nmiddle\nhigh", "river_curves": curves}
     with record(tmp_path / "run.h5", model, seconds=0.1, rivers=rivers) as recording:
@@ -203,30 +203,30 @@ def test_every_river_is_drawn_with_its_tube_where_it_is_and_in_a_colour_of_its_o
             np.testing.assert_allclose(away, radius, atol=1e-5)
 
 
-def test_one_curve_is_drawn_alone_and_without_a_tube_where_it_has_none(tmp_path, model):
+def test_single_curve_without_radius_is_drawn_without_a_tube(tmp_path, model):
     with record(tmp_path / "run.h5", model, seconds=0.1, radius=0.0) as recording:
         drawn = meshes(replay_html(recording, model))
     assert {name for name in drawn if name.startswith("/curve/")} == {"/curve/0/line"}
 
 
-def test_rivers_differ_in_colour_however_many_and_from_hand_and_field():
+def test_river_colours_differ_from_each_other_and_from_hand_and_field():
     assert river_colors(3) == RIVERS[:3]
     for n in (len(RIVERS), 8, 30):
         colors = [*river_colors(n), FIELD, USER, CURVE]
         seen = np.array([rgb(color) for color in colors], dtype=float)
-        apart = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
-        assert apart.min() > 25.0
-        # Seen on white, in the page and in figures.
+        distances = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
+        assert distances.min() > 25.0
+        # Distinct from white, the background of the page and of figures.
         assert (np.linalg.norm(seen - 255.0, axis=1) > 100.0).all()
 
 
 @pytest.mark.parametrize(("radius", "drawn"), [(0.01, 0.01), (0.25, 0.03)])
-def test_a_tube_that_would_hide_everything_is_drawn_narrower(tmp_path, model, radius, drawn):
+def test_wide_tube_is_drawn_narrower(tmp_path, model, radius, drawn):
     with record(tmp_path / "run.h5", model, seconds=0.1, radius=radius) as recording:
         assert drawn_tube(recording) == pytest.approx(drawn)
 
 
-def test_the_page_refers_to_nothing_outside_itself(tmp_path, model):
+def test_page_refers_to_nothing_outside_itself(tmp_path, model):
     with record(tmp_path / "run.h5", model, seconds=0.1) as recording:
         page = replay_html(recording, model)
     assert all(not reference or reference.startswith("data:") for reference in References(page).found)
@@ -239,21 +239,21 @@ def test_fifteen_seconds_stay_below_thirty_megabytes(tmp_path, model):
 
 
 @pytest.mark.slow
-def test_a_browser_plays_it_from_disk_without_a_network(tmp_path, model):
+def test_browser_plays_the_page_from_disk_without_network(tmp_path, model):
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     chromium = Path("/usr/bin/chromium")
     if not chromium.exists():
         pytest.skip("no chromium")
     with record(tmp_path / "run.h5", model) as recording:
         (tmp_path / "replay.html").write_text(replay_html(recording, model), encoding="utf-8")
-    asked: list[str] = []
-    failed: list[str] = []
+    requested_urls: list[str] = []
+    page_errors: list[str] = []
     options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with playwright.sync_playwright() as play:
         browser = play.chromium.launch(executable_path=chromium, args=options)
         page = browser.new_page(viewport={"width": 640, "height": 400})
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("pageerror", lambda error: failed.append(str(error)))
+        page.on("request", lambda request: requested_urls.append(request.url))
+        page.on("pageerror", lambda error: page_errors.append(str(error)))
         page.set_default_timeout(240_000)  # a processor that draws in software may be busy with other tests
         page.goto((tmp_path / "replay.html").as_uri())
         clock = page.locator("input").first
@@ -261,12 +261,12 @@ def test_a_browser_plays_it_from_disk_without_a_network(tmp_path, model):
         page.wait_for_function(f"document.querySelector('input').value != '{clock.input_value()}'")
         picture = page.screenshot()
         browser.close()
-    assert failed == []
-    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+    assert page_errors == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in requested_urls)
     assert len(picture) > 20_000  # a blank page compresses to a few kilobytes
 
 
-def test_visible_geometry_is_the_figure_and_not_its_contact_spheres(model):
+def test_drawn_geometry_is_the_figure_without_its_contact_spheres(model):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     shapes = body_shapes(model, "figure/")
@@ -277,7 +277,7 @@ def test_visible_geometry_is_the_figure_and_not_its_contact_spheres(model):
     assert all(s.rgba[3] == 1.0 for s in shapes)
 
 
-def test_a_tube_lies_at_its_radius_and_faces_outwards():
+def test_tube_lies_at_its_radius_and_faces_outwards():
     helix = np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0.3 * ANGLE])
     vertices, faces = tube(helix, 0.1, sides=12)
     axis = np.repeat(helix, 12, axis=0)
@@ -299,14 +299,14 @@ def test_a_tube_lies_at_its_radius_and_faces_outwards():
     ids=["rests at first", "rests", "turns back", "corners", "never moves"],
 )
 @pytest.mark.filterwarnings("error")
-def test_a_tube_about_a_path_that_rests_or_turns_sharply_is_whole(points):
+def test_tube_about_a_resting_or_sharply_turning_path_is_intact(points):
     vertices, _ = tube(points, 0.1, sides=6)
     rings = vertices.reshape(len(points), 6, 3) - points[:, None]
     np.testing.assert_allclose(np.linalg.norm(rings, axis=2), 0.1, atol=1e-12)
-    # No ring is flat.
+    # No ring is degenerate.
     assert all(np.linalg.svd(ring, compute_uv=False)[1] > 0.1 for ring in rings)
 
 
-def test_a_closed_tube_has_no_gap():
+def test_closed_tube_has_no_gap():
     vertices, _ = tube(CIRCLE, 0.01, sides=8)
     np.testing.assert_allclose(vertices[:8], vertices[-8:], atol=1e-12)

@@ -1,4 +1,4 @@
-"""A view of the live page is in the middle of what the panel leaves free, and all of it is there."""
+"""Views of the live page are centred in the space beside the panel, and completely visible."""
 
 import asyncio
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import pytest
 from sim.viewer.views import FIELD_OF_VIEW, PANEL, SHEET, VIEWS, View, camera_of, is_phone, look, open_with, screen_axes
 
 
-def seen(view: View, width: float, height: float) -> np.ndarray:
+def projected_points(view: View, width: float, height: float) -> np.ndarray:
     """Pixels of the centre and of the corners of a view's plane, shape (5, 2), from the picture's top left."""
     camera = camera_of(view, width, height)
     forward = camera.look_at - camera.position
@@ -30,19 +30,19 @@ def seen(view: View, width: float, height: float) -> np.ndarray:
     "size", [(1400, 850), (900, 520), (1920, 1080), (390, 780), (1170, 2340), (700, 900), (600, 1200)]
 )
 @pytest.mark.parametrize("name", VIEWS)
-def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int]) -> None:
+def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int]) -> None:
     width, height = size
     free = (width, (1.0 - SHEET) * height) if is_phone(width, height) else (width - PANEL, height)
-    pixels = seen(VIEWS[name], *size)
+    pixels = projected_points(VIEWS[name], *size)
     np.testing.assert_allclose(pixels[0], [0.5 * free[0], 0.5 * free[1]], atol=1e-6)
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)
     assert inside.all()
     spread = np.ptp(pixels, axis=0) / free
-    assert spread.max() == pytest.approx(1.0)  # no smaller than it has to be
+    assert spread.max() == pytest.approx(1.0)  # as large as possible
 
 
-def opened() -> tuple[Any, Any, Callable[[], None]]:
-    """A server, the camera of its browser of 900×520, and what tells it that the camera has changed."""
+def opened_page() -> tuple[Any, Any, Callable[[], None]]:
+    """A server, the camera of its browser of 900×520, and a function that reports a change of the camera."""
     calls: dict[str, Callable[..., Any]] = {}
     server: Any = SimpleNamespace(
         initial_camera=SimpleNamespace(), on_client_connect=lambda call: calls.update(connect=call)
@@ -58,13 +58,13 @@ def resize(camera: Any, width: int, height: int) -> None:
     camera.image_width, camera.aspect = width, width / height
 
 
-def test_a_view_is_fitted_to_a_window_that_is_resized_until_somebody_turns_it() -> None:
-    _, camera, update = opened()
+def test_view_is_fitted_to_resized_windows_until_somebody_turns_it() -> None:
+    _, camera, update = opened_page()
     for size in ((1300, 850), (800, 600), (600, 1200), (390, 780)):
         resize(camera, *size)
         update()
         np.testing.assert_allclose(camera.position, camera_of(VIEWS["both"], *size).position)
-    look(camera, VIEWS["stage"], (390, 780))  # by its button
+    look(camera, VIEWS["stage"], (390, 780))  # as by its button
     update()
     resize(camera, 800, 600)
     update()
@@ -79,8 +79,8 @@ def test_a_view_is_fitted_to_a_window_that_is_resized_until_somebody_turns_it() 
     np.testing.assert_array_equal(camera.position, turned)
 
 
-def test_a_browser_that_applies_the_initial_camera_late_is_shown_its_view_again() -> None:
-    server, camera, update = opened()
+def test_late_initial_camera_is_replaced_by_the_fitted_view() -> None:
+    server, camera, update = opened_page()
     fitted = camera_of(VIEWS["both"], 900, 520)
     np.testing.assert_allclose(camera.position, fitted.position)
     camera.position = server.initial_camera.position.astype(np.float32)

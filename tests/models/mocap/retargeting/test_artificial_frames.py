@@ -65,13 +65,9 @@ def test_calibration_pose_smeared_by_a_filter_is_dropped_entirely(tmp_path) -> N
 
 def test_remarked_times_count_from_the_first_frame_of_the_file() -> None:
     clearance = np.where(np.arange(100) < 40, 0.0, 0.3)
-<<<<<<< HEAD:tests/models/mocap/retargeting/test_filled_motions.py
-    (plain,), (led,) = (
+    (plain,), (late,) = (
         list(floor_remarks(clearance, np.zeros((len(clearance), 3)), 30.0, dropped)) for dropped in (0, 90)
     )
-=======
-    (plain,), (late,) = (list(floor_remarks(clearance, 30.0, dropped)) for dropped in (0, 90))
->>>>>>> wt-t2:tests/models/mocap/retargeting/test_artificial_frames.py
     assert "(the first at 1.33 s)" in plain
     assert "(the first at 4.33 s)" in late
 

@@ -1,4 +1,4 @@
-"""A simulated hand that takes hold: where it means to be, and when the switch is pressed."""
+"""A simulated hand that grabs: where it wants to be, and when the switch is pressed."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from sim.errors import SimError
 from sim.users.hand.actions import Grab
 from sim.users.hand.arm import Arm, hand_force
 from sim.world.world import World
-from tests.sim.bare_servos import Stepped
+from tests.sim.bare_servos import SteppedPhantom
 
 GRAB = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
 
 
 class Hand:
-    """The hand of an arm that is held at a point: its force in terms of its stiffness is where it wants to be."""
+    """A hand held at a point: its force divided by its stiffness tells where it wants to be."""
 
     def __init__(self, arm: Arm):
         self.arm = arm.compiled()
@@ -27,7 +27,7 @@ class Hand:
         return force, float(self.arm.switch[0])
 
 
-def test_it_goes_to_the_place_presses_carries_holds_and_lets_go() -> None:
+def test_grab_reaches_presses_carries_holds_and_releases() -> None:
     hand = Hand(Arm(stiffness=200.0, damping=0.0, grabs=(GRAB,)))
     start = np.array([0.03, 0.0, 0.0])
     for t, wanted, switch in (
@@ -46,7 +46,7 @@ def test_it_goes_to_the_place_presses_carries_holds_and_lets_go() -> None:
         assert pressed == switch
 
 
-def test_a_steady_one_moves_from_its_first_moment_to_its_last() -> None:
+def test_steady_grab_moves_at_constant_speed() -> None:
     grab = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.0, steady=True)
     hand, damped = (Hand(Arm(stiffness=k, damping=b, grabs=(grab,))) for k, b in ((200.0, 0.0), (1e-9, 5.0)))
     for share in (0.0, 0.1, 0.5, 0.99):
@@ -57,7 +57,7 @@ def test_a_steady_one_moves_from_its_first_moment_to_its_last() -> None:
     assert not hand.at(1.501)[0].any()
 
 
-def test_it_damps_towards_the_speed_that_it_wants() -> None:
+def test_damping_is_relative_to_the_wanted_speed() -> None:
     still = Hand(Arm(stiffness=200.0, damping=0.0, grabs=(GRAB,)))
     damped = Hand(Arm(stiffness=200.0, damping=3.0, grabs=(GRAB,)))
     h = 1e-5
@@ -66,7 +66,7 @@ def test_it_damps_towards_the_speed_that_it_wants() -> None:
         np.testing.assert_allclose(damped.at(t)[0] - still.at(t)[0], 3.0 * speed, atol=1e-6)
 
 
-def test_without_a_place_it_presses_where_it_is() -> None:
+def test_grab_without_a_place_presses_at_the_current_point() -> None:
     hand = Hand(Arm(grabs=(Grab(0.5, (0.0, 0.0, 0.0), seconds=0.2, hold=0.0),)))
     assert hand.at(0.4) == (pytest.approx(np.zeros(3)), 0.0)
     force, pressed = hand.at(0.5)
@@ -75,11 +75,11 @@ def test_without_a_place_it_presses_where_it_is() -> None:
     assert hand.at(0.71)[1] == 0.0
 
 
-def test_the_device_tells_of_the_switch() -> None:
+def test_device_reports_the_switch() -> None:
     world = World()
     world.reset(np.array([0.03, 0.02, 0.02]), rest_pose())
     arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), seconds=0.03, hold=0.0),))
-    phantom, switches = Stepped(world, arm), []
+    phantom, switches = SteppedPhantom(world, arm), []
     for _ in range(80):
         switches.append(phantom.read().switch)
         phantom.write(np.zeros(3))
@@ -100,12 +100,12 @@ def test_the_device_tells_of_the_switch() -> None:
         {"at": 0.0, "carry": (0.0, 0.0, 0.0), "place": (0.0, 0.0, 0.0), "reach": 0.0},
     ],
 )
-def test_a_grab_that_makes_no_sense_is_refused(grab: dict) -> None:
+def test_invalid_grab_is_refused(grab: dict) -> None:
     with pytest.raises((SimError, ParameterError)):
         Grab(**grab)
 
 
-def test_one_hand_does_one_thing_at_a_time() -> None:
+def test_overlapping_grabs_or_grabs_on_a_path_are_refused() -> None:
     with pytest.raises(SimError, match=r"begins at 1\.5 s, before another has ended at 2\.1 s"):
         Arm(grabs=(GRAB, Grab(1.5, (0.0, 0.0, 0.0))))
     with pytest.raises(SimError, match="path"):

@@ -1,4 +1,4 @@
-"""A simulated hand that turns the stylus: what it wants, its moment, where the stylus goes, and its replay."""
+"""A simulated hand that turns the stylus: wanted turn, moment, motion of the stylus, and replay."""
 
 import mujoco
 import numpy as np
@@ -19,7 +19,7 @@ from sim.users.hand.arm import Arm
 from sim.users.hand.fingers import turning_moment, wanted_turn
 from sim.world.phantom_port import phantom_port, true_turn
 from sim.world.world import World
-from tests.sim.bare_servos import Stepped
+from tests.sim.bare_servos import SteppedPhantom
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 START = np.array([0.03, 0.02, 0.04])
@@ -36,7 +36,7 @@ def wanted(turns, t):
     return turn, rate
 
 
-def test_it_wants_to_turn_there_and_back_and_to_hold_the_pen_upright_in_between():
+def test_wanted_turn_goes_there_and_back_and_its_rate_is_its_derivative():
     turn = Turn(1.0, 0.5, 0.8, (0.0, 3.0, 4.0))
     axis = np.array([0.0, 0.6, 0.8])
     for t, share in ((0.0, 0.0), (1.0, 0.0), (1.125, 0.5), (1.25, 1.0), (1.375, 0.5), (1.5, 0.0), (9.0, 0.0)):
@@ -47,7 +47,7 @@ def test_it_wants_to_turn_there_and_back_and_to_hold_the_pen_upright_in_between(
         )
 
 
-def test_the_moment_is_a_spring_and_a_damper_about_what_it_wants():
+def test_moment_is_a_spring_damper_about_the_wanted_turn():
     rng, table, moment, h = np.random.default_rng(0), turn_table(TURNS), np.empty(3), 1e-6
     for t in rng.uniform(0.16, 0.44, 50):
         q, w = Rotation.random(random_state=rng), rng.normal(size=3)
@@ -57,7 +57,7 @@ def test_the_moment_is_a_spring_and_a_damper_about_what_it_wants():
         np.testing.assert_allclose(moment, 0.3 * (now * q.inv()).as_rotvec() + 0.02 * (spin - w), atol=1e-6)
 
 
-def test_the_fingers_feel_how_the_stylus_turns_in_the_compiled_world():
+def test_sensed_stylus_rotation_equals_the_compiled_world():
     rng, world = np.random.default_rng(1), World()
     model, data = world.model, world.data
     for _ in range(20):
@@ -76,20 +76,20 @@ def test_the_fingers_feel_how_the_stylus_turns_in_the_compiled_world():
         np.testing.assert_allclose(rotation(q).as_matrix(), data.site(PHANTOM + "tip").xmat.reshape(3, 3), atol=1e-9)
 
 
-def test_a_stylus_begins_as_it_is_put():
+def test_stylus_starts_in_the_given_orientation():
     world = World()
     q = np.roll(Rotation.from_rotvec([0.3, -0.8, 1.1]).as_quat(), 1)
     world.reset(START, rest_pose(), tuple(q))
-    state = Stepped(world).read()
+    state = SteppedPhantom(world).read()
     assert abs(state.q @ q) == pytest.approx(1.0, abs=1e-5)
     np.testing.assert_allclose(state.p, START, atol=5e-5)
 
 
-def test_the_stylus_goes_where_the_hand_turns_it_and_its_tip_stays():
+def test_stylus_follows_the_wanted_turn_while_its_tip_stays():
     world = World()
     world.reset(START, rest_pose(), UPRIGHT)
     errors, largest = [], 0.0
-    phantom = Stepped(world, Arm(turns=TURNS))
+    phantom = SteppedPhantom(world, Arm(turns=TURNS))
     for k in range(700):
         state = phantom.read()
         target = Rotation.from_rotvec(wanted(TURNS, 1e-3 * k)[0])
@@ -102,7 +102,7 @@ def test_the_stylus_goes_where_the_hand_turns_it_and_its_tip_stays():
     assert errors[-1] < np.deg2rad(0.2)
 
 
-def test_a_run_with_turns_replays_bit_for_bit():
+def test_run_with_turns_replays_bit_for_bit():
     config = run_config(
         clips=("cheer",), seconds=0.4, turns=TURNS, expressive=True, orientation_stiffness=0.2, orientation_damping=1e-3
     )
@@ -116,7 +116,7 @@ def test_a_run_with_turns_replays_bit_for_bit():
     np.testing.assert_array_equal(frames.qpos, again.qpos)
     assert ticks.applied.shape == (400, first.servo.plant.substeps, 6)
     assert np.abs(ticks.applied[:, :, 3:]).max() > 1e-3
-    # The moment of the field is recorded; the motors get nothing of it.
+    # The moment of the field is recorded, although the motors cannot apply it.
     moment = tick_channels(ticks, 400)["field"][:, 3:]
     expected = -0.2 * np.array([rotation(q).as_rotvec() for q in ticks.hand[:, 4:8]]) - 1e-3 * ticks.hand[:, 11:14]
     near = np.linalg.norm(expected, axis=1) > 1e-3
@@ -139,11 +139,11 @@ def test_a_run_with_turns_replays_bit_for_bit():
         {"axis": (0.0, np.inf, 0.0)},
     ],
 )
-def test_a_turn_that_makes_no_sense_is_refused(turn):
+def test_invalid_turn_is_refused(turn):
     with pytest.raises((SimError, ParameterError)):
         Turn(**({"at": 0.0, "seconds": 1.0, "angle": 0.5, "axis": (0.0, 0.0, 1.0)} | turn))
 
 
-def test_fingers_that_make_no_sense_are_refused():
+def test_invalid_turn_stiffness_is_refused():
     with pytest.raises(SimError, match="turn_stiffness is -1"):
         Arm(turn_stiffness=-1.0)

@@ -1,4 +1,4 @@
-"""A run that begins in motion: stylus and figure move from the first moment as they are told to."""
+"""A run that begins in motion: stylus and figure start with the given velocities."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,7 @@ from sim.world.world import World
 
 
 @pytest.mark.parametrize("v_H", [(0.1, 0.0, 0.0), (-0.05, 0.12, 0.03)])
-def test_the_stylus_has_the_velocity_that_it_was_given(v_H):
+def test_stylus_starts_with_the_given_velocity(v_H):
     world, p = World(), np.array([0.03, -0.02, 0.02])
     world.reset(p, rest_pose(), None, np.array(v_H))
     port = phantom_port(world.model, world.data, 0.001, 150.0)
@@ -24,14 +24,14 @@ def test_the_stylus_has_the_velocity_that_it_was_given(v_H):
     true_motion(port, place, velocity, np.empty((3, 3)))
     np.testing.assert_allclose(place, p, atol=1e-12)
     np.testing.assert_allclose(velocity, v_H, atol=1e-12)
-    # The loop of the linkage moves with it, or MuJoCo's constraint would pull at once.
+    # The closed linkage moves with it, otherwise MuJoCo's constraint would act at once.
     rate = {name: world.data.qvel[world.model.joint(PHANTOM + name).dofadr[0]] for name in ("theta2", "theta3")}
     for name, sign in (("elbow", 1.0), ("twin", -1.0)):
         got = world.data.qvel[world.model.joint(PHANTOM + name).dofadr[0]]
         assert got == pytest.approx(sign * (rate["theta3"] - rate["theta2"]), abs=1e-15)
 
 
-def test_the_figure_has_its_velocity_and_after_a_step_has_gone_on_by_it():
+def test_figure_starts_with_the_given_velocity():
     world, rng = World(), np.random.default_rng(2)
     velocity = rng.normal(scale=0.1, size=N_TANGENT)
     pose = rest_pose()
@@ -49,13 +49,13 @@ def test_the_figure_has_its_velocity_and_after_a_step_has_gone_on_by_it():
     assert np.corrcoef(moved, velocity)[0, 1] > 0.9
 
 
-def test_without_velocities_both_rest():
+def test_stylus_and_figure_rest_without_velocities():
     world = World()
     world.reset(np.array([0.03, 0.0, 0.0]), rest_pose())
     assert not world.data.qvel.any()
 
 
-def test_the_device_knows_its_velocity_from_the_first_tick():
+def test_velocity_estimate_is_right_from_the_first_tick():
     world, p, v_H = World(), np.array([0.03, -0.02, 0.02]), np.array([0.1, -0.05, 0.08])
     errors = []
     for moves in (False, True):
@@ -67,18 +67,18 @@ def test_the_device_knows_its_velocity_from_the_first_tick():
         assert port.hand[0] == 0.0
         np.testing.assert_allclose(port.hand[1:4], p, atol=5e-5)
         errors.append(np.linalg.norm(port.hand[8:11] - v_H))
-    # An encoder step in a period, filtered, is what is left; without it the hand is taken to rest.
+    # The error left is one filtered encoder step per period; without `sense_in_motion` the velocity starts at zero.
     assert errors[0] > 0.9 * np.linalg.norm(v_H)
     assert errors[1] < 0.03
 
 
-def test_the_filter_of_the_stylus_is_where_the_motion_is_at_its_first_update():
+def test_stylus_filter_starts_at_the_given_motion():
     lap, period = Trajectory.circle(0.05, 2.0), 0.008
     reference = SimpleNamespace(
         period=period, smoothing=0.7, started=np.zeros(1), hand=np.zeros((3, 3)), trail=np.zeros((2, 3))
     )
     begin_in_motion(reference, np.array([lap.point(0.0), lap.velocity(0.0), lap.acceleration(0.0)]))
-    # And comes from where it would have been.
+    # Its past values are those of the same motion.
     np.testing.assert_allclose(reference.trail[0], lap.point(-2.0 * period), atol=2e-6)
     stylus = np.append(lap.point(0.0), [1.0, 0.0, 0.0, 0.0])
     smooth_hand(reference.hand, stylus[:3], reference.smoothing, period)

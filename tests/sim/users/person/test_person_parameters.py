@@ -1,4 +1,4 @@
-"""Persons and populations: numbers within published intervals, seeded, and refused in one line where they are not."""
+"""Persons and populations: parameters within published intervals, seeded, and otherwise refused in one line."""
 
 from dataclasses import fields, replace
 
@@ -13,20 +13,20 @@ from sim.users.person.population import PERSONAS, persona, population
 from sim.users.person.random_numbers import fresh_chance, normal, uniform
 
 
-def test_every_number_of_a_person_has_an_interval_with_a_source() -> None:
+def test_every_parameter_of_a_person_has_an_interval_with_a_source() -> None:
     numbers = {option.name for option in fields(Person)} - {"name", "hand"}
     assert numbers == set(INTERVALS)
     assert all(interval.source and interval.least < interval.most for interval in INTERVALS.values())
 
 
-def test_a_population_is_of_its_seed_and_a_larger_one_begins_with_the_same_people() -> None:
+def test_population_depends_on_its_seed_and_larger_ones_extend_smaller_ones() -> None:
     assert population(3, 7) == population(5, 7)[:3]
     assert population(3, 7) != population(3, 8)
     assert persona("7:2") == population(3, 7)[2]
     assert persona("expert") is PERSONAS["expert"]
 
 
-def test_people_differ_as_the_literature_says() -> None:
+def test_population_statistics_follow_the_literature() -> None:
     people = population(400, 3)
     age, delay = np.array([p.age for p in people]), np.array([p.visual_delay for p in people])
     skill, noise = np.array([p.skill for p in people]), np.array([p.motor_noise for p in people])
@@ -38,7 +38,7 @@ def test_people_differ_as_the_literature_says() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(INTERVALS))
-def test_a_number_outside_of_its_interval_is_refused_with_what_is_expected(name: str) -> None:
+def test_parameter_outside_its_interval_is_refused_with_what_is_expected(name: str) -> None:
     for wrong in (INTERVALS[name].most * 1.01 + 1e-3, INTERVALS[name].least - 0.01, float("nan")):
         with pytest.raises(SimError, match=name) as refused:
             Person(**{name: wrong})
@@ -46,7 +46,7 @@ def test_a_number_outside_of_its_interval_is_refused_with_what_is_expected(name:
         assert "\n" not in str(refused.value)
 
 
-def test_who_does_not_exist_is_refused_with_those_who_do() -> None:
+def test_unknown_persona_or_invalid_population_is_refused() -> None:
     for name in ("nobody", "7:x", "-1", "1:99999999999"):
         with pytest.raises(SimError, match="median, expert"):
             persona(name)
@@ -57,7 +57,7 @@ def test_who_does_not_exist_is_refused_with_those_who_do() -> None:
             population(number, seed)
 
 
-def test_the_arm_is_positive_definite_and_mirrored_in_the_other_hand() -> None:
+def test_arm_matrices_are_positive_definite_and_mirrored_for_the_other_hand() -> None:
     mirror = np.diag([1.0, -1.0, 1.0])
     for person in population(20, 1):
         for ours, theirs in zip(
@@ -69,7 +69,7 @@ def test_the_arm_is_positive_definite_and_mirrored_in_the_other_hand() -> None:
             np.testing.assert_allclose(theirs, mirror @ ours @ mirror, atol=1e-12)
 
 
-def test_steps_that_cannot_carry_her_are_refused() -> None:
+def test_steps_too_long_for_the_person_are_refused() -> None:
     with pytest.raises(SimError, match="physics step"):
         check_steps(Person(grip_stiffness=3000.0, grip_damping=20.0), 1e-3)
     with pytest.raises(SimError, match="reflex"):
@@ -78,7 +78,7 @@ def test_steps_that_cannot_carry_her_are_refused() -> None:
         Participant().holding(0.02, 1e-4)
 
 
-def test_random_numbers_are_uniform_normal_and_repeated() -> None:
+def test_random_numbers_are_uniform_normal_and_reproducible() -> None:
     state, again = fresh_chance(5), fresh_chance(5)
     drawn = np.array([normal(state) for _ in range(20_000)])
     np.testing.assert_array_equal(drawn[:50], [normal(again) for _ in range(50)])
@@ -89,7 +89,7 @@ def test_random_numbers_are_uniform_normal_and_repeated() -> None:
     assert abs(np.var(even) - 1.0 / 12.0) < 0.003
 
 
-def test_the_tremor_s_filter_gives_its_size_at_its_frequency() -> None:
+def test_tremor_filter_has_its_amplitude_at_its_frequency() -> None:
     person, period = Person(tremor=0.1, tremor_frequency=8.0), 1e-3
     a, b, gain = tremor_filter(person, period)
     response = gain / np.abs(np.fft.fft([1.0, -a, -b], 1 << 18))

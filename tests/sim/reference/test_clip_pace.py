@@ -1,4 +1,4 @@
-"""The pace of a clip on its river: a push along the curve makes no clip race, and it stops when the hand does."""
+"""The pace of a clip on its river: a push along the curve does not speed it up, and it stops with the hand."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from sim.reference.reference import make_reference, reference_along
 LAP, PERIOD = 3.4, 2e-3
 FIGURE = figure_model()
 CURVE = Trajectory.circle(0.0477, LAP)
-PUSHED, BUMP, LEAD = 1.0, 0.25, 0.08  # [s]: a push begins, lasts, and takes the hand on along the curve by so much
+PUSHED, BUMP, LEAD = 1.0, 0.25, 0.08  # [s]: start and duration of a push, and how far it moves the hand ahead
 
 
 class Played(NamedTuple):
@@ -37,7 +37,7 @@ def walk() -> RiverClips:
 
 
 def _played(clips: RiverClips, phases: np.ndarray) -> Played:
-    """What a reference does whose hand is at phases of the river [s], tick by tick."""
+    """Ticks of a reference whose hand is at given phases of the river [s]."""
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, 0.4, packed_legs(FIGURE))
     traces, poses = np.zeros((1, TRACE_SIZE)), np.empty((1, 75))
     rows = []
@@ -47,18 +47,18 @@ def _played(clips: RiverClips, phases: np.ndarray) -> Played:
         memory = reference.memory
         rows.append((memory[PHASE], memory[SHOWN], reference.velocity.copy(), reference.acceleration.copy()))
     hand, clip, velocity, acceleration = zip(*rows, strict=True)
-    hand, clip = (np.unwrap(np.array(told), period=LAP) for told in (hand, clip))
+    hand, clip = (np.unwrap(np.array(values), period=LAP) for values in (hand, clip))
     return Played(hand, clip, np.array(velocity), np.array(acceleration))
 
 
-def _bumped(seconds: float) -> np.ndarray:
+def _bumped_phases(seconds: float) -> np.ndarray:
     t = np.arange(round(seconds / PERIOD)) * PERIOD
     s = np.clip((t - PUSHED) / BUMP, 0.0, 1.0)
     return t + LEAD * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-def test_a_push_along_the_river_does_not_make_the_clip_race_and_it_catches_up(walk: RiverClips) -> None:
-    played = _played(walk, _bumped(5.0))
+def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: RiverClips) -> None:
+    played = _played(walk, _bumped_phases(5.0))
     after = slice(round(0.8 / PERIOD), None)
     rates = [np.diff(phases[after]) / PERIOD for phases in (played.hand, played.clip)]
     assert rates[0].max() > 1.4
@@ -68,17 +68,17 @@ def test_a_push_along_the_river_does_not_make_the_clip_race_and_it_catches_up(wa
     assert lag[-1] == pytest.approx(0.0, abs=2e-3)
 
 
-def test_velocity_and_acceleration_are_those_of_the_motion_that_is_shown(walk: RiverClips) -> None:
-    played = _played(walk, _bumped(1.6))
-    # While all of the excess is taken up; later the stylus filter's prediction of a pushed hand is off by itself.
+def test_velocity_and_acceleration_are_those_of_the_shown_motion(walk: RiverClips) -> None:
+    played = _played(walk, _bumped_phases(1.6))
+    # While all of the excess is compensated; later the stylus filter's prediction of a pushed hand is wrong anyway.
     pushed = slice(round((PUSHED + 0.04) / PERIOD), round((PUSHED + 0.1) / PERIOD))
     assert (np.diff(played.hand)[pushed] / PERIOD).max() > 1.5
-    away = np.gradient(played.velocity[:, :3], PERIOD, axis=0) - played.acceleration[:, :3]
-    assert np.abs(away[pushed]).max() < 0.3  # [m/s²]
+    difference = np.gradient(played.velocity[:, :3], PERIOD, axis=0) - played.acceleration[:, :3]
+    assert np.abs(difference[pushed]).max() < 0.3  # [m/s²]
 
 
 @pytest.mark.slow
-def test_a_hand_that_goes_on_faster_is_followed_with_a_lag_and_one_that_stops_at_once(walk: RiverClips) -> None:
+def test_clip_follows_a_faster_hand_with_a_lag_and_stops_with_it(walk: RiverClips) -> None:
     t = np.arange(round(6.0 / PERIOD)) * PERIOD
     fast = _played(walk, np.where(t < 1.0, t, 1.0 + 1.3 * (t - 1.0)))
     assert np.diff(fast.clip)[-500:].mean() / PERIOD == pytest.approx(1.3, abs=0.02)

@@ -1,4 +1,4 @@
-"""The live page draws the state it is shown, at most thirty times a second."""
+"""The live page draws the shown state, at most thirty times per second."""
 
 import mujoco
 import numpy as np
@@ -15,7 +15,7 @@ from sim.viewer.shown import Shown
 ANGLE = np.linspace(0, 6, 30)
 CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
 DRAWN = courses({"river_names": "one\ntwo", "river_curves": CURVES})
-NOWHERE = np.full(3, np.nan)
+NO_TARGET = np.full(3, np.nan)
 
 
 @pytest.fixture
@@ -25,16 +25,16 @@ def page():
     page.close()
 
 
-def moment(model, p=(0.0, 0.0, 0.0), force=(0.0, 0.0, 0.0), target=NOWHERE, t=0.0, root=0.0) -> Shown:
+def shown_state(model, p=(0.0, 0.0, 0.0), force=(0.0, 0.0, 0.0), target=NO_TARGET, t=0.0, root=0.0) -> Shown:
     qpos = np.array(model.qpos0)
     at = int(model.jnt_qposadr[model.joint("figure/root").id])
     qpos[at] += root
     return Shown(t, qpos, qpos[at : at + 75], np.array(p), np.array(force), np.zeros(3), np.array(target))
 
 
-def test_the_force_is_drawn_from_the_tip_along_the_force(page):
+def test_force_arrow_starts_at_the_tip_and_points_along_the_force(page):
     stage, tip = page._stage, np.array([0.01, 0.02, 0.03])
-    page.show(moment(stage._model, tip, (0.0, 0.0, 2.0)))
+    page.show(shown_state(stage._model, tip, (0.0, 0.0, 2.0)))
     start, end = stage._arrows["force"].points[0]
     np.testing.assert_allclose(start, drawn_at(tip), atol=1e-6)
     np.testing.assert_allclose(end - start, [0, 0, 2.0 * METRES_PER_NEWTON], atol=1e-6)
@@ -42,42 +42,42 @@ def test_the_force_is_drawn_from_the_tip_along_the_force(page):
     assert not stage._arrows["user"].visible  # nobody pushes
 
 
-def test_the_lag_of_a_hand_is_drawn_from_the_stylus_to_where_it_means_to_be(page):
+def test_lag_line_connects_the_stylus_to_its_target(page):
     stage = page._stage
-    page.show(moment(stage._model, (0.0, 0.0, 0.0), target=(0.01, 0.0, 0.0)))
+    page.show(shown_state(stage._model, (0.0, 0.0, 0.0), target=(0.01, 0.0, 0.0)))
     assert stage._lag_line.visible
     np.testing.assert_allclose(
         stage._lag_line.points[0], [drawn_at(np.zeros(3)), drawn_at(np.array([0.01, 0, 0]))], atol=1e-6
     )
-    stage.show(moment(stage._model))
+    stage.show(shown_state(stage._model))
     assert not stage._lag_line.visible
 
 
 def test_states_that_come_too_fast_are_skipped(page):
     model = page._stage._model
-    page.show(moment(model))
-    page.show(moment(model, (1.0, 1.0, 1.0)))
+    page.show(shown_state(model))
+    page.show(shown_state(model, (1.0, 1.0, 1.0)))
     np.testing.assert_allclose(page._stage._arrows["force"].points[0][0], drawn_at(np.zeros(3)), atol=1e-6)
 
 
-def test_the_clock_says_the_time_of_what_is_shown(page):
-    page.show(moment(page._stage._model, t=12.34))
+def test_clock_shows_the_time_of_the_shown_state(page):
+    page.show(shown_state(page._stage._model, t=12.34))
     assert "12.34 s" in page._clock.content
 
 
-def test_a_figure_that_travels_is_followed_and_one_that_dances_is_not(page):
+def test_camera_follows_a_travelling_figure_and_not_a_dancing_one(page):
     stage = page._stage
-    stage.show(moment(stage._model))
-    stage.show(moment(stage._model, root=1.0))
+    stage.show(shown_state(stage._model))
+    stage.show(shown_state(stage._model, root=1.0))
     assert np.all(stage._view_offset == 0.0)
     for k in range(200):
-        stage.show(moment(stage._model, root=1.0 + 0.02 * k, t=0.02 * k))
+        stage.show(shown_state(stage._model, root=1.0 + 0.02 * k, t=0.02 * k))
     assert 3.0 < stage._view_offset[0] < 5.0
-    stage.show(moment(stage._model))  # put back
+    stage.show(shown_state(stage._model))  # reset to the start
     assert np.all(stage._view_offset == 0.0)
 
 
-def test_where_a_point_is_drawn_tells_the_point():
+def test_taken_at_inverts_drawn_at():
     points = np.random.default_rng(1).normal(size=(5, 3))
     np.testing.assert_allclose(taken_at(drawn_at(points)), points, atol=1e-15)
 
@@ -92,13 +92,13 @@ def test_coarser_shapes_lie_within_a_cell_of_the_fine_ones():
         np.testing.assert_allclose(b.vertices.max(axis=0), a.vertices.max(axis=0), atol=0.01)
 
 
-def test_showing_a_state_does_not_touch_the_model_that_runs():
+def test_showing_a_state_leaves_the_model_unchanged():
     model = world_model(SceneConfig())
     before = model.qpos0.copy(), model.body_pos.copy(), model.geom_rgba.copy()
     data = mujoco.MjData(model)
-    NullPage().show(moment(model))
+    NullPage().show(shown_state(model))
     page = LivePage(model, DRAWN, 0.02, port=0)
-    page.show(moment(model)._replace(qpos=data.qpos + 0.1))
+    page.show(shown_state(model)._replace(qpos=data.qpos + 0.1))
     page.close()
-    for array, kept in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):
-        assert np.array_equal(array, kept)
+    for array, original in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):
+        assert np.array_equal(array, original)

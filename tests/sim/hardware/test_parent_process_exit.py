@@ -1,4 +1,4 @@
-"""A process whose parent was killed while it started ends, too."""
+"""A process ends if its parent was killed while it started."""
 
 import os
 import queue
@@ -18,25 +18,25 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.gated_servo import ROW_SIZE
 from sim.hardware.recorder_process import RECORDER_SIZE, record_rows
 from sim.hardware.shared import Ring, SharedNumbers
-from tests.sim.hardware.hosted import PERIOD
+from tests.sim.hardware.process_factories import PERIOD
 from tests.sim.hardware.test_processes import job
 
-GONE = 2**22 + 1  # no process has such an id
+UNUSED_PID = 2**22 + 1  # above the largest process id
 
 
 @pytest.fixture
 def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
-    """This process is one whose parent is gone."""
-    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=GONE))
+    """Makes this process appear as one whose parent has died."""
+    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=UNUSED_PID))
 
 
-def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, monkeypatch) -> None:
+def test_emulated_device_ends_if_its_parent_died_while_it_started(orphan, monkeypatch) -> None:
     class Device:
         writes, torque, clock = 0, np.zeros(3), 0.0
 
         def write(self, torque, enable) -> None:
             self.writes += 1
-            assert self.writes < 3, "it goes on"
+            assert self.writes < 3, "the loop does not end"
 
         def read(self, reading, timeout) -> None: ...
 
@@ -48,7 +48,7 @@ def test_an_emulated_device_whose_parent_went_while_it_was_made_ends(orphan, mon
     shown.close()
 
 
-def test_an_empty_recording_of_a_killed_run_is_taken_away(orphan, monkeypatch, tmp_path) -> None:
+def test_empty_recording_of_a_killed_run_is_removed(orphan, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     rows, orders, report = Ring(10, ROW_SIZE), SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
     record_rows(job(tmp_path / "run.h5"), rows, orders, report)
@@ -57,29 +57,29 @@ def test_an_empty_recording_of_a_killed_run_is_taken_away(orphan, monkeypatch, t
         shared.close()
 
 
-def test_a_worker_whose_page_went_while_it_worked_ends(orphan) -> None:
-    class Asked:
+def test_worker_ends_if_its_page_died_while_it_worked(orphan) -> None:
+    class EmptyQueue:
         times = 0
 
         def get(self, timeout: float) -> None:
             self.times += 1
-            assert self.times < 3, "it goes on"
+            assert self.times < 3, "the loop does not end"
             raise queue.Empty
 
-    assert newest(Asked()) is None
+    assert newest(EmptyQueue()) is None
 
 
 SCRIPT = """
 import multiprocessing, os, signal, socket, time
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.shared import SharedNumbers
-from tests.sim.hardware.hosted import PERIOD, device
+from tests.sim.hardware.process_factories import PERIOD, emulated_device
 
 
 def late():
     os.kill(os.getppid(), signal.SIGKILL)
     time.sleep(0.2)
-    return device()
+    return emulated_device()
 
 
 if __name__ == "__main__":
@@ -92,10 +92,10 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_a_killed_parent_leaves_no_device(tmp_path) -> None:
+def test_killed_parent_leaves_no_device_process(tmp_path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(SCRIPT)
-    # Its output ends when the last process that has it is gone.
+    # Its output ends only when the last process that holds it has ended.
     paths = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, timeout=60, check=False, env=paths)
     assert ended.returncode == -signal.SIGKILL

@@ -1,4 +1,4 @@
-"""What the processes of the tests are made of; found by name from other processes."""
+"""Servos and devices that other processes of the tests make; importable by name from there."""
 
 import socket
 
@@ -7,19 +7,19 @@ from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import GatedServo
 from tests.sim.bare_servos import START
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo
 
 PERIOD = 4e-3
-GATE = {**AT_ONCE, "ramp": 0.1, "quiet": PERIOD, "dead_man": False}
+GATE = {**UNRAMPED_GATE, "ramp": 0.1, "quiet": PERIOD, "dead_man": False}
 
 
-def in_process() -> GatedServo:
+def servo_with_own_device() -> GatedServo:
     return gated_servo(period=PERIOD, holds=60.0, **GATE)
 
 
-def over_packets(packets: socket.socket) -> GatedServo:
+def servo_over_packets(packets: socket.socket) -> GatedServo:
     return gated_servo(EmulatedDriver(packets), period=PERIOD, **GATE)
 
 
-def device() -> EmulatedPhantom:
+def emulated_device() -> EmulatedPhantom:
     return EmulatedPhantom(SceneConfig(servo_period=PERIOD), START, holds=600.0)
