@@ -1,4 +1,4 @@
-"""A map of a figure of another size: all points of the body in proportion, its derivative, and what it wraps."""
+"""The map of a figure of another size: body points in proportion, the Jacobian, and the order of its kernels."""
 
 import mujoco
 import numpy as np
@@ -30,19 +30,19 @@ def soles(stature: float, pose: np.ndarray) -> np.ndarray:
     return data.geom_xpos[[figure.geom(name).id for name in FOOT_CONTACTS]]
 
 
-def test_every_point_of_the_body_is_in_proportion() -> None:
+def test_sole_points_scale_with_the_figure() -> None:
     np.testing.assert_allclose(soles(1.2, MAP.pose(STYLUS)), SIZE * soles(1.75, BASE.pose(STYLUS)), atol=1e-12)
 
 
-def test_the_derivative_is_that_of_the_pose() -> None:
+def test_jacobian_matches_finite_differences() -> None:
     np.testing.assert_allclose(MAP.jacobian(STYLUS), finite_differences(MAP.pose, STYLUS), rtol=2e-6, atol=2e-6)
 
 
-def test_the_tick_evaluates_it_as_python_does() -> None:
+def test_compiled_map_is_identical() -> None:
     assert_same_compiled(MAP, STYLUS)
 
 
-def test_its_kernels_are_called_after_those_of_all_that_it_is_made_of() -> None:
+def test_kernels_run_after_those_of_the_wrapped_maps() -> None:
     stages, params, _, size = MAP.compiled()
     assert kernels_of(stages) == (cylindrical_map, express, size_pose)
     np.testing.assert_array_equal(first_params.py_func(stages, params), BASE.base.compiled().params)
@@ -50,6 +50,6 @@ def test_its_kernels_are_called_after_those_of_all_that_it_is_made_of() -> None:
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, np.inf, np.nan])
-def test_a_size_that_none_has_is_refused(size: float) -> None:
+def test_invalid_size_raises_parameter_error(size: float) -> None:
     with pytest.raises(ParameterError, match="expected more than 0, and finite"):
         Sized(BASE, size)
