@@ -14,21 +14,21 @@ call = kernel_call(ARGUMENTS)
 
 
 @njit
-def shifting_law(values, at, out):
-    if at >= values.shape[0]:
+def shifting_law(values, index, out):
+    if index >= values.shape[0]:
         raise ControllerError("beyond the end")
     for i in range(out.shape[0]):
-        out[i] = values[at] + 0.1 * i
+        out[i] = values[index] + 0.1 * i
 
 
 @njit
-def mirroring_law(values, at, out):
-    out[:] = -values[at]
+def mirroring_law(values, index, out):
+    out[:] = -values[index]
 
 
 @njit
-def call_by_address(address, values, at, out):
-    call(address, (values, at, out))
+def call_by_address(address, values, index, out):
+    call(address, (values, index, out))
 
 
 def address(kernel):
@@ -59,8 +59,8 @@ def test_error_in_the_kernel_is_raised_in_the_caller():
 def test_calls_neither_free_nor_leak_arrays():
     kernel, values, out = address(shifting_law), np.zeros(2), np.zeros(4)
     arrays = ArrayLifetimes(values, out)
-    for at in (0, 1) * 50:
-        call_by_address(kernel, values, at, out)
+    for index in (0, 1) * 50:
+        call_by_address(kernel, values, index, out)
     assert arrays.all_alive()
     del values, out
     assert arrays.all_freed()

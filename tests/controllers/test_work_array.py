@@ -22,19 +22,19 @@ def _filled(into: np.ndarray, value: float) -> float:
 
 @njit
 def weighted_sum(n: int, turns: int) -> float:
-    kept, counts = work_array((n, 2)), work_integers(4)
+    rows, counts = work_array((n, 2)), work_integers(4)
     for i in range(n):
-        kept[i, 0], kept[i, 1] = i, -i
+        rows[i, 0], rows[i, 1] = i, -i
     counts[:] = 7
     total = 0.0
     for k in range(turns):
-        again = work_array((ROWS, 5))  # of constant size: the same memory in each turn
-        for row in again:
+        block = work_array((ROWS, 5))  # of constant size: the same memory in each turn
+        for row in block:
             total += _filled(row, float(k))
-        total += again[0, 0] + again[ROWS - 1, 4]
+        total += block[0, 0] + block[ROWS - 1, 4]
     for i in range(n):
-        total += 10.0 * kept[i, 0] + kept[i, 1]
-    return total + counts.sum() + kept.shape[0]
+        total += 10.0 * rows[i, 0] + rows[i, 1]
+    return total + counts.sum() + rows.shape[0]
 
 
 def test_kernel_with_work_arrays_equals_python() -> None:

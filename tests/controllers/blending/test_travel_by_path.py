@@ -48,9 +48,11 @@ def test_constant_turning_drift_accumulates_heading():
 @pytest.mark.parametrize(("haptic_map", "middle"), [(MAP, 0.05), (MOVING, 0.045)])
 def test_radial_hand_motion_late_in_a_lap_barely_moves_the_figure(haptic_map, middle):
     memory, angle = haptic_map.compiled().memory, 5.8
-    places = [stylus(middle + 0.008 * np.sin(s), angle, 0.006 * np.sin(s)) for s in np.linspace(0.0, 0.5 * np.pi, 200)]
-    with_memory = np.array([haptic_map.pose(x, memory)[:2] for x in places])
-    without_memory = np.array([haptic_map.pose(x)[:2] for x in places])
+    stylus_poses = [
+        stylus(middle + 0.008 * np.sin(s), angle, 0.006 * np.sin(s)) for s in np.linspace(0.0, 0.5 * np.pi, 200)
+    ]
+    with_memory = np.array([haptic_map.pose(x, memory)[:2] for x in stylus_poses])
+    without_memory = np.array([haptic_map.pose(x)[:2] for x in stylus_poses])
     displacement_without_memory, displacement = (np.linalg.norm(p[-1] - p[0]) for p in (without_memory, with_memory))
     assert displacement_without_memory > 0.1
     assert displacement < 0.35 * displacement_without_memory

@@ -60,13 +60,13 @@ def test_block_without_interrupt_keeps_handler_and_exceptions() -> None:
 
 
 def test_other_threads_keep_the_signal_handler() -> None:
-    before, seen = signal.getsignal(signal.SIGINT), list[object]()
+    before, handlers = signal.getsignal(signal.SIGINT), list[object]()
 
-    def work() -> None:
+    def enter_block() -> None:
         with heeding_interrupts():
-            seen.append(signal.getsignal(signal.SIGINT))
+            handlers.append(signal.getsignal(signal.SIGINT))
 
-    thread = threading.Thread(target=work)
+    thread = threading.Thread(target=enter_block)
     thread.start()
     thread.join()
-    assert seen == [before]
+    assert handlers == [before]

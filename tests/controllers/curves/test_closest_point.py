@@ -114,7 +114,7 @@ def test_centre_of_a_circle_gives_its_radius():
 
 
 @pytest.mark.parametrize("point", [(1e6, 0.0, 0.0), (1e120, -1e120, 0.0)])
-def test_far_away_it_is_finite(point):
+def test_distance_to_a_far_point_is_finite_and_exact(point):
     curve = Trajectory.circle(0.05, 4.0)
     phase, distance = closest_phase(curve.packed(), 0, *point, np.nan)
     assert np.isfinite(phase)

@@ -50,14 +50,14 @@ def largest_jump(program, start, end, v=(0.0, 0.0, 0.0), t=0.0, samples=400, hun
     def force(s):
         return force_of(program, HandState.at(start + s * (end - start), v, t))
 
-    places = np.linspace(0.0, 1.0, samples + 1)
-    values = np.array([force(s) for s in places])
+    shares = np.linspace(0.0, 1.0, samples + 1)
+    values = np.array([force(s) for s in shares])
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
     # Where the slope changes most a jump hides, not only where the slope is largest.
     bends = np.abs(np.diff(steps, prepend=steps[0])) + np.abs(np.diff(steps, append=steps[-1]))
     worst = 0.0
     for k in {*np.argsort(steps)[-hunts:], *np.argsort(bends)[-hunts:]}:
-        low, high, a, b = places[k], places[k + 1], values[k], values[k + 1]
+        low, high, a, b = shares[k], shares[k + 1], values[k], values[k + 1]
         while (high - low) * np.linalg.norm(end - start) > 1e-13:
             middle = 0.5 * (low + high)
             m = force(middle)

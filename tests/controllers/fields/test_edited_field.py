@@ -103,13 +103,13 @@ def test_waiting_recording_resumes_when_the_hand_arrives_and_repeats():
     clock = np.arange(9000) * 1e-3
     held = np.array([HandState.at([0.0, 0.0, 0.06], t=t).vector() for t in clock[:100]])
     along = np.array([HandState.at(performed.point(t % 4.0), t=0.1 + t).vector() for t in clock])
-    memory, places = program.fresh_memory(), []
+    memory, phases = program.fresh_memory(), []
     for hand in np.concatenate((held, along)):
         run_over(*program.compiled(), memory, hand[None], np.empty((1, 6)))
-        places.append(memory[slot + 1])
-    assert places[99] == 0.0
-    np.testing.assert_allclose(places[100:4000], clock[:3900], atol=2e-3)
-    np.testing.assert_allclose(places[-1], clock[-1] % 4.0, atol=0.02)
+        phases.append(memory[slot + 1])
+    assert phases[99] == 0.0
+    np.testing.assert_allclose(phases[100:4000], clock[:3900], atol=2e-3)
+    np.testing.assert_allclose(phases[-1], clock[-1] % 4.0, atol=0.02)
 
 
 def test_field_is_continuous_in_space():

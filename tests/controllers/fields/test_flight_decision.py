@@ -103,7 +103,7 @@ def test_led_figure_flies_only_at_flying_pace():
     acceleration = np.abs(np.diff(speed)) / RATE
     assert acceleration[held[1:] < 0.5].max() < 1.001 * WALKING.haste
     assert acceleration.max() == pytest.approx(WALKING.pull, rel=1e-3)
-    # The form changes smoothly with the place.
+    # The blend changes smoothly with the argument.
     assert np.abs(np.diff(held)).max() < 0.012
 
 

@@ -76,7 +76,7 @@ def test_sum_with_follow_equals_compiled_program():
         np.testing.assert_allclose(wrench[:3], follow.wrench(hand).force + GOVERNOR.wrench(hand).force, atol=1e-9)
 
 
-def test_where_a_curve_rests_there_is_no_force():
+def test_no_force_where_the_curve_rests():
     line = Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], ends="clamped")
     governor = Governor(line, [[0.05, 0.1], [0.05, 0.1]])
     assert not governor.wrench(HandState.at([-0.01, 0.0, 0.0], [0.3, 0.0, 0.0])).force.any()

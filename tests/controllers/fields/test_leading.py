@@ -60,9 +60,9 @@ def walker_of(walkers):
     return walker_at.py_func(walkers.state, 0)
 
 
-def frames(walkers, places):
+def frames(walkers, arguments):
     path = walker_of(walkers).path
-    return np.array([[path_value(path, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in places])
+    return np.array([[path_value(path, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in arguments])
 
 
 def turn_rates(trail, walkers):
@@ -83,12 +83,12 @@ def s_shaped(walking, seconds=5.0, pace=1.0):
     steps = (
         RATE * pace * walking.gait.speed / walking.scale * ramp[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1)
     )
-    places = np.array(walking.start) + np.cumsum(steps, axis=0)
-    return np.column_stack([places, np.zeros(len(t))])
+    positions = np.array(walking.start) + np.cumsum(steps, axis=0)
+    return np.column_stack([positions, np.zeros(len(t))])
 
 
-def resting(place, seconds=2.0):
-    return np.tile(place, (round(seconds / RATE), 1))
+def resting(position, seconds=2.0):
+    return np.tile(position, (round(seconds / RATE), 1))
 
 
 def straight(start, end, seconds):
@@ -101,9 +101,9 @@ def erratic(walking, seed, seconds=8.0):
     waves = sum(
         rng.normal(size=2) * 0.05 / k * np.sin(2 * np.pi * 0.2 * k * t[:, None] + rng.uniform(0, 6, 2)) for k in (1, 2)
     )
-    way = np.outer(0.02 * t, [np.cos(walking.heading), np.sin(walking.heading)])
-    places = np.array(walking.start) + way + waves - waves[0]
-    return np.column_stack([places, np.zeros(len(t))])
+    advance = np.outer(0.02 * t, [np.cos(walking.heading), np.sin(walking.heading)])
+    positions = np.array(walking.start) + advance + waves - waves[0]
+    return np.column_stack([positions, np.zeros(len(t))])
 
 
 def hand_at(along, across, height=0.0, walking=WALKING):
@@ -150,9 +150,9 @@ def test_force_is_continuous_along_random_lines():
         assert largest_jump(program, *ends, samples=150, hunts=3) < 1e-9
 
 
-@pytest.mark.parametrize("place", [[1e3, -1e3, 1e3], [-1e6, 0.0, 0.0], [0.0, 1e9, 0.0]])
-def test_force_is_finite_at_any_distance(place):
-    assert np.isfinite(force_of(FIELD.program(), HandState.at(place))).all()
+@pytest.mark.parametrize("position", [[1e3, -1e3, 1e3], [-1e6, 0.0, 0.0], [0.0, 1e9, 0.0]])
+def test_force_is_finite_at_any_distance(position):
+    assert np.isfinite(force_of(FIELD.program(), HandState.at(position))).all()
 
 
 def test_non_finite_hand_gives_nan_force_and_leaves_the_path():
@@ -218,10 +218,10 @@ def test_hand_led_straight_back_retraces_the_path(gait):
     homeward = frames(walkers, returning[:, 0])
     assert trail[-1, 0] > 3.0 * gait.speed
     assert returning[-1, 0] < 0.05 * trail[-1, 0]
-    for place in homeward[(returning[:, 0] >= 0.0) & (returning[:, 0] <= trail[-1, 0])][::50]:
-        k = int(np.argmin(np.hypot(*(outward[:, :2] - place[:2]).T)))
-        assert np.hypot(*(outward[k, :2] - place[:2])) < 0.01
-        assert abs(outward[k, 2] - place[2]) < np.radians(2.0)
+    for position in homeward[(returning[:, 0] >= 0.0) & (returning[:, 0] <= trail[-1, 0])][::50]:
+        k = int(np.argmin(np.hypot(*(outward[:, :2] - position[:2]).T)))
+        assert np.hypot(*(outward[k, :2] - position[:2])) < 0.01
+        assert abs(outward[k, 2] - position[2]) < np.radians(2.0)
     # The hand returns straight, the figure along the S, so the force must be considerable.
     assert np.linalg.norm(returning[:, 2:4], axis=1).max() > 0.2
 
@@ -230,8 +230,8 @@ def test_forward_again_re_enters_the_path_and_extends_it():
     forth = np.vstack([s_shaped(WALKING), resting(s_shaped(WALKING)[-1])])
     trail, walkers = led(FIELD, forth)
     front = path_front(walker_of(walkers).path)
-    places = np.linspace(0.0, front, 300)
-    before = frames(walkers, places)
+    arguments = np.linspace(0.0, front, 300)
+    before = frames(walkers, arguments)
     half = forth[len(forth) // 3]
     _, walkers = led(FIELD, np.vstack([straight(forth[-1], half, 5.0), resting(half)]), walkers)
     middle = float(walker_of(walkers).argument[0])
@@ -240,7 +240,7 @@ def test_forward_again_re_enters_the_path_and_extends_it():
     ahead = forth[-1] + 0.04 * np.array([np.cos(before[-1, 2]), np.sin(before[-1, 2]), 0.0])
     hands = np.vstack([straight(half, forth[-1], 5.0), straight(forth[-1], ahead, 2.0), resting(ahead)])
     _, walkers = led(FIELD, hands, walkers)
-    np.testing.assert_array_equal(frames(walkers, places), before)
+    np.testing.assert_array_equal(frames(walkers, arguments), before)
     assert walker_of(walkers).argument[0] > trail[-1, 0] + 1.0
 
 
@@ -268,12 +268,12 @@ def test_repeated_tick_changes_nothing():
     _, walkers = led(FIELD, s_shaped(WALKING)[:1500])
     program, wrenches = FIELD.program(), np.empty((2, 6))
     hand = HandState.at([0.0, 0.0, 0.0], t=2.0).vector()
-    memory, places = program.fresh_memory(), []
+    memory, arguments = program.fresh_memory(), []
     for wrench in wrenches:
         feed_walkers(walkers, program.params, memory, hand)
         evaluate(*program.compiled(), memory, hand, wrench)
-        places.append(float(walker_of(walkers).argument[0]))
-    assert places[0] == places[1]
+        arguments.append(float(walker_of(walkers).argument[0]))
+    assert arguments[0] == arguments[1]
 
 
 @pytest.mark.parametrize(

@@ -94,21 +94,21 @@ def test_edit_is_local_and_committed_on_release() -> None:
 def test_short_click_undoes_and_long_click_redoes_exactly() -> None:
     session = Session(TUBES)
     session.at([0.05, 0.0, 0.0])
-    place = CIRCLE.point(3.7)
+    on_tube = CIRCLE.point(3.7)
     states = [session.curve.coefficients]
     for phase in (0.5, 1.2, 2.0, 2.9):
         p = session.curve.point(phase)
         session.drag(p, p * 1.2 + [0.0, 0.0, 0.01])
         states.append(session.curve.coefficients)
     for state in reversed(states[:-1]):
-        session.click(place, 0.5 * CLICK_TIME)
+        session.click(on_tube, 0.5 * CLICK_TIME)
         np.testing.assert_array_equal(session.curve.coefficients, state)
-    session.click(place, 0.5 * CLICK_TIME)
+    session.click(on_tube, 0.5 * CLICK_TIME)
     assert session.edits == 0
     for state in states[1:]:
-        session.click(place, 2.0 * CLICK_TIME)
+        session.click(on_tube, 2.0 * CLICK_TIME)
         np.testing.assert_array_equal(session.curve.coefficients, state)
-    session.click(place, 2.0 * CLICK_TIME)
+    session.click(on_tube, 2.0 * CLICK_TIME)
     assert session.edits == 4
 
 

@@ -111,12 +111,12 @@ def test_pose_is_twice_differentiable_over_every_edge(seed):
 
 def test_joint_yields_smoothly_to_its_limit_and_never_exceeds_it():
     current, low, high = 0.2, -0.5, 0.9
-    wanted = np.linspace(-30.0, 30.0, 6001)
-    passed = np.array([yielded(y, current, low, high)[0] for y in wanted])
-    assert (np.diff(passed) >= 0.0).all()
-    assert low < current + passed.min() < low + 0.03
-    assert high - 0.03 < current + passed.max() < high
-    np.testing.assert_allclose(passed[np.abs(wanted) < 0.2], wanted[np.abs(wanted) < 0.2], rtol=0.02)
+    requested = np.linspace(-30.0, 30.0, 6001)
+    applied = np.array([yielded(y, current, low, high)[0] for y in requested])
+    assert (np.diff(applied) >= 0.0).all()
+    assert low < current + applied.min() < low + 0.03
+    assert high - 0.03 < current + applied.max() < high
+    np.testing.assert_allclose(applied[np.abs(requested) < 0.2], requested[np.abs(requested) < 0.2], rtol=0.02)
     # Where the clip exceeds the limit already, it is neither turned further nor back.
     assert 0.0 <= yielded(1.0, 1.1, low, high)[0] < 1e-3
 

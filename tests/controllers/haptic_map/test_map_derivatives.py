@@ -28,7 +28,7 @@ def differences(end, start):
 def test_jacobian_matches_finite_differences_at_a_thousand_positions(name):
     h_map, rng = MAPS[name], np.random.default_rng(7)
     x = np.array([
-        stylus(*place) for place in rng.uniform([0.025, 0.001, -0.035], [0.075, 6.282, 0.035], (1000, 3))
+        stylus(*cylindrical) for cylindrical in rng.uniform([0.025, 0.001, -0.035], [0.075, 6.282, 0.035], (1000, 3))
     ])  # fmt: skip
     jacobians = np.array([h_map.jacobian(at) for at in x])
     error = np.zeros(len(x))

@@ -208,8 +208,8 @@ def upright(**numbers: object) -> np.ndarray:
     """An upright pose of the figure with some numbers replaced, by index (`at5`)."""
     pose = np.zeros(75)
     pose[3::4] = 1.0
-    for place, number in numbers.items():
-        pose[int(place[2:])] = number
+    for key, number in numbers.items():
+        pose[int(key[2:])] = number
     return pose
 
 

@@ -78,7 +78,7 @@ def test_curved_walk_has_a_periodic_remainder():
 
 
 @pytest.mark.parametrize("turns", [-1.0, 1.0, 2.0])
-def test_loop_of_a_spinning_walk_keeps_its_heading_over_the_seam(turns):
+def test_closed_loop_keeps_heading_drift_of_spinning_walk(turns):
     poses = swinging(2, travel=1.3)
     s = np.linspace(0.0, 1.0, len(poses))
     poses[:, 3:7] = yawed((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])

@@ -35,8 +35,8 @@ def test_interval_bounds_contain_sampled_values():
     high = low + rng.uniform(0.0, 1.5, (60, 2))
     least, most = bounds(function, low, high)
     for i in range(60):
-        for place in rng.uniform(low[i], high[i], (40, 2)):
-            value = np.array(function(place))
+        for point in rng.uniform(low[i], high[i], (40, 2)):
+            value = np.array(function(point))
             assert np.all(least[i] <= value)
             assert np.all(value <= most[i])
             assert np.linalg.norm(value, 2) <= spectral_bound(least[i : i + 1], most[i : i + 1])[0]

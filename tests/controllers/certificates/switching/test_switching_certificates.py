@@ -42,10 +42,10 @@ def _both_keepings(field, clock=CLOCK):
 
 def _found_counterexample(field, clock, newtons):
     rivers = _rivers(field, clock)
-    place = meetings(rivers)[0]
-    towards = rivers[place.other].curve.velocity(0.8)
+    meeting = meetings(rivers)[0]
+    towards = rivers[meeting.other].curve.velocity(0.8)
     simulate = partial(simulated_course, field, clock)
-    return counterexample(field, place.own, rivers[place.own], place.phase, towards, (newtons,), simulate)
+    return counterexample(field, meeting.own, rivers[meeting.own], meeting.phase, towards, (newtons,), simulate)
 
 
 def _simulated_counterexample(field, clock, found):
@@ -144,9 +144,9 @@ def test_counterexample_is_empty_if_the_simulation_keeps_the_hand():
         n = round(seconds / CLOCK.period)
         return Course(np.zeros((n, 3)), np.zeros(n))
 
-    place = meetings(rivers)[0]
-    towards = rivers[place.other].curve.velocity(0.8)
-    assert counterexample(field, place.own, rivers[place.own], place.phase, towards, (1.0,), undisturbed) == {}
+    meeting = meetings(rivers)[0]
+    towards = rivers[meeting.other].curve.velocity(0.8)
+    assert counterexample(field, meeting.own, rivers[meeting.own], meeting.phase, towards, (1.0,), undisturbed) == {}
     assert pushes
 
 
@@ -190,8 +190,8 @@ def test_lag_of_selection_velocity_stays_within_its_bound():
     keeping = Keeping(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
     angle = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
     velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(angle), np.cos(angle)), axis=1)
-    seen = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
-    lag = np.linalg.norm(seen - velocity, axis=1)[1000:].max()
+    filtered = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
+    lag = np.linalg.norm(filtered - velocity, axis=1)[1000:].max()
     assert 0.9 * keeping.lag < lag < keeping.lag
     without = replace(keeping, sharing=replace(sharing, look=0.0))
     assert keeping.bounds(0.05).score > without.bounds(0.05).score

@@ -24,8 +24,8 @@ def test_cores_do_not_overlap_and_use_the_available_room(m):
     sites, shares = moving_sites(m), []
     points = core_points(sites)
     for angle in np.linspace(0.0, TURN, 500, endpoint=False):
-        places, cores = round_lap(sites, angle), cores_at(points, angle)
-        distance = np.linalg.norm(places[:, None] - places, axis=2) + np.diag(np.full(m, np.inf))
+        centres, cores = round_lap(sites, angle), cores_at(points, angle)
+        distance = np.linalg.norm(centres[:, None] - centres, axis=2) + np.diag(np.full(m, np.inf))
         assert (cores[:, None] + cores < distance).all()
         assert (cores <= _MAX_CORE_RADIUS + 1e-12).all()
         shares.append(cores / np.minimum(0.45 * distance.min(axis=1), _MAX_CORE_RADIUS))
