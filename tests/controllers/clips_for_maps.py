@@ -58,6 +58,12 @@ def stylus(r, angle, z):
     return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
 
 
+def displaced(x, tangent):
+    """A stylus pose moved by tangent[:3] [m] and turned by the rotation vector tangent[3:] in the hand frame H."""
+    turn = Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1))
+    return np.concatenate([x[:3] + tangent[:3], wxyz(turn)])
+
+
 def numeric_jacobian(h_map, x, step, memory=None):
     """Derivative (nv, 3) of a map's pose by the stylus position, by extrapolated differences with a step [m]."""
 

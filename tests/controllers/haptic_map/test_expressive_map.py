@@ -10,7 +10,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, stylus_turn, yielded
-from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging, wxyz
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, displaced, stylus, swinging, wxyz
 from tests.derivatives import extrapolated_differences
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
@@ -30,10 +30,6 @@ def random_stylus(rng, largest=np.pi):
     axis = rng.normal(size=3)
     turn = Rotation.from_rotvec(rng.uniform(0.0, largest) * axis / np.linalg.norm(axis))
     return turned(stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.03, 0.03)), turn)
-
-
-def moved(x, tangent):
-    return turned(x[:3] + tangent[:3], Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1)))
 
 
 def distance_to_limits(x):
@@ -77,7 +73,7 @@ def test_jacobian_matches_finite_differences_on_the_manifold():
         for _ in range(500):
             x = random_stylus(rng)
             jacobian = h_map.jacobian(x)
-            pose_at = lambda d, h_map=h_map, x=x: h_map.pose(moved(x, d))  # noqa: E731
+            pose_at = lambda d, h_map=h_map, x=x: h_map.pose(displaced(x, d))  # noqa: E731
             numeric = extrapolated_differences(pose_at, np.zeros(6), 1e-5, difference)
             errors.append(np.abs(numeric - jacobian).max() / (1.0 + np.abs(jacobian).max()))
             largest = max(largest, np.abs(jacobian[:, 3:]).max())
