@@ -1,4 +1,4 @@
-"""Small clips of a made-up figure for the tests of haptic maps: a root and three joints, smooth and exactly cyclic."""
+"""Small synthetic clips for tests of haptic maps: a root and three joints, smooth and exactly cyclic."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -6,9 +6,10 @@ from scipy.spatial.transform import Rotation
 from controllers.haptic_map.map_stages import evaluate_map, evaluate_map_jacobian
 from controllers.legs.limbs import Limb
 from sim.compilation.kernel_units import linked_stages
+from tests.derivatives import extrapolated_differences
 
 JOINTS = 3
-# The three joints as a leg: hip, knee that flexes about y, ankle.
+# The three joints as a leg: hip, knee (flexion about y), ankle.
 LEG = Limb(
     (1, 2, 3),
     np.array([[0.0, 0.1, 0.0], [0.0, 0.0, -0.45], [0.0, 0.0, -0.45]]),
@@ -57,8 +58,24 @@ def stylus(r, angle, z):
     return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
 
 
+def displaced(x, tangent):
+    """A stylus pose moved by tangent[:3] [m] and turned by the rotation vector tangent[3:] in the hand frame H."""
+    turn = Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1))
+    return np.concatenate([x[:3] + tangent[:3], wxyz(turn)])
+
+
+def numeric_jacobian(h_map, x, step, memory=None):
+    """Derivative (nv, 3) of a map's pose by the stylus position, by extrapolated differences with a step [m]."""
+
+    def pose_at(p):
+        y = np.concatenate([p, x[3:]])
+        return h_map.pose(y) if memory is None else h_map.pose(y, memory.copy())
+
+    return extrapolated_differences(pose_at, x[:3], step, difference)
+
+
 def assert_same_compiled(h_map, x):
-    """Assert that the kernels of the map's stages give its pose and derivative at a stylus pose to the last bit."""
+    """Assert that the compiled stages of a map give its pose and Jacobian at a stylus pose to the last bit."""
     (stages, params, memory, _), pose, other = h_map.compiled(), *np.empty((2, h_map.nq))
     stages, jacobian = linked_stages(stages), np.empty((h_map.nv, 6))
     evaluate_map(stages, params, x, memory, pose)

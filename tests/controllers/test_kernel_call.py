@@ -1,6 +1,4 @@
-"""Kernels called by their address: the same numbers, the same errors, and nothing of them in the caller."""
-
-import sys
+"""Kernels called by their address: same values, same errors, and a caller compiled without their code."""
 
 import numpy as np
 import pytest
@@ -8,6 +6,7 @@ from numba import njit, types
 
 from controllers.errors import ControllerError
 from controllers.kernel_call import kernel_call
+from tests.controllers.array_lifetimes import ArrayLifetimes
 
 VECTOR = types.Array(types.float64, 1, "C")
 ARGUMENTS = (VECTOR, types.int64, VECTOR)
@@ -15,21 +14,21 @@ call = kernel_call(ARGUMENTS)
 
 
 @njit
-def shifting_law(values, at, out):
-    if at >= values.shape[0]:
+def shifting_law(values, index, out):
+    if index >= values.shape[0]:
         raise ControllerError("beyond the end")
     for i in range(out.shape[0]):
-        out[i] = values[at] + 0.1 * i
+        out[i] = values[index] + 0.1 * i
 
 
 @njit
-def mirroring_law(values, at, out):
-    out[:] = -values[at]
+def mirroring_law(values, index, out):
+    out[:] = -values[index]
 
 
 @njit
-def called(address, values, at, out):
-    call(address, (values, at, out))
+def call_by_address(address, values, index, out):
+    call(address, (values, index, out))
 
 
 def address(kernel):
@@ -38,28 +37,30 @@ def address(kernel):
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
-def test_the_kernel_is_chosen_by_its_address_alone():
+def test_kernel_is_called_by_its_address_alone():
     values, one, other = np.random.default_rng(0).normal(size=5), np.empty(4), np.empty(4)
     for kernel in (shifting_law, mirroring_law):
-        called(address(kernel), values, 3, one)
+        call_by_address(address(kernel), values, 3, one)
         kernel(values, 3, other)
         np.testing.assert_array_equal(one, other)
-    assert len(called.signatures) == 1
+    assert len(call_by_address.signatures) == 1
     assert not any(
-        name in text for text in called.inspect_llvm().values() for name in ("shifting_law", "mirroring_law")
+        name in text for text in call_by_address.inspect_llvm().values() for name in ("shifting_law", "mirroring_law")
     )
 
 
-def test_an_error_in_the_kernel_is_the_caller_s():
+def test_error_in_the_kernel_is_raised_in_the_caller():
     out = np.zeros(4)
     with pytest.raises(ControllerError, match="beyond the end"):
-        called(address(shifting_law), np.zeros(2), 7, out)
+        call_by_address(address(shifting_law), np.zeros(2), 7, out)
     assert not out.any()
 
 
-def test_calls_leave_the_arrays_reference_counts_as_they_were():
+def test_calls_neither_free_nor_leak_arrays():
     kernel, values, out = address(shifting_law), np.zeros(2), np.zeros(4)
-    before = [sys.getrefcount(array) for array in (values, out)]
-    for at in (0, 1) * 50:
-        called(kernel, values, at, out)
-    assert [sys.getrefcount(array) for array in (values, out)] == before
+    arrays = ArrayLifetimes(values, out)
+    for index in (0, 1) * 50:
+        call_by_address(kernel, values, index, out)
+    assert arrays.all_alive()
+    del values, out
+    assert arrays.all_freed()

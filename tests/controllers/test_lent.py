@@ -1,6 +1,5 @@
-"""Named tuples that are lent: one pointer, and fields that are read by name, in compiled code and called by address."""
+"""Lent named tuples: one pointer, with fields read by name, in compiled code and in kernels called by address."""
 
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from numba.core.errors import TypingError
 from controllers.kernel_call import address_of, call_as_given
 from controllers.lent import Lent, lend
 from controllers.state import Array
+from tests.controllers.array_lifetimes import ArrayLifetimes
 
 
 class Inner(NamedTuple):
@@ -20,7 +20,7 @@ class Inner(NamedTuple):
 
 
 class Same(NamedTuple):
-    """Fields of one type: numba has another type for these."""
+    """Fields of one type, for which numba has another tuple type."""
 
     first: float
     second: float
@@ -33,7 +33,7 @@ class Parts(NamedTuple):
 
 
 class Renamed(NamedTuple):
-    """The types of `Same` by other names: numba's name of the type is the same but for the class."""
+    """The fields of `Same` in another order: numba's type names differ only by the class."""
 
     second: float
     first: float
@@ -85,30 +85,30 @@ def _misspelt(these: Any) -> float:
 FILLED = [[1.0, 2.0], [1.0, 2.5], [1.0, 3.0]]
 
 
-def counts(these: Parts) -> list[int]:
-    return [sys.getrefcount(these.given), sys.getrefcount(these.inner.pair[0])]
-
-
-def test_fields_of_a_lent_tuple_and_of_those_in_it_are_read_and_written_in_place():
+def test_fields_of_lent_and_nested_tuples_are_read_and_written_in_place():
     these = parts()
-    before = counts(these)
+    arrays = ArrayLifetimes(these.given, these.inner.pair[0])
     for _ in range(100):
         _filled(these, 3)
     np.testing.assert_array_equal(these.given, FILLED)
-    assert counts(these) == before
+    assert arrays.all_alive()
+    del these
+    assert arrays.all_freed()
 
 
-def test_a_kernel_called_by_its_address_finds_what_it_is_lent():
+def test_kernel_called_by_address_reads_lent_fields():
     these = parts()
-    before = counts(these)
+    arrays = ArrayLifetimes(these.given, these.inner.pair[0])
     kernel = address_of(_fill, (Lent(typeof(these)), types.int64))
     for _ in range(100):
         _by_address(kernel, these)
     np.testing.assert_array_equal(these.given, FILLED)
-    assert counts(these) == before
+    assert arrays.all_alive()
+    del these
+    assert arrays.all_freed()
 
 
-def test_the_same_function_takes_a_tuple_and_a_lent_one():
+def test_function_accepts_tuples_and_lent_tuples():
     these, others = parts(), parts()
     _fill(these, 3)
     _filled(others, 3)
@@ -121,6 +121,6 @@ def test_fields_are_found_by_name_where_types_are_equal():
     assert Lent(typeof(Same(1.0, 2.0))) != Lent(typeof(Renamed(1.0, 2.0)))
 
 
-def test_a_field_that_does_not_exist_is_an_error_of_compilation():
+def test_missing_field_raises_typing_error():
     with pytest.raises(TypingError, match="missing"):
         _misspelt(Same(1.0, 2.0))

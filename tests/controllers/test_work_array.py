@@ -1,4 +1,4 @@
-"""Work arrays of compiled kernels: on the stack, each its own, whatever else the kernel calls."""
+"""Work arrays of compiled kernels: distinct arrays on the stack that called functions do not overwrite."""
 
 import numpy as np
 from numba import njit
@@ -11,7 +11,7 @@ ROWS = 3
 
 @njit
 def _filled(into: np.ndarray, value: float) -> float:
-    """Uses the stack below its caller's."""
+    """Fills a work array of its own, on the stack below its caller's."""
     own = work_array(64)
     for i in range(64):
         own[i] = value
@@ -21,38 +21,38 @@ def _filled(into: np.ndarray, value: float) -> float:
 
 
 @njit
-def weighed(n: int, turns: int) -> float:
-    kept, counts = work_array((n, 2)), work_integers(4)
+def weighted_sum(n: int, turns: int) -> float:
+    rows, counts = work_array((n, 2)), work_integers(4)
     for i in range(n):
-        kept[i, 0], kept[i, 1] = i, -i
+        rows[i, 0], rows[i, 1] = i, -i
     counts[:] = 7
     total = 0.0
     for k in range(turns):
-        again = work_array((ROWS, 5))  # of constant size: one place, however often
-        for row in again:
+        block = work_array((ROWS, 5))  # of constant size: the same memory in each turn
+        for row in block:
             total += _filled(row, float(k))
-        total += again[0, 0] + again[ROWS - 1, 4]
+        total += block[0, 0] + block[ROWS - 1, 4]
     for i in range(n):
-        total += 10.0 * kept[i, 0] + kept[i, 1]
-    return total + counts.sum() + kept.shape[0]
+        total += 10.0 * rows[i, 0] + rows[i, 1]
+    return total + counts.sum() + rows.shape[0]
 
 
-def test_compiled_and_in_python_a_kernel_with_work_arrays_gives_the_same() -> None:
-    assert weighed(6, 50) == weighed.py_func(6, 50) == 3 * 1225 + 2 * 1225 + 9 * 15 + 28 + 6
+def test_kernel_with_work_arrays_equals_python() -> None:
+    assert weighted_sum(6, 50) == weighted_sum.py_func(6, 50) == 3 * 1225 + 2 * 1225 + 9 * 15 + 28 + 6
 
 
-def test_work_arrays_take_nothing_from_the_heap_and_no_more_stack_in_each_turn() -> None:
-    weighed(6, 1)
+def test_work_arrays_use_no_heap_and_constant_stack() -> None:
+    weighted_sum(6, 1)
     _nrt_python.memsys_enable_stats()
     try:
         before = rtsys.get_allocation_stats().alloc
-        weighed(6, 1_000_000)  # as many places would be 120 MB
+        weighted_sum(6, 1_000_000)  # separate arrays would take 120 MB
         assert rtsys.get_allocation_stats().alloc == before
     finally:
         _nrt_python.memsys_disable_stats()
 
 
-def test_an_array_that_is_empty_is_empty() -> None:
+def test_empty_work_array_has_size_zero() -> None:
     @njit
     def size(n: int) -> int:
         return work_array((4, n)).size + work_array((0, 3)).shape[1]

@@ -1,6 +1,6 @@
-"""A golden trajectory for each mode that is a field over a fixed curve: a mass in it, pushed once, as it ever was.
+"""Golden trajectories of a mass, pushed once, for each mode that is a field over a fixed curve.
 
-``python tests/golden/test_golden_fields.py`` writes the file anew, after a change of a law that is meant.
+``python tests/golden/test_golden_fields.py`` rewrites the file after an intended change of a law.
 """
 
 from pathlib import Path
@@ -22,8 +22,8 @@ CURVE = Trajectory.circle(0.0477, 4.0)
 MODES = ("follow", "bunny", "rivers discrete", "rivers smooth", "rivers sum", "edited")
 
 
-# Written out, so that other defaults change no golden path.
-WORDS = {
+# Explicit, so that the golden paths do not depend on defaults.
+PARAMETERS = {
     "follow": {"stiffness": 300.0, "damping": 4.0, "tube": 0.25},
     "bunny": {
         "stiffness": 300.0, "damping": 4.0, "bunny_width": 0.02, "bunny_attraction": "point", "bunny_pace": "wait",
@@ -48,12 +48,12 @@ def _glide(units, ops, params, memory, push, path):
 def _field(mode):
     if mode == "edited":
         times = np.linspace(0.0, 4.0, 401)
-        swell = 1.0 + 0.2 * np.sin(np.pi * np.clip(times - 1.0, 0.0, 1.0)) ** 2
-        performed = performance(times, CURVE.point(times) * swell[:, None])
+        scale = 1.0 + 0.2 * np.sin(np.pi * np.clip(times - 1.0, 0.0, 1.0)) ** 2
+        performed = performance(times, CURVE.point(times) * scale[:, None])
         return Edited(River(CURVE, 0.04), (performed,), (1.0,))
     name, _, crossing = mode.partition(" ")
-    words = WORDS[name] | ({"crossing": crossing} if crossing else {})
-    config = run_config(name, "composite", radius=0.0477, lap=4.0, reach=0.025, **words)
+    parameters = PARAMETERS[name] | ({"crossing": crossing} if crossing else {})
+    config = run_config(name, "composite", radius=0.0477, lap=4.0, reach=0.025, **parameters)
     return parts_of(config, map_parts(config, figure_model())).field
 
 
@@ -61,18 +61,18 @@ def _trajectory(mode):
     """Positions every 10 ms for 3 s, from rest 2 mm beside the curve, pushed for 0.3 s."""
     program, push, path = _field(mode).program(), np.zeros((3000, 3)), np.zeros((300, 3))
     push[1300:1500] = [0.0, 0.05, 0.1]
-    # Away from where rivers meet: there the smooth field decides by a hair.
+    # Away from where rivers meet, since there the smooth field is sensitive to rounding.
     path[0] = CURVE.point(0.25) + np.array([0.002, 0.0, 0.001])
     _glide(*program.compiled(), program.fresh_memory(), push, path)
     return path
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_mass_moves_in_each_mode_as_it_ever_did(mode):
+def test_field_trajectories_match_golden_values(mode):
     rows = np.loadtxt(GOLDEN, delimiter=",", skiprows=1)
     golden = rows[:, 3 * MODES.index(mode) : 3 * MODES.index(mode) + 3]
     path = _trajectory(mode)
-    # Rounding differs from machine to machine, and a field that attracts does not let it grow: 1 nm becomes 2.
+    # Rounding differs between machines, and attracting fields hardly amplify it: 1 nm becomes 2 nm.
     np.testing.assert_allclose(path, golden, atol=1e-8)
     assert np.ptp(path, axis=0).max() > 0.05
 

@@ -1,6 +1,6 @@
-"""LEADING: the default hand on a mass leads a walk along the S and straight back; both go where they ever went.
+"""LEADING: golden trajectories of the default hand that leads a walk along an S and straight back, and of the figure.
 
-Run this file to write their ways anew, after a change that means to change them.
+Run this file to rewrite them after an intended change.
 """
 
 import json
@@ -29,7 +29,7 @@ def _run() -> dict[str, list]:
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
     walkers = program.fresh_walkers()
     walker = walker_at.py_func(walkers.state, 0)
-    p, v, ways = np.array([*field.walking.start, 0.001]), np.zeros(3), []
+    p, v, trajectory = np.array([*field.walking.start, 0.001]), np.zeros(3), []
     for k in range(round(SECONDS / PERIOD)):
         hand[0] = k * PERIOD
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
@@ -37,18 +37,18 @@ def _run() -> dict[str, list]:
         evaluate(*program.compiled(), memory, hand, wrench)
         hand_force(arm, k * PERIOD, p, v, user)
         if k % EVERY == 0:
-            ways.append([*p.tolist(), float(walker.argument[0])])
+            trajectory.append([*p.tolist(), float(walker.argument[0])])
         v = v + PERIOD / MASS * (wrench[:3] + user)
         p = p + PERIOD * v
-    return {"ways": ways}
+    return {"ways": trajectory}
 
 
-def test_the_hand_leads_and_the_figure_follows_as_they_did() -> None:
+def test_lead_trajectories_match_golden_values() -> None:
     golden, now = np.array(json.loads(GOLDEN.read_text(encoding="utf-8"))["ways"]), np.array(_run()["ways"])
-    # A start moved by 1 nm moves the hand by 1 nm and the figure's way by 4 nm.
+    # A start displaced by 1 nm displaces the hand by 1 nm and the figure by 4 nm.
     np.testing.assert_allclose(now[:, :3], golden[:, :3], atol=1e-8)
     np.testing.assert_allclose(now[:, 3], golden[:, 3], atol=1e-6)
-    # Along the S and back again.
+    # Along the S and back.
     assert now[:, 3].max() > 5.0
     assert abs(now[-1, 3]) < 0.1
 

@@ -1,6 +1,6 @@
-"""A golden trajectory of the stylus's orientation: what the figure makes of turns, and a stylus turned by the field.
+"""Golden response of the expressive figure and the orientation field to rotations of the stylus.
 
-``python tests/golden/test_golden_orientation.py`` writes the file anew, after a change that is meant.
+``python tests/golden/test_golden_orientation.py`` rewrites the file after an intended change.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ def _rows():
     table = turn_table([replace(turn, angle=np.copysign(1.2, turn.angle)) for turn in turns])
     field, memory = Orientation(CURVE, 0.2, 3e-3), figure.compiled().memory
     rows, turn, rate = [], np.empty(3), np.empty(3)
-    # Not from the lap's seam, where rounding would decide which lap it is.
+    # Not from the seam of the lap, where rounding would decide which lap it is.
     for t in np.arange(0.025, 12.0, 0.05):
         wanted_turn(table, t, turn, rate)
         q = np.roll(Rotation.from_rotvec(turn).as_quat(), 1)
@@ -43,7 +43,7 @@ def _rows():
     return np.array(rows)
 
 
-def test_turns_of_the_stylus_make_of_the_figure_and_of_the_field_what_they_ever_did():
+def test_figure_pose_and_field_moment_match_golden_values():
     golden, rows = np.loadtxt(GOLDEN, delimiter=",", skiprows=1), _rows()
     np.testing.assert_allclose(rows, golden, atol=1e-9)
     assert np.ptp(rows[:, 9:13], axis=0).max() > 0.5

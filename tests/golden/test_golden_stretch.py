@@ -1,6 +1,6 @@
-"""STRETCHY TUBES, alone and then FOLLOW: a hand on a mass bends the default curve and lets go; the paths are known.
+"""STRETCHY TUBES, alone and then FOLLOW: golden paths and edits of a hand that bends the default curve and releases it.
 
-Run this file to write the paths anew, after a change that means to change them.
+Run this file to rewrite them after an intended change.
 """
 
 import json
@@ -16,7 +16,7 @@ from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.hand.arm import hand_force
 
-# Written out, so that other defaults change no golden path.
+# Explicit, so that the golden paths do not depend on defaults.
 BENDING = {"seek": 150.0, "rubber": 150.0, "tube_damping": 14.0, "rubber_tube": 0.008, "bump": 0.5}
 MODES = {"stretch": {}, "stretch-then-follow": {"stiffness": 300.0, "damping": 4.0, "tube": 0.25}}
 MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 17.0, 250
@@ -46,7 +46,7 @@ def _run(mode: str) -> dict[str, list]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_the_hand_goes_where_it_went_and_the_curve_is_bent_as_it_was(mode: str) -> None:
+def test_stretch_trajectories_and_edits_match_golden_values(mode: str) -> None:
     golden, now = json.loads(_golden(mode).read_text(encoding="utf-8")), _run(mode)
     np.testing.assert_allclose(now["path"], golden["path"], atol=1e-8)
     np.testing.assert_allclose(now["edits"], golden["edits"], atol=1e-8)

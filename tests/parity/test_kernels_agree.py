@@ -1,4 +1,4 @@
-"""The same law three ways: NumPy reference, compiled, and symbolic by ``.py_func`` on CasADi."""
+"""Kernels compiled, in Python and symbolically by ``.py_func`` on CasADi; curves and rotations by SciPy."""
 
 import casadi
 import numpy as np
@@ -38,7 +38,7 @@ def _symbolic(kernel, arity):
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
-def test_the_compiled_law_is_the_symbolic_one(kernel, arity):
+def test_compiled_kernel_matches_casadi_and_python(kernel, arity):
     symbolic = _symbolic(kernel, arity)
     for _ in range(30):
         arguments = RNG.uniform(0.1, 1.0, arity)
@@ -48,13 +48,13 @@ def test_the_compiled_law_is_the_symbolic_one(kernel, arity):
 
 
 @pytest.mark.parametrize("periodic", [False, True])
-def test_the_compiled_curve_is_scipys_spline(periodic):
+def test_compiled_curve_matches_scipy_spline(periodic):
     points = RNG.normal(size=(9, 3))
     points[-1] = points[0] if periodic else points[-1]
     times = np.cumsum(RNG.uniform(0.1, 1.0, 9))
     curve = Trajectory(times, points, periodic=periodic)
     reference = CubicSpline(times, points, bc_type="periodic" if periodic else "natural")
-    # Not at the array's start, to see that offsets are kept.
+    # At an offset in the array, to test that offsets are respected.
     blob = np.concatenate([np.full(5, np.nan), curve.packed()])
     for t in RNG.uniform(times[0], times[-1], 50):
         np.testing.assert_allclose(curve_point(blob, 5, t), reference(t), atol=1e-13)
@@ -64,7 +64,7 @@ def test_the_compiled_curve_is_scipys_spline(periodic):
             np.testing.assert_allclose(curve_point(blob, 5, t + 3 * curve.duration), reference(t), atol=1e-11)
 
 
-def test_rotations_are_scipys():
+def test_rotations_match_scipy():
     for _ in range(30):
         a, b = Rotation.random(random_state=RNG), Rotation.random(random_state=RNG)
         qa, qb = (np.roll(r.as_quat(), 1) for r in (a, b))
@@ -77,6 +77,6 @@ def test_rotations_are_scipys():
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-20, 1e-9, 3.1415926])
-def test_exponential_and_logarithm_invert_each_other_where_they_are_delicate(angle):
+def test_exponential_and_logarithm_are_inverse_at_delicate_angles(angle):
     vector = angle * np.array([0.6, 0.0, -0.8])
     np.testing.assert_allclose(rotations.logarithm(*rotations.exponential(*vector)), vector, rtol=1e-9, atol=1e-16)

@@ -1,4 +1,4 @@
-"""How far a figure has come is its hand's path: going aside changes how fast it walks, not where it is."""
+"""Travel integrates drift over the hand's path: moving aside changes the walking speed, not the position."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from tests.controllers.haptic_map.test_lifted_map import MAP
 TURN = 2.0 * np.pi
 
 
-def walked(path):
-    """Where a figure is in the end, x, y and heading, on a path of angles (n,) and drifts (n, 3)."""
+def travelled(path):
+    """Final x, y and heading of the figure after a path of pairs (angle, drift (3,))."""
     memory = fresh_lap()
     for angle, drift in path:
         update_lap(memory, np.mod(angle, TURN), drift)
@@ -23,22 +23,22 @@ def walked(path):
     return np.array([memory[LAP_X] + s * (c * x - n * y), memory[LAP_Y] + s * (n * x + c * y), memory[LAP_HEADING]])
 
 
-def test_the_way_is_the_integral_of_the_drift_over_the_path():
+def test_travel_is_the_integral_of_drift_over_the_path():
     angles = np.linspace(0.2, 15.0, 3000)
     drifts = np.column_stack([1.0 + np.sin(0.7 * angles), 0.3 * np.cos(angles), 0.0 * angles])
     expected = np.trapezoid(drifts, angles / TURN, axis=0) + 0.2 / TURN * drifts[0]
-    np.testing.assert_allclose(walked(list(zip(angles, drifts, strict=True))), expected, atol=1e-9)
+    np.testing.assert_allclose(travelled(list(zip(angles, drifts, strict=True))), expected, atol=1e-9)
 
 
-def test_there_and_back_is_where_it_was():
+def test_returning_along_the_path_restores_the_position():
     angles = np.concatenate([np.linspace(0.2, 9.0, 900), np.linspace(9.0, 0.2, 900)])
     drifts = np.column_stack([1.0 + np.sin(0.7 * angles), 0.3 * np.cos(angles), 0.0 * angles])
     np.testing.assert_allclose(
-        walked(list(zip(angles, drifts, strict=True)))[:2], 0.2 / TURN * drifts[0, :2], atol=1e-9
+        travelled(list(zip(angles, drifts, strict=True)))[:2], 0.2 / TURN * drifts[0, :2], atol=1e-9
     )
 
 
-def test_a_steady_drift_that_turns_is_as_it_was():
+def test_constant_turning_drift_accumulates_heading():
     memory, drift = fresh_lap(), np.array([0.4, 0.1, 1.0])
     for angle in np.mod(np.linspace(0.1, 4.0 * TURN + 0.1, 400), TURN):
         update_lap(memory, angle, drift)
@@ -46,11 +46,13 @@ def test_a_steady_drift_that_turns_is_as_it_was():
 
 
 @pytest.mark.parametrize(("haptic_map", "middle"), [(MAP, 0.05), (MOVING, 0.045)])
-def test_a_hand_that_goes_aside_late_in_a_lap_does_not_carry_the_figure_off(haptic_map, middle):
+def test_radial_hand_motion_late_in_a_lap_barely_moves_the_figure(haptic_map, middle):
     memory, angle = haptic_map.compiled().memory, 5.8
-    places = [stylus(middle + 0.008 * np.sin(s), angle, 0.006 * np.sin(s)) for s in np.linspace(0.0, 0.5 * np.pi, 200)]
-    with_memory = np.array([haptic_map.pose(x, memory)[:2] for x in places])
-    alone = np.array([haptic_map.pose(x)[:2] for x in places])
-    carried, moved = (np.linalg.norm(p[-1] - p[0]) for p in (alone, with_memory))
-    assert carried > 0.1
-    assert moved < 0.35 * carried
+    stylus_poses = [
+        stylus(middle + 0.008 * np.sin(s), angle, 0.006 * np.sin(s)) for s in np.linspace(0.0, 0.5 * np.pi, 200)
+    ]
+    with_memory = np.array([haptic_map.pose(x, memory)[:2] for x in stylus_poses])
+    without_memory = np.array([haptic_map.pose(x)[:2] for x in stylus_poses])
+    displacement_without_memory, displacement = (np.linalg.norm(p[-1] - p[0]) for p in (without_memory, with_memory))
+    assert displacement_without_memory > 0.1
+    assert displacement < 0.35 * displacement_without_memory

@@ -1,4 +1,4 @@
-"""Certificates survive JSON, and notice every change of their inputs."""
+"""Certificates as JSON, and the hash of their inputs."""
 
 import json
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ VERDICTS = {
 }
 
 
-def test_a_certificate_survives_json():
+def test_certificate_round_trips_through_json():
     text = json.dumps(Certificate(VERDICTS, hash_of(GAINS)).to_json(), allow_nan=False)
     again = Certificate.from_json(json.loads(text))
     again.check(GAINS)
@@ -35,7 +35,7 @@ def test_a_certificate_survives_json():
     assert json.dumps(again.to_json()) == text
 
 
-def test_numbers_that_are_not_finite_are_null_in_json():
+def test_non_finite_figures_become_null_in_json():
     verdict = Verdict("certified", "no upper bound", figures={"bound": [1.0, np.inf]})
     assert Certificate({"a": verdict}, "0").to_json()["a"]["figures"] == {"bound": [1.0, None]}
 
@@ -49,7 +49,7 @@ def test_numbers_that_are_not_finite_are_null_in_json():
         {"k": 300.0, "curve": GAINS.curve},
     ],
 )
-def test_any_change_of_the_inputs_is_noticed(changed):
+def test_check_raises_for_any_changed_input(changed):
     with pytest.raises(CertificateError, match="certify again"):
         Certificate(VERDICTS, hash_of(GAINS)).check(changed)
 
@@ -62,23 +62,23 @@ def test_different_inputs_have_different_hashes(one, other):
     assert hash_of(one) != hash_of(other)
 
 
-def test_the_order_of_a_mapping_plays_no_part():
+def test_hash_ignores_mapping_order():
     assert hash_of({"a": 1, "b": 2}) == hash_of({"b": 2, "a": 1})
 
 
-def test_what_has_no_value_of_its_own_is_not_hashed():
+def test_hash_of_object_without_value_raises():
     with pytest.raises(CertificateError, match="cannot be hashed"):
         hash_of([object()])
 
 
 @pytest.mark.parametrize("values", [None, [], {"stability": {}}, {"inputs": "0", "a": {"verdict": "maybe"}}, "text"])
-def test_what_is_no_certificate_is_refused(values):
+def test_from_json_raises_for_malformed_certificates(values):
     with pytest.raises(CertificateError, match="not a certificate"):
         Certificate.from_json(values)
 
 
-def test_only_what_is_refuted_has_a_counterexample():
+def test_counterexample_is_required_for_refuted_and_forbidden_otherwise():
     with pytest.raises(CertificateError, match="counterexample"):
-        Verdict("refuted", "so they say")
+        Verdict("refuted", "no reason given")
     with pytest.raises(CertificateError, match="counterexample"):
-        Verdict("certified", "so they say", counterexample={"p": [0.0]})
+        Verdict("certified", "no reason given", counterexample={"p": [0.0]})

@@ -1,4 +1,4 @@
-"""Ctrl-C ends a solution of IPOPT, and is not taken for a problem without one."""
+"""Ctrl-C ends IPOPT with KeyboardInterrupt, not with a failed solution."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ from controllers.certificates.interrupts import heeding_interrupts
 
 
 @pytest.fixture(autouse=True)
-def handled_by_python() -> Generator[None]:
+def python_handles_sigint() -> Generator[None]:
     """A background job of a shell, as CI may be, begins with SIGINT ignored."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
@@ -25,32 +25,32 @@ def _interrupt() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
-def test_ctrl_c_ends_ipopt() -> None:
+def test_interrupt_ends_ipopt() -> None:
     x = ca.MX.sym("x", 3000)
     cost = ca.sum1(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2) + 0.01 * ca.sum1(ca.cos(7 * x))
     options = {"print_time": 0, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 100_000}
     solve, timer = ca.nlpsol("solve", "ipopt", {"x": x, "f": cost}, options), threading.Timer(0.2, _interrupt)
     timer.start()
     with pytest.raises(KeyboardInterrupt), heeding_interrupts():
-        solve(x0=0.3)  # nine seconds, if it is let
+        solve(x0=0.3)  # some nine seconds without an interrupt
     timer.join()
     assert not solve.stats()["success"]
 
 
-def _lose_an_interrupt() -> None:
+def _suppressed_interrupt() -> None:
     with contextlib.suppress(KeyboardInterrupt):
         _interrupt()
         time.sleep(1.0)
 
 
-def test_an_interrupt_that_is_lost_within_a_block_is_raised_at_its_end() -> None:
+def test_interrupt_lost_within_the_block_is_raised_at_its_end() -> None:
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt), heeding_interrupts():
-        _lose_an_interrupt()
+        _suppressed_interrupt()
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_block_without_an_interrupt_is_as_without_the_guard() -> None:
+def test_block_without_interrupt_keeps_handler_and_exceptions() -> None:
     before = signal.getsignal(signal.SIGINT)
     with heeding_interrupts():
         pass
@@ -59,14 +59,14 @@ def test_a_block_without_an_interrupt_is_as_without_the_guard() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_other_threads_leave_the_handler_as_it_is() -> None:
-    before, seen = signal.getsignal(signal.SIGINT), list[object]()
+def test_other_threads_keep_the_signal_handler() -> None:
+    before, handlers = signal.getsignal(signal.SIGINT), list[object]()
 
-    def work() -> None:
+    def enter_block() -> None:
         with heeding_interrupts():
-            seen.append(signal.getsignal(signal.SIGINT))
+            handlers.append(signal.getsignal(signal.SIGINT))
 
-    thread = threading.Thread(target=work)
+    thread = threading.Thread(target=enter_block)
     thread.start()
     thread.join()
-    assert seen == [before]
+    assert handlers == [before]

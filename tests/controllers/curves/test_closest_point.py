@@ -1,4 +1,4 @@
-"""The closest point is global and exact, however it is started."""
+"""The closest point of a curve is global and exact, for any initial guess."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def _random_curve(rng, n, periodic):
 
 
 def _brute_force(curve, point):
-    """Smallest distance on 2000 samples, each of the five best refined by golden section: no kernel involved."""
+    """Smallest distance on 2000 samples, the five best refined by golden section, in NumPy alone."""
     t = np.linspace(curve.start, curve.end, 2001)
     distance = np.linalg.norm(curve.point(t) - point, axis=1)
     best = np.inf
@@ -44,18 +44,18 @@ def _brute_force(curve, point):
 
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("n", [4, 9, 40])
-def test_it_is_the_global_minimum_within_a_nanometre(n, periodic):
+def test_distance_is_the_global_minimum_within_a_nanometre(n, periodic):
     rng = np.random.default_rng(n)
     curve = _random_curve(rng, n, periodic)
     points = rng.normal(size=(12, 3)) * 0.08
     found = _search(curve.packed(), points, np.full(12, np.nan))
-    truth = np.array([_brute_force(curve, p) for p in points])
+    expected = np.array([_brute_force(curve, p) for p in points])
     np.testing.assert_allclose(np.linalg.norm(curve.point(found[:, 0]) - points, axis=1), found[:, 1], atol=1e-15)
-    assert np.abs(found[:, 1] - truth).max() < 1e-9
+    assert np.abs(found[:, 1] - expected).max() < 1e-9
 
 
 @pytest.mark.parametrize("n", [2, 3, 30, 400])
-def test_a_guess_anywhere_does_not_change_the_answer(n):
+def test_guess_does_not_change_the_distance(n):
     rng = np.random.default_rng(n)
     curve = _random_curve(rng, n, periodic=False)
     points = rng.normal(size=(500, 3)) * 0.08
@@ -64,7 +64,7 @@ def test_a_guess_anywhere_does_not_change_the_answer(n):
     assert np.abs(warm[:, 1] - cold[:, 1]).max() < 1e-10
 
 
-def test_between_two_passes_of_a_curve_it_leaps_to_the_nearer_one_at_the_middle():
+def test_search_switches_to_the_nearer_strand_halfway_between_two():
     # Two strands 10 mm apart that the curve runs along one after the other: a tracker could stay on the wrong one.
     x = np.linspace(-0.05, 0.05, 21)
     there = np.stack([x, np.zeros(21), np.zeros(21)], axis=1)
@@ -78,14 +78,14 @@ def test_between_two_passes_of_a_curve_it_leaps_to_the_nearer_one_at_the_middle(
 
 
 @pytest.mark.slow
-def test_all_three_extrema_of_one_piece_are_considered():
-    # One hairpin piece: near its axis the distance has two minima with a maximum between.
+def test_all_three_extrema_of_one_segment_are_considered():
+    # One hairpin segment: near its axis the distance has two minima with a maximum between.
     curve = Trajectory([0.0, 1.0, 2.0], [[-0.01, 0.0, 0.0], [0.0, 0.05, 0.0], [0.01, 0.0, 0.0]])
     points = np.stack([np.linspace(-0.009, 0.009, 41), np.full(41, 0.02), np.zeros(41)], axis=1)
     for guess in (0.1, 1.9):
         found = _search(curve.packed(), points, np.full(41, guess))
-        truth = np.array([_brute_force(curve, p) for p in points])
-        assert np.abs(found[:, 1] - truth).max() < 1e-9
+        expected = np.array([_brute_force(curve, p) for p in points])
+        assert np.abs(found[:, 1] - expected).max() < 1e-9
 
 
 @settings(max_examples=60)
@@ -94,19 +94,19 @@ def test_all_three_extrema_of_one_piece_are_considered():
     st.tuples(*[st.floats(-0.2, 0.2)] * 3),
     st.floats(1e-9, 1.0),
 )
-def test_degenerate_samples_neither_hang_nor_mislead(samples, point, squeeze):
+def test_degenerate_samples_give_the_minimum_distance(samples, point, squeeze):
     positions = np.array(samples) * [1.0, squeeze, squeeze]
     if np.linalg.norm(np.diff(positions, axis=0), axis=1).sum() < 1e-6:
         positions[-1] += [0.01, 0.0, 0.0]
     curve = Trajectory(np.arange(len(positions), dtype=float), positions)
     _, distance = closest_phase(curve.packed(), 0, *point, np.nan)
     dense = np.linalg.norm(curve.point(np.linspace(curve.start, curve.end, 4001)) - np.array(point), axis=1).min()
-    # What `closest_phase` says of itself; a curve of a micrometre was found on which it uses half of it.
+    # The tolerance that `closest_phase` documents; a curve of a micrometre uses half of it.
     assert distance <= dense + 1e-11
     assert distance >= dense - 0.01 * curve.length - 1e-12
 
 
-def test_at_the_centre_of_a_circle_where_all_points_are_near_it_still_answers():
+def test_centre_of_a_circle_gives_its_radius():
     curve = Trajectory.circle(0.05, 4.0)
     phase, distance = closest_phase(curve.packed(), 0, 0.0, 0.0, 0.0, 1.0)
     assert distance == pytest.approx(0.05, abs=1e-8)
@@ -114,7 +114,7 @@ def test_at_the_centre_of_a_circle_where_all_points_are_near_it_still_answers():
 
 
 @pytest.mark.parametrize("point", [(1e6, 0.0, 0.0), (1e120, -1e120, 0.0)])
-def test_far_away_it_is_finite(point):
+def test_distance_to_a_far_point_is_finite_and_exact(point):
     curve = Trajectory.circle(0.05, 4.0)
     phase, distance = closest_phase(curve.packed(), 0, *point, np.nan)
     assert np.isfinite(phase)
@@ -122,6 +122,6 @@ def test_far_away_it_is_finite(point):
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_point_that_is_not_finite_gives_no_distance(bad):
+def test_non_finite_point_gives_nan_distance(bad):
     _, distance = closest_phase(Trajectory.circle(0.05, 4.0).packed(), 0, bad, 0.0, 0.0, 0.5)
     assert np.isnan(distance)

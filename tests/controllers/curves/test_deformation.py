@@ -1,4 +1,4 @@
-"""Bending a curve: exact under the hand, nothing outside the bump, closed curves closed, undo to the last bit."""
+"""Deformation of a curve: exact at the hand, local, closed curves stay closed, undo is exact."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def _circle() -> Trajectory:
 
 
 def _uneven(periodic: bool, n: int = 15) -> Trajectory:
-    """A curve of unequal steps whose stylus turns."""
+    """A curve with unequal time steps and a turning stylus."""
     rng = np.random.default_rng(n)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.5, n))])
     times *= 4.0 / times[-1]
@@ -49,7 +49,7 @@ def curve(request: pytest.FixtureRequest) -> Trajectory:
 
 def _record(curve: Trajectory, depth: int = 64) -> np.ndarray:
     record = record_of(curve, WIDTH, depth)
-    let_go(record, 0)  # which bounds its pieces as after every edit
+    let_go(record, 0)  # also updates the bounds of the segments, as after every edit
     return record
 
 
@@ -65,7 +65,7 @@ def _blob(record: np.ndarray) -> np.ndarray:
     return record[deformation.work_curve(record, 0) :]
 
 
-def test_the_bump_is_one_at_its_centre_compact_and_twice_differentiable() -> None:
+def test_bump_is_one_at_its_centre_compact_and_twice_differentiable() -> None:
     s = np.linspace(-1.2, 1.2, 2401)
     w = np.array([bump(x) for x in s])
     assert bump(0.0) == 1.0
@@ -79,7 +79,7 @@ def test_the_bump_is_one_at_its_centre_compact_and_twice_differentiable() -> Non
         assert float(symbolic(x)) == pytest.approx(bump(x), abs=1e-15)
 
 
-def test_refining_changes_nothing(curve: Trajectory) -> None:
+def test_refined_curve_equals_the_original(curve: Trajectory) -> None:
     fine = refined(curve, 100)
     assert len(fine.coefficients) > len(curve.coefficients)
     for name in ("point", "velocity", "acceleration", "orientation"):
@@ -88,7 +88,7 @@ def test_refining_changes_nothing(curve: Trajectory) -> None:
 
 @settings(max_examples=25)
 @given(st.floats(0.0, 4.0), st.tuples(*[st.floats(-0.1, 0.1)] * 3))
-def test_the_grabbed_point_is_where_it_is_carried_and_the_rest_stays(phase: float, delta: tuple) -> None:
+def test_grabbed_point_follows_the_hand_and_the_rest_stays(phase: float, delta: tuple) -> None:
     for curve in (CURVES["circle"], CURVES["uneven closed"]):
         record = _record(curve)
         before = curve_of(record, 0, curve)
@@ -104,7 +104,7 @@ def test_the_grabbed_point_is_where_it_is_carried_and_the_rest_stays(phase: floa
         np.testing.assert_array_equal(bent.orientation(PHASES), before.orientation(PHASES))
 
 
-def test_the_bend_is_the_sum_of_bumps_that_the_formula_says(curve: Trajectory) -> None:
+def test_deformation_is_the_documented_sum_of_bumps(curve: Trajectory) -> None:
     record, bends = _record(curve), []
     for phase, delta in ((1.0, [0.01, 0.0, 0.0]), (1.2, [0.0, -0.02, 0.01]), (2.9, [0.0, 0.0, 0.03])):
         assert take_hold(record, 0, phase)
@@ -121,7 +121,7 @@ def test_the_bend_is_the_sum_of_bumps_that_the_formula_says(curve: Trajectory) -
     np.testing.assert_allclose(curve_of(record, 0, curve).point(PHASES), expected, atol=1e-14)
 
 
-def test_a_closed_curve_stays_closed_and_every_curve_stays_smooth(curve: Trajectory) -> None:
+def test_closed_curve_stays_closed_and_any_curve_stays_smooth(curve: Trajectory) -> None:
     phase = 3.95 if curve.periodic else 0.3
     bent = curve_of(_edited(curve, phase, [0.02, 0.01, -0.02]), 0, curve)
     breaks = np.asarray(bent.times)[1:-1]
@@ -136,7 +136,7 @@ def test_a_closed_curve_stays_closed_and_every_curve_stays_smooth(curve: Traject
         assert np.linalg.norm(bent.point(3.9) - curve.point(3.9)) > 5e-3
 
 
-def test_open_ends_stay_put_with_slope_and_curvature() -> None:
+def test_open_ends_keep_position_slope_and_curvature() -> None:
     curve = CURVES["uneven open"]
     for phase in (0.2, 0.45, 3.6):
         bent = curve_of(_edited(curve, phase, [0.02, 0.02, 0.02]), 0, curve)
@@ -146,7 +146,7 @@ def test_open_ends_stay_put_with_slope_and_curvature() -> None:
     assert not take_hold(_record(curve), 0, 0.05)
 
 
-def test_undo_and_redo_are_exact_to_the_last_bit(curve: Trajectory) -> None:
+def test_undo_and_redo_are_exact(curve: Trajectory) -> None:
     rng = np.random.default_rng(3)
     record = _record(curve)
     history = [_blob(record).copy()]
@@ -166,7 +166,7 @@ def test_undo_and_redo_are_exact_to_the_last_bit(curve: Trajectory) -> None:
     assert not redo(record, 0)
 
 
-def test_a_pending_edit_that_is_let_go_leaves_no_trace_and_a_new_one_ends_what_can_be_redone() -> None:
+def test_discarded_edit_leaves_no_trace_and_a_new_edit_clears_redo() -> None:
     record = _edited(_circle(), 1.0, [0.01, 0.0, 0.0])
     state = _blob(record).copy()
     assert take_hold(record, 0, 1.1)
@@ -181,7 +181,7 @@ def test_a_pending_edit_that_is_let_go_leaves_no_trace_and_a_new_one_ends_what_c
     assert not redo(record, 0)
 
 
-def test_edits_beyond_the_depth_stay_and_can_no_longer_be_undone() -> None:
+def test_edits_beyond_the_depth_cannot_be_undone() -> None:
     deep, shallow = _record(_circle()), _record(_circle(), depth=2)
     for k, phase in enumerate((0.5, 1.5, 2.5, 3.5, 0.7)):
         for record in (deep, shallow):
@@ -194,7 +194,7 @@ def test_edits_beyond_the_depth_stay_and_can_no_longer_be_undone() -> None:
     np.testing.assert_array_equal(_blob(deep), _blob(shallow))
 
 
-def test_the_closest_point_is_exact_on_a_curve_as_it_is_bent(curve: Trajectory) -> None:
+def test_closest_point_is_exact_on_a_curve_being_bent(curve: Trajectory) -> None:
     rng = np.random.default_rng(4)
     record = _record(curve)
     for phase in (0.4, 1.7, 3.5):
@@ -212,7 +212,7 @@ def test_the_closest_point_is_exact_on_a_curve_as_it_is_bent(curve: Trajectory) 
         commit(record, 0)
 
 
-def test_the_curve_read_back_has_the_coefficients_of_the_servo() -> None:
+def test_curve_read_back_has_the_coefficients_of_the_servo() -> None:
     curve = CURVES["uneven closed"]
     record = _edited(curve, 1.0, [0.01, 0.01, 0.0])
     blob, packed = _blob(record), curve_of(record, 0, curve).packed()
@@ -221,7 +221,7 @@ def test_the_curve_read_back_has_the_coefficients_of_the_servo() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: record_of(_circle(), 0.0, 64), "above 0 s"),
         (lambda: record_of(_circle(), 2.1, 64), "at most half of the curve's 4 s, got 2.1"),
@@ -231,12 +231,12 @@ def test_the_curve_read_back_has_the_coefficients_of_the_servo() -> None:
         (lambda: record_of(_circle(), 0.5, 10**12), "from 1 to 10000 edits"),
     ],
 )
-def test_what_makes_no_sense_is_refused(make, says) -> None:
-    with pytest.raises(CurveError, match=says):
+def test_invalid_records_raise_curve_error(make, message) -> None:
+    with pytest.raises(CurveError, match=message):
         make()
 
 
-def test_the_example_of_the_documentation_runs() -> None:
+def test_documentation_example_runs() -> None:
     page = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "stretchy-tubes.md"
     text = page.read_text(encoding="utf-8")
     names: dict = {}

@@ -1,4 +1,4 @@
-"""Curves: what they pass through, how smooth they are, what is refused."""
+"""Trajectories: interpolation, smoothness, geometry and validation."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
+from tests.derivatives import central_differences
 
 RNG = np.random.default_rng(7)
 
@@ -23,7 +24,7 @@ def _closed_samples(n):
     return angle, ring
 
 
-def test_a_circle_has_the_length_curvature_and_reach_of_a_circle():
+def test_circle_has_exact_length_curvature_and_reach():
     circle = Trajectory.circle(0.05, 4.0, centre=(0.01, 0.0, -0.02))
     assert circle.length == pytest.approx(2.0 * np.pi * 0.05, abs=1e-7)
     assert circle.curvature(np.linspace(0, 4, 50)) == pytest.approx(20.0, rel=1e-3)
@@ -57,19 +58,20 @@ def test_position_and_orientation_are_twice_continuously_differentiable(periodic
         assert np.abs(right - left).max() / step**2 < 20 * step * np.abs(left / step**2).max() + 1e-6
 
 
-def test_derivatives_agree_with_differences():
+def test_derivatives_match_finite_differences():
     t, points = _closed_samples(12)
     curve = Trajectory(t, points, periodic=True)
-    at, h = np.linspace(0.1, 6.0, 37), 1e-5
-    np.testing.assert_allclose(curve.velocity(at), (curve.point(at + h) - curve.point(at - h)) / (2 * h), atol=1e-8)
-    np.testing.assert_allclose(
-        curve.acceleration(at), (curve.velocity(at + h) - curve.velocity(at - h)) / (2 * h), atol=1e-6
+    phases = np.linspace(0.1, 6.0, 37)
+    by_point, by_velocity, by_arc_length = (
+        central_differences(lambda h, function=function: function(phases + h), 0.0, 1e-5)
+        for function in (curve.point, curve.velocity, curve.arc_length)
     )
-    speed = np.linalg.norm(curve.velocity(at), axis=1)
-    np.testing.assert_allclose((curve.arc_length(at + h) - curve.arc_length(at - h)) / (2 * h), speed, rtol=2e-5)
+    np.testing.assert_allclose(curve.velocity(phases), by_point, atol=1e-8)
+    np.testing.assert_allclose(curve.acceleration(phases), by_velocity, atol=1e-6)
+    np.testing.assert_allclose(by_arc_length, np.linalg.norm(curve.velocity(phases), axis=1), rtol=2e-5)
 
 
-def test_it_meets_its_samples_in_position_and_orientation():
+def test_curve_passes_through_its_samples():
     t, points = _closed_samples(12)
     turns = _wxyz(Rotation.from_rotvec(np.outer(np.sin(t), [0.4, 0.2, -0.5])))
     scrambled = turns * RNG.choice([-1.0, 1.0], size=13)[:, None]
@@ -78,7 +80,7 @@ def test_it_meets_its_samples_in_position_and_orientation():
     assert np.abs(np.abs((curve.orientation(t) * turns).sum(axis=1)) - 1.0).max() < 1e-12
 
 
-def test_an_orientation_that_turns_once_a_lap_closes_smoothly():
+def test_orientation_that_turns_once_per_lap_closes_smoothly():
     t, points = _closed_samples(24)
     curve = Trajectory(t, points, _wxyz(Rotation.from_rotvec(np.outer(t, [0.0, 0.0, 1.0]))), periodic=True)
     h = 1e-4
@@ -90,14 +92,14 @@ def test_an_orientation_that_turns_once_a_lap_closes_smoothly():
     assert turn == pytest.approx([h, h], rel=1e-3)
 
 
-def test_an_open_curve_holds_at_its_ends_and_a_clamped_one_rests_there():
+def test_open_curve_holds_its_ends_and_clamped_curve_rests_there():
     curve = Trajectory([0.0, 1.0, 2.0], [[0, 0, 0], [0.01, 0.02, 0], [0.05, 0, 0]], ends="clamped")
     np.testing.assert_array_equal(curve.point([-1.0, 5.0]), curve.point([0.0, 2.0]))
     np.testing.assert_allclose(curve.velocity([0.0, 2.0]), 0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("times", "positions", "options", "says"),
+    ("times", "positions", "options", "message"),
     [
         ([0.0], [[0, 0, 0]], {}, "at least 2 samples, got 1"),
         ([0.0, 1.0, 2.0], [[0, 0, 0], [1, 0, 0], [0, 0, 0]], {"periodic": True}, "at least 4 samples, got 3"),
@@ -110,14 +112,14 @@ def test_an_open_curve_holds_at_its_ends_and_a_clamped_one_rests_there():
         ([0.0, 1.0], [[0, 0, 0], [1, 0, 0]], {"quaternions": [[1, 0, 0, 0], [0, 1, 0, 0]]}, "turns 180°"),
     ],
 )
-def test_what_is_no_curve_is_refused_with_the_numbers(times, positions, options, says):
-    with pytest.raises(CurveError, match=says):
+def test_invalid_samples_raise_curve_error(times, positions, options, message):
+    with pytest.raises(CurveError, match=message):
         Trajectory(times, positions, **options)
 
 
 @settings(max_examples=50)
 @given(st.lists(st.tuples(*[st.floats(-0.1, 0.1)] * 3), min_size=2, max_size=10), st.floats(1e-6, 10.0))
-def test_any_samples_with_a_length_give_finite_values(samples, spacing):
+def test_any_samples_with_positive_length_give_finite_values(samples, spacing):
     positions = np.array(samples)
     if np.linalg.norm(np.diff(positions, axis=0), axis=1).sum() < 1e-6:
         positions[-1, 0] += 0.01

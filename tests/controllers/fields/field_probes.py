@@ -1,4 +1,4 @@
-"""What several tests of fields use: an evaluation in a compiled loop, a hunt for jumps, a mass in a field."""
+"""Shared helpers of field tests: evaluation in a compiled loop, search for jumps, a mass in a field."""
 
 import numpy as np
 from numba import njit
@@ -16,7 +16,7 @@ def run_over(units, ops, params, memory, hands, wrenches):
 
 @njit
 def glide(units, ops, params, memory, mass, period, push, path, velocity):
-    """A mass in a field, from path[0] at velocity[0], pushed by a force at each tick."""
+    """Simulate a mass in a field from path[0] at velocity[0], with an external force at each tick."""
     hand, wrench = np.zeros(15), np.zeros(6)
     hand[4] = 1.0
     for k in range(len(path) - 1):
@@ -35,7 +35,7 @@ def force_of(program, hand):
 
 
 def mass_in(program, start, velocity, push, mass=0.1, period=1e-3):
-    """Path of a mass in a field, and the memory at its end."""
+    """Path of a mass in a field and the final memory of the program."""
     path, speed = np.zeros((len(push), 3)), np.zeros((len(push), 3))
     path[0], speed[0] = start, velocity
     memory = program.fresh_memory()
@@ -44,20 +44,20 @@ def mass_in(program, start, velocity, push, mass=0.1, period=1e-3):
 
 
 def largest_jump(program, start, end, v=(0.0, 0.0, 0.0), t=0.0, samples=400, hunts=4):
-    """Largest jump of the force along a line: where it changes most, intervals are halved until a jump is left."""
+    """Largest jump of the force along a line, by bisection of the intervals in which it changes most."""
     start, end = np.asarray(start, float), np.asarray(end, float)
 
     def force(s):
         return force_of(program, HandState.at(start + s * (end - start), v, t))
 
-    places = np.linspace(0.0, 1.0, samples + 1)
-    values = np.array([force(s) for s in places])
+    shares = np.linspace(0.0, 1.0, samples + 1)
+    values = np.array([force(s) for s in shares])
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
     # Where the slope changes most a jump hides, not only where the slope is largest.
     bends = np.abs(np.diff(steps, prepend=steps[0])) + np.abs(np.diff(steps, append=steps[-1]))
     worst = 0.0
     for k in {*np.argsort(steps)[-hunts:], *np.argsort(bends)[-hunts:]}:
-        low, high, a, b = places[k], places[k + 1], values[k], values[k + 1]
+        low, high, a, b = shares[k], shares[k + 1], values[k], values[k + 1]
         while (high - low) * np.linalg.norm(end - start) > 1e-13:
             middle = 0.5 * (low + high)
             m = force(middle)

@@ -1,4 +1,4 @@
-"""The bunny as its width grows without bound, and scalar laws of this family on symbols."""
+"""The bunny in the limit of infinite width, and scalar kernels of fields against CasADi."""
 
 import casadi
 import numpy as np
@@ -16,7 +16,7 @@ RNG = np.random.default_rng(0)
 HANDS = [HandState.at(RNG.normal(size=3) * 0.04, RNG.normal(size=3) * 0.1, RNG.uniform(0.0, 9.0)) for _ in range(40)]
 
 
-def test_along_the_curve_it_tends_to_the_static_field_with_the_square_of_the_width():
+def test_pull_along_the_curve_tends_to_follow_with_the_square_of_the_width():
     follow = Follow(CIRCLE, 200.0, 4.0, np.inf)
     for hand in HANDS:
         static = follow.wrench(hand).force
@@ -28,7 +28,7 @@ def test_along_the_curve_it_tends_to_the_static_field_with_the_square_of_the_wid
             assert gap >= bound * (1.0 - square / (2.0 * delta**2)) - 1e-12
 
 
-def test_to_the_point_it_tends_to_a_spring_and_damper_to_the_moving_point():
+def test_pull_to_the_point_with_infinite_width_is_a_spring_and_damper():
     for hand in HANDS:
         spring = 200.0 * (CIRCLE.point(hand.t) - hand.p) + 4.0 * (CIRCLE.velocity(hand.t) - hand.v)
         np.testing.assert_allclose(
@@ -37,7 +37,7 @@ def test_to_the_point_it_tends_to_a_spring_and_damper_to_the_moving_point():
 
 
 @pytest.mark.parametrize(("kernel", "arity"), [(mismatch, 4), (smooth_step, 1)])
-def test_the_compiled_law_is_the_one_on_symbols(kernel, arity):
+def test_compiled_scalar_kernel_matches_casadi(kernel, arity):
     casadi.GlobalOptions.setNumpyMode(1)
     symbols = [casadi.SX.sym(f"x{i}") for i in range(arity)]
     function = casadi.Function("law", symbols, [kernel.py_func(*symbols)])

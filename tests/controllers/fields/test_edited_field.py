@@ -1,4 +1,4 @@
-"""V + U: what was performed comes out again, as a flow and as a force; stacked, weighted, kept."""
+"""The edited field V + U: it reproduces performances as flow and as force, with weights, and can be stored."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ TIMES = np.arange(4000) * 1e-3
 
 
 def _pushed(rng, peak):
-    """A mass in the river that is pushed once in a random direction."""
+    """Path and push of a mass in the river that is pushed once in a random direction."""
     direction = rng.normal(size=3)
     start, duration = rng.uniform(0.5, 2.0), rng.uniform(0.3, 1.0)
     bump = np.sin(np.pi * np.clip((TIMES - start) / duration, 0.0, 1.0)) ** 2
@@ -28,7 +28,7 @@ def _pushed(rng, peak):
 
 
 @pytest.mark.slow
-def test_integrating_v_plus_u_gives_the_performed_curve_for_twenty_random_pushes():
+def test_flow_integrates_to_the_performed_curve_for_random_pushes():
     rng = np.random.default_rng(0)
     for _ in range(20):
         path, _ = _pushed(rng, rng.uniform(0.5, 3.0))
@@ -42,7 +42,7 @@ def test_integrating_v_plus_u_gives_the_performed_curve_for_twenty_random_pushes
         assert error.max() < 1e-3
 
 
-def test_a_light_mass_let_go_in_the_edited_field_traces_the_performed_curve_by_itself():
+def test_light_mass_in_the_edited_field_traces_the_performed_curve():
     rng = np.random.default_rng(1)
     for _ in range(5):
         path, push = _pushed(rng, 2.0)
@@ -51,12 +51,12 @@ def test_a_light_mass_let_go_in_the_edited_field_traces_the_performed_curve_by_i
         for mass in (0.02, 0.01):
             again, _ = mass_in(program, path[0], CIRCLE.velocity(0.0), np.zeros_like(push), mass)
             errors.append(np.sqrt(np.mean(np.sum((again - path) ** 2, axis=1))))
-        # What is left is its inertia.
+        # The remaining error is due to the inertia.
         assert errors[1] < 1e-3
         assert errors[1] < 0.6 * errors[0]
 
 
-def test_a_hand_that_moves_as_was_performed_feels_nothing_and_u_is_the_push_of_a_light_hand():
+def test_hand_on_the_performance_feels_nothing_and_u_equals_the_push():
     path, push = _pushed(np.random.default_rng(2), 2.0)
     performed = performance(TIMES, path)
     edited = Edited(RIVER, (performed,), (1.0,))
@@ -65,11 +65,11 @@ def test_a_hand_that_moves_as_was_performed_feels_nothing_and_u_is_the_push_of_a
         assert np.abs(edited.wrench(hand).force).max() < 1e-9
         felt = edited.wrench(hand).force - RIVER.wrench(hand).force
         inertia = 0.1 * performed.acceleration(t)
-        # The push less what moved the mass itself.
+        # The push less the force that accelerated the mass.
         np.testing.assert_allclose(felt, push[round(1e3 * t)] - inertia, atol=0.1)
 
 
-def test_recordings_stack_with_their_weights():
+def test_recordings_add_with_their_weights():
     rng = np.random.default_rng(3)
     one, two = (performance(TIMES, _pushed(rng, 2.0)[0]) for _ in range(2))
     both = Edited(RIVER, (one, two), (0.5, -2.0))
@@ -87,7 +87,7 @@ def test_recordings_stack_with_their_weights():
     np.testing.assert_array_equal(none.flow(1.0, CIRCLE.point(0.3)), RIVER.flow(1.0, CIRCLE.point(0.3)))
 
 
-def test_after_its_end_and_far_from_it_a_recording_is_not_felt():
+def test_recording_is_not_felt_after_its_end_or_far_away():
     performed = performance(TIMES, _pushed(np.random.default_rng(4), 2.0)[0])
     edited = Edited(RIVER, (performed,), (1.0,), epsilon=0.01)
     for p, t in ((CIRCLE.point(0.2), 4.5), (performed.point(1.5) + np.array([0.0, 0.0, 0.011]), 1.5)):
@@ -96,23 +96,23 @@ def test_after_its_end_and_far_from_it_a_recording_is_not_felt():
         np.testing.assert_array_equal(edited.flow(t, p), RIVER.flow(t, p))
 
 
-def test_a_recording_that_waits_goes_on_when_the_hand_comes_by_and_begins_again():
+def test_waiting_recording_resumes_when_the_hand_arrives_and_repeats():
     performed = performance(TIMES, _pushed(np.random.default_rng(5), 2.0)[0])
     program = Edited(RIVER, (performed,), (1.0,), pace="wait").program()
     slot = program.places()[1].memory  # the recording comes second
     clock = np.arange(9000) * 1e-3
     held = np.array([HandState.at([0.0, 0.0, 0.06], t=t).vector() for t in clock[:100]])
     along = np.array([HandState.at(performed.point(t % 4.0), t=0.1 + t).vector() for t in clock])
-    memory, places = program.fresh_memory(), []
+    memory, phases = program.fresh_memory(), []
     for hand in np.concatenate((held, along)):
         run_over(*program.compiled(), memory, hand[None], np.empty((1, 6)))
-        places.append(memory[slot + 1])
-    assert places[99] == 0.0
-    np.testing.assert_allclose(places[100:4000], clock[:3900], atol=2e-3)
-    np.testing.assert_allclose(places[-1], clock[-1] % 4.0, atol=0.02)
+        phases.append(memory[slot + 1])
+    assert phases[99] == 0.0
+    np.testing.assert_allclose(phases[100:4000], clock[:3900], atol=2e-3)
+    np.testing.assert_allclose(phases[-1], clock[-1] % 4.0, atol=0.02)
 
 
-def test_it_has_no_jump_in_space():
+def test_field_is_continuous_in_space():
     performed = performance(TIMES, _pushed(np.random.default_rng(6), 2.0)[0])
     rng = np.random.default_rng(7)
     program = Edited(River(CIRCLE, 0.03, 0.02), (performed,), (1.0,), epsilon=0.02).program()
@@ -129,13 +129,13 @@ FIELDS = [Edited(RIVER, (PERFORMED,), (1.0,), pace=pace) for pace in ("clock", "
 
 @settings(max_examples=60)
 @given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3), st.floats(0, 1e6))
-def test_it_is_finite_everywhere(p, v, t):
+def test_force_and_flow_are_finite_everywhere(p, v, t):
     for field in FIELDS:
         assert np.isfinite(field.wrench(HandState.at(p, v, t)).force).all()
         assert np.isfinite(field.flow(t, np.array(p))).all()
 
 
-def test_from_python_it_is_the_compiled_loops_to_the_last_bit():
+def test_wrench_equals_the_compiled_program():
     rng = np.random.default_rng(9)
     for field in FIELDS:
         for t in rng.uniform(0.0, 4.0, 20):
@@ -143,7 +143,7 @@ def test_from_python_it_is_the_compiled_loops_to_the_last_bit():
             np.testing.assert_array_equal(field.wrench(hand).force, force_of(field.program(), hand))
 
 
-def test_it_comes_back_from_its_arrays_to_the_last_bit():
+def test_field_round_trips_through_arrays():
     field = Edited(RIVER, (PERFORMED, PERFORMED), (0.3, -1.0), 0.02, "wait")
     arrays = field.arrays()
     np.testing.assert_array_equal(Edited.from_arrays(arrays).program().params, field.program().params)
@@ -155,7 +155,7 @@ def test_it_comes_back_from_its_arrays_to_the_last_bit():
         Edited.from_arrays({})
 
 
-def test_bad_numbers_of_an_edited_field_are_refused():
+def test_invalid_arguments_raise_parameter_error():
     with pytest.raises(ParameterError, match="1 performances need as many"):
         Edited(RIVER, (PERFORMED,), (1.0, 2.0))
     with pytest.raises(ParameterError, match="finite weights"):

@@ -1,4 +1,4 @@
-"""FOLLOW, the bunny and their programs: closed forms, continuity, limits, what is refused."""
+"""FOLLOW, the bunny and their programs: closed forms, continuity, limits and validation."""
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.own.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
+from tests.derivatives import central_differences
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
 SPEED = 2.0 * np.pi * 0.05 / 4.0
@@ -27,7 +28,7 @@ def _run(program, hand, memory):
     return wrench
 
 
-def test_the_window_is_one_at_the_centre_and_leaves_with_value_slope_and_curvature_zero():
+def test_window_leaves_its_edge_with_zero_value_slope_and_curvature():
     assert window(0.0) == 1.0
     assert window(1.0) == window(4.0) == window(np.inf) == 0.0
     h = 1e-4
@@ -36,7 +37,7 @@ def test_the_window_is_one_at_the_centre_and_leaves_with_value_slope_and_curvatu
     assert value[1:] == [0.0, 0.0]
 
 
-def test_follow_on_a_circle_is_the_closed_form():
+def test_follow_on_a_circle_matches_closed_form():
     rng = np.random.default_rng(0)
     follow = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=0.1)
     for _ in range(50):
@@ -49,15 +50,15 @@ def test_follow_on_a_circle_is_the_closed_form():
         np.testing.assert_allclose(follow.wrench(HandState.at(p, v)).force, expected, atol=1e-4)
 
 
-def test_a_hand_that_moves_with_the_curve_feels_nothing():
+def test_hand_moving_with_the_curve_feels_no_force():
     follow = Follow(CIRCLE, k_r=200.0, b_d=4.0)
     for t in np.linspace(0.0, 4.0, 17):
         force = follow.wrench(HandState.at(CIRCLE.point(t), CIRCLE.velocity(t))).force
         assert np.abs(force).max() < 1e-12
 
 
-def test_a_hand_beside_a_parallel_flow_keeps_the_curves_pace_and_one_beside_the_papers_does_not():
-    rng, step = np.random.default_rng(4), 1e-4
+def test_parallel_flow_keeps_the_pace_beside_the_curve_unlike_the_papers():
+    rng = np.random.default_rng(4)
     t = np.linspace(0.0, 4.0, 41)
     bent = np.column_stack([0.05 * np.cos(np.pi * t / 2), 0.04 * np.sin(np.pi * t / 2), 0.02 * np.cos(np.pi * t)])
     curve = Trajectory(t, bent, periodic=True)
@@ -67,22 +68,25 @@ def test_a_hand_beside_a_parallel_flow_keeps_the_curves_pace_and_one_beside_the_
         p = curve.point(phase) + 0.2 / float(curve.curvature(phase)) * normal / np.linalg.norm(normal)
         for row, parallel in zip(rates, (True, False), strict=True):
             law = Follow(curve, k_r=200.0, b_d=4.0, epsilon=np.inf, parallel=parallel)
-            # The velocity at which the damper gives no force along the curve; the phase by the curve's own search.
+            # The velocity at which the damper gives no force along the curve, and the rate of the nearest phase at it.
             along = law.wrench(HandState.at(p)).force @ v / (4.0 * v @ v) * v
-            ahead, behind = (closest_phase(curve.packed(), 0, *(p + d * along), phase)[0] for d in (step, -step))
-            row[k] = (ahead - behind) / (2.0 * step)
+
+            def phase_at(h, p=p, along=along, phase=phase):
+                return closest_phase(curve.packed(), 0, *(p + h * along), phase)[0]
+
+            row[k] = central_differences(phase_at, 0.0, 1e-4)
     np.testing.assert_allclose(rates[0], 1.0, atol=1e-5)
     assert np.abs(rates[1] - 1.0).max() > 0.15
 
 
 @pytest.mark.parametrize(("radius", "pace"), [(0.03, 0.6), (0.01, 0.5), (0.07, 1.4), (0.2, 1.5)])
-def test_a_parallel_flow_turns_with_the_circle_and_is_held(radius, pace):
+def test_parallel_flow_turns_with_the_circle_up_to_its_bounds(radius, pace):
     law = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=np.inf, parallel=True)
     force = law.wrench(HandState.at(np.array([radius, 0.0, 0.0]))).force
     np.testing.assert_allclose(force, [200.0 * (0.05 - radius), 4.0 * pace * SPEED, 0.0], atol=1e-4)
 
 
-def test_force_has_no_jump_along_lines_through_the_tube():
+def test_force_is_continuous_along_lines_through_the_tube():
     rng = np.random.default_rng(1)
     # A tube inside the reach: there the closest point is unique, so the law must be continuous everywhere.
     program = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=0.03).program()
@@ -97,13 +101,13 @@ def test_force_has_no_jump_along_lines_through_the_tube():
             pair = [_run(program, HandState.at(start + (s + d) * direction), memory)[:3] for d in (0.0, 1e-12)]
             assert np.abs(pair[1] - pair[0]).max() < 1e-9
             forces.append(pair[0])
-        # 0.4 mm apart a force of stiffness k and at most 12 N cannot leap.
+        # Between points 0.4 mm apart a force of stiffness k and at most 12 N changes little.
         assert np.abs(np.diff(forces, axis=0)).max() < 1.0
 
 
 @settings(max_examples=100)
 @given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3), st.floats(0, 1e6))
-def test_every_law_is_finite_everywhere(p, v, t):
+def test_force_of_every_law_is_finite_everywhere(p, v, t):
     for law in LAWS:
         assert np.isfinite(law.wrench(HandState.at(p, v, t)).force).all()
 
@@ -115,12 +119,12 @@ LAWS = [
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_on_the_medial_axis_and_at_rest_a_law_is_finite(law):
+def test_force_on_the_medial_axis_and_at_rest_is_finite(law):
     for p in ([0.0, 0.0, 0.0], [0.0, 0.0, 0.03], [0.05, 0.0, 0.0]):
         assert np.isfinite(law.wrench(HandState.at(p)).force).all()
 
 
-def test_a_hand_that_is_not_finite_gives_a_force_that_is_not_finite_so_that_safety_sees_it():
+def test_non_finite_hand_gives_non_finite_force():
     program = LAWS[0].program()
     memory = program.fresh_memory()
     assert np.isnan(_run(program, HandState.at([np.nan, 0, 0]), memory)[:3]).all()
@@ -130,7 +134,7 @@ def test_a_hand_that_is_not_finite_gives_a_force_that_is_not_finite_so_that_safe
     assert np.isfinite(_run(program, HandState.at([0.05, 0, 0]), memory)).all()
 
 
-def test_a_bunny_that_is_felt_everywhere_and_pulls_along_the_curve_is_follow():
+def test_bunny_with_infinite_width_along_the_curve_equals_follow():
     rng = np.random.default_rng(2)
     bunny = Bunny(CIRCLE, 200.0, 4.0, np.inf, "along", "clock")
     follow = Follow(CIRCLE, 200.0, 4.0, epsilon=np.inf)
@@ -141,7 +145,7 @@ def test_a_bunny_that_is_felt_everywhere_and_pulls_along_the_curve_is_follow():
         np.testing.assert_allclose(narrow.wrench(hand).force, follow.wrench(hand).force, rtol=1e-8, atol=1e-12)
 
 
-def test_the_pull_to_the_bunny_is_a_spring_and_damper_weighted_by_the_gaussian():
+def test_bunny_is_a_spring_and_damper_weighted_by_a_gaussian():
     bunny = Bunny(CIRCLE, 200.0, 4.0, 0.02, "point", "clock")
     p, v, t = np.array([0.03, 0.03, 0.01]), np.array([0.1, -0.2, 0.0]), 4.0 + 0.7
     away = CIRCLE.point(t) - p
@@ -158,7 +162,7 @@ def _bunny_phases(pace, hands):
     return np.array(phases)
 
 
-def test_a_bunny_by_the_clock_runs_on_and_one_that_waits_waits_for_a_held_hand():
+def test_clocked_bunny_runs_on_and_waiting_bunny_waits_for_a_held_hand():
     held = [CIRCLE.point(0.5)] * 3000
     clock, waits = _bunny_phases("clock", held), _bunny_phases("wait", held)
     np.testing.assert_allclose(clock, np.arange(3000) * 1e-3, atol=1e-12)
@@ -170,13 +174,13 @@ def test_a_bunny_by_the_clock_runs_on_and_one_that_waits_waits_for_a_held_hand()
     assert np.diff(waits)[-1] < 0.2e-3
 
 
-def test_a_bunny_that_waits_keeps_the_clocks_pace_for_a_hand_that_keeps_up():
+def test_waiting_bunny_keeps_pace_with_a_hand_that_keeps_up():
     moving = [CIRCLE.point(0.5 + k * 1e-3) for k in range(5000)]
     phases = _bunny_phases("wait", moving)
     assert np.linalg.norm(CIRCLE.point(phases) - moving, axis=1).max() < 1e-4
 
 
-def test_programs_add_and_python_may_fill_in_a_wrench():
+def test_programs_add_and_external_wrench_enters_the_sum():
     inner, outer = Trajectory.circle(0.03, 2.0), Trajectory.circle(0.07, 3.0)
     laws = [Follow(inner, 100.0, 1.0), Follow(outer, 50.0, 2.0), Bunny(outer, 30.0, 1.0, 0.05)]
     hand = HandState.at([0.045, 0.01, 0.0], [0.0, 0.1, 0.0], 0.3)
@@ -187,14 +191,14 @@ def test_programs_add_and_python_may_fill_in_a_wrench():
     wrench = _run(program, hand, memory)
     force = sum(law.wrench(hand).force for law in laws)
     np.testing.assert_allclose(wrench, np.concatenate([force + np.array([1, 2, 3]), [4, 5, 6]]), rtol=1e-14)
-    # The trace tells of the nearest curve, here the inner one.
+    # The trace is of the nearest curve, here the inner one.
     assert memory[TRACE_ROW] == 0
     distance = np.hypot(0.045, 0.01) - 0.03
     assert memory[TRACE_DISTANCE] == pytest.approx(distance, abs=1e-7)
     np.testing.assert_allclose(memory[TRACE_POINT : TRACE_POINT + 3], inner.point(memory[TRACE_PHASE]), atol=1e-15)
 
 
-def test_memory_changes_the_cost_and_not_the_value():
+def test_warm_started_memory_does_not_change_the_force():
     program = Follow(CIRCLE, 200.0, 4.0).program()
     memory = program.fresh_memory()
     for t in np.linspace(0, 4, 50):
@@ -203,7 +207,7 @@ def test_memory_changes_the_cost_and_not_the_value():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: Follow(CIRCLE, -1.0, 1.0), "k_r must be finite and at least 0 N/m, got -1.0"),
         (lambda: Follow(CIRCLE, 1.0, np.inf), "b_d"),
@@ -217,13 +221,13 @@ def test_memory_changes_the_cost_and_not_the_value():
         (lambda: Program(np.zeros((0, 4), np.int64), np.zeros(0), np.zeros(8)), "one wrench"),
     ],
 )
-def test_bad_gains_are_refused_with_the_numbers(make, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_gains_raise_parameter_error(make, message):
+    with pytest.raises(ParameterError, match=message):
         make()
 
 
 @pytest.mark.parametrize("law", LAWS[:2], ids=["follow", "bunny by the clock"])
-def test_a_mass_that_is_let_go_traces_the_curve_at_its_pace(law):
+def test_released_mass_traces_the_curve_at_its_pace(law):
     program, mass, period = law.program(), 0.1, 1e-3
     memory = program.fresh_memory()
     p, v = CIRCLE.point(0.0) + np.array([0.008, 0.0, 0.005]), np.zeros(3)

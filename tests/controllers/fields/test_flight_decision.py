@@ -1,4 +1,4 @@
-"""When a led figure flies: decided by its pace where a stance is entered, carried out in it, never in the air."""
+"""The decision of a led figure to fly: taken by its pace at the start of a stance, carried out within it."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def decided(shares, speed, memory=None):
     return np.array(held), memory
 
 
-def test_stances_are_where_a_foot_bears():
+def test_stances_are_intervals_with_a_foot_on_the_floor():
     np.testing.assert_allclose(RUN.stances, [[0.0, 32 / 88], [0.5, 32 / 88]])
     turned = Gait(2.2, 3.0, np.roll(RUN.support, -10), 0.6)
     np.testing.assert_allclose(np.sort(turned.stances[:, 0]), [34 / 88, 78 / 88])
@@ -36,25 +36,25 @@ def test_stances_are_where_a_foot_bears():
 
 
 @pytest.mark.parametrize(("speed", "ends"), [(2.8, 0.0), (2.6, 1.0), (-2.9, 1.0)])
-def test_from_the_ground_it_flies_from_the_pace_of_taking_off_on(speed, ends):
+def test_grounded_figure_takes_off_above_the_take_off_pace(speed, ends):
     _, memory = decided([-1.0], speed)
     held, _ = decided(np.linspace(0.0, 1.0, 201), speed, memory)
     assert held[0] == 1.0
     assert held[-1] == ends
-    # Pushing off is the clip's own.
+    # The end of the stance is the clip's own push-off.
     assert np.all(held[np.linspace(0.0, 1.0, 201) > WITHIN] == ends)
 
 
 @pytest.mark.parametrize(("speed", "ends"), [(2.6, 0.0), (2.4, 1.0)])
-def test_having_flown_it_goes_on_until_it_is_slower_than_landing(speed, ends):
+def test_flying_figure_lands_below_the_landing_pace(speed, ends):
     held, memory = decided([-1.0], 3.0, np.zeros(4))
     held, memory = decided(np.linspace(0.0, 1.0, 201), speed, memory)
     assert held[-1] == pytest.approx(ends, abs=1e-12)
-    # Landing is the clip's own.
+    # The start of the stance is the clip's own landing.
     assert np.all(held[np.linspace(0.0, 1.0, 201) < 1.0 - WITHIN] == 0.0)
 
 
-def test_what_is_decided_does_not_change_within_the_stance_and_nothing_does_in_the_air():
+def test_decision_holds_during_the_stance_and_in_the_air():
     _, memory = decided([-1.0], 3.0)
     _, memory = decided(np.linspace(0.0, 0.3, 50), 3.0, memory)
     held, memory = decided(np.linspace(0.3, 1.0, 50), 0.5, memory)
@@ -63,7 +63,7 @@ def test_what_is_decided_does_not_change_within_the_stance_and_nothing_does_in_t
     np.testing.assert_array_equal(held, 0.0)
 
 
-def test_going_back_in_a_stance_takes_back_what_was_done_in_it():
+def test_moving_back_in_a_stance_reverses_the_blend():
     _, memory = decided([-1.0], 3.0)
     shares = np.linspace(0.0, 0.6, 61)
     there, memory = decided(shares, 3.0, memory)
@@ -72,7 +72,7 @@ def test_going_back_in_a_stance_takes_back_what_was_done_in_it():
 
 
 def led(seconds):
-    """A hand that leads straight on at the gait's own pace for three seconds and then stops."""
+    """Argument, flight blend and speed (n, 3) for a hand that leads straight at the gait's pace for 3 s and stops."""
     program = Leading(WALKING).program()
     memory, walkers, hand = program.fresh_memory(), program.fresh_walkers(), np.zeros(15)
     hand[4] = 1.0
@@ -86,35 +86,35 @@ def led(seconds):
     return trail
 
 
-def test_led_from_rest_to_rest_it_flies_only_at_the_pace_for_it():
+def test_led_figure_flies_only_at_flying_pace():
     s, held, speed = led(7.0).T
     lap = s / RUN.stride
     flying = RUN.support[(88 * (lap - np.floor(lap))).astype(int)] == 0
     assert held[0] == 1.0
     assert held[-1] == 1.0
     assert held.min() == 0.0
-    # In the air either all is flown or nothing, and what is flown has nearly the pace at which that was decided.
+    # In the air the blend is 0 or 1, and the pace in flight is nearly that of the decision.
     assert np.minimum(held[flying], 1.0 - held[flying]).max() < 1e-6
     flown = flying & (held < 1e-6)
     assert flown.sum() > 200
     assert speed[flown].min() > 0.75 * RUN.speed
     assert speed[flown].max() <= 1.05 * RUN.speed
-    # And flying it hardly hastens.
-    haste = np.abs(np.diff(speed)) / RATE
-    assert haste[held[1:] < 0.5].max() < 1.001 * WALKING.haste
-    assert haste.max() == pytest.approx(WALKING.pull, rel=1e-3)
-    # The form changes smoothly with the place.
+    # In flight it hardly accelerates.
+    acceleration = np.abs(np.diff(speed)) / RATE
+    assert acceleration[held[1:] < 0.5].max() < 1.001 * WALKING.haste
+    assert acceleration.max() == pytest.approx(WALKING.pull, rel=1e-3)
+    # The blend changes smoothly with the argument.
     assert np.abs(np.diff(held)).max() < 0.012
 
 
 @pytest.mark.parametrize(
-    ("numbers", "says"),
+    ("numbers", "message"),
     [
         ({"landing": 0.95}, "takes off at no lower pace"),
         ({"haste": 0.0}, "haste"),
         ({"take_off": np.nan}, "take_off"),
     ],
 )
-def test_bad_numbers_of_flights_are_refused(numbers, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_flight_parameters_raise_parameter_error(numbers, message):
+    with pytest.raises(ParameterError, match=message):
         Walking(RUN, **numbers)

@@ -1,4 +1,4 @@
-"""The governor: no force inside the interval, a continuous one outside it, along the curve and only near it."""
+"""The governor: no force inside the speed interval, outside it a continuous one along the curve and near it."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def on_curve(phase, speed):
 @pytest.mark.parametrize(
     ("speed", "force"), [(0.0, 0.48), (0.05, 0.08), (0.06, 0.0), (0.09, 0.0), (0.12, 0.0), (0.2, -0.64), (-0.05, 0.88)]
 )
-def test_in_flight_a_slow_hand_is_urged_on_and_a_fast_one_held_back(speed, force):
+def test_slow_hand_is_pulled_forward_and_fast_hand_held_back_in_flight(speed, force):
     felt = GOVERNOR.wrench(on_curve(FLIGHT, speed))
     along = CIRCLE.velocity(FLIGHT) / np.linalg.norm(CIRCLE.velocity(FLIGHT))
     np.testing.assert_allclose(felt.force, force * along, atol=1e-12)
@@ -36,7 +36,7 @@ def test_in_flight_a_slow_hand_is_urged_on_and_a_fast_one_held_back(speed, force
 
 @settings(max_examples=60)
 @given(st.floats(0.0, 4.0), st.floats(-0.3, 0.5), st.floats(0.0, 0.03))
-def test_it_is_its_formula_with_the_interval_by_linear_interpolation(phase, speed, off):
+def test_force_matches_formula_with_interpolated_interval(phase, speed, off):
     outward = CIRCLE.point(phase) / 0.05
     hand = on_curve(phase, speed)
     felt = GOVERNOR.wrench(HandState.at(hand.p + off * outward, hand.v)).force
@@ -47,7 +47,7 @@ def test_it_is_its_formula_with_the_interval_by_linear_interpolation(phase, spee
     np.testing.assert_allclose(felt, force * along, atol=1e-6)
 
 
-def test_the_force_is_continuous_in_place_and_in_speed():
+def test_force_is_continuous_in_position_and_speed():
     program = GOVERNOR.program()
     start, end = CIRCLE.point(2.1), CIRCLE.point(2.5)
     slow = 0.01 * CIRCLE.velocity(2.3) / np.linalg.norm(CIRCLE.velocity(2.3))
@@ -57,14 +57,14 @@ def test_the_force_is_continuous_in_place_and_in_speed():
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() <= 8.0 * 0.00025 * (1.0 + 1e-9)
 
 
-def test_it_never_gives_more_power_than_its_drag_at_half_the_least_speed():
+def test_power_is_at_most_that_at_half_the_least_speed():
     powers = [
         GOVERNOR.wrench(hand).force @ hand.v for hand in (on_curve(FLIGHT, s) for s in np.linspace(-0.2, 0.3, 501))
     ]
     assert max(powers) == pytest.approx(0.25 * 8.0 * 0.06**2, rel=1e-3)
 
 
-def test_it_adds_to_a_field_and_is_the_compiled_law_in_the_sum():
+def test_sum_with_follow_equals_compiled_program():
     follow = Follow(CIRCLE, 300.0, 4.0, 0.02)
     both = follow.program() + GOVERNOR.program()
     rng = np.random.default_rng(3)
@@ -76,14 +76,14 @@ def test_it_adds_to_a_field_and_is_the_compiled_law_in_the_sum():
         np.testing.assert_allclose(wrench[:3], follow.wrench(hand).force + GOVERNOR.wrench(hand).force, atol=1e-9)
 
 
-def test_where_a_curve_rests_there_is_no_force():
+def test_no_force_where_the_curve_rests():
     line = Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], ends="clamped")
     governor = Governor(line, [[0.05, 0.1], [0.05, 0.1]])
     assert not governor.wrench(HandState.at([-0.01, 0.0, 0.0], [0.3, 0.0, 0.0])).force.any()
     assert governor.wrench(HandState.at([0.05, 0.0, 0.0])).force[0] == pytest.approx(0.4)
 
 
-def test_a_hand_that_is_nowhere_reaches_the_limiter_as_it_is():
+def test_nan_velocity_gives_non_finite_force():
     assert not np.isfinite(GOVERNOR.wrench(HandState.at([0.0475, 0.0, 0.0], [np.nan, 0.0, 0.0])).force).all()
 
 
@@ -97,6 +97,6 @@ def test_a_hand_that_is_nowhere_reaches_the_limiter_as_it_is():
         ({"epsilon": 0.0}, "epsilon"),
     ],
 )
-def test_what_makes_no_governor_is_refused(arguments, message):
+def test_invalid_governor_raises_parameter_error(arguments, message):
     with pytest.raises(ParameterError, match=message):
         Governor(**({"curve": CIRCLE, "speeds": SPEEDS} | arguments))

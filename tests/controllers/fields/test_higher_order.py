@@ -1,4 +1,4 @@
-"""Fields of higher order: which river takes a hand, at crossings of every kind."""
+"""Fields of higher order: the selection of a river by the hand's velocity, at crossings of every kind."""
 
 import numpy as np
 import pytest
@@ -37,22 +37,22 @@ def _run(program, hands):
     return wrenches[:, :3], memory
 
 
-def test_branches_are_the_minima_of_distance_within_the_ball():
+def test_branches_are_the_local_minima_of_distance_within_the_ball():
     rng = np.random.default_rng(0)
     curve = Trajectory(*_eight_samples(), periodic=True)
-    blob, found, twice = curve.packed(), np.empty((BRANCHES, 2)), 0
+    blob, phases_distances, double_branches = curve.packed(), np.empty((BRANCHES, 2)), 0
     phases = np.linspace(0.0, 4.0, 8001)[:-1]
     for _ in range(400):
         p = curve.point(rng.uniform(0, 4)) * rng.choice([0.05, 1.0]) + rng.normal(size=3) * 0.005
         square = ((curve.point(phases) - p) ** 2).sum(1)
-        low = (square <= np.roll(square, 1)) & (square < np.roll(square, -1)) & (square < 0.012**2)
-        count = branches(blob, 0, *p, 0.012, found)
-        assert count == low.sum()
-        np.testing.assert_allclose(np.sort(found[:count, 0]) % 4.0, phases[low], atol=5.1e-4)
+        is_minimum = (square <= np.roll(square, 1)) & (square < np.roll(square, -1)) & (square < 0.012**2)
+        count = branches(blob, 0, *p, 0.012, phases_distances)
+        assert count == is_minimum.sum()
+        np.testing.assert_allclose(np.sort(phases_distances[:count, 0]) % 4.0, phases[is_minimum], atol=5.1e-4)
         if count:
-            assert found[:count, 1].min() == pytest.approx(closest_phase(blob, 0, *p, np.nan)[1], abs=1e-11)
-        twice += count == 2
-    assert twice > 20
+            assert phases_distances[:count, 1].min() == pytest.approx(closest_phase(blob, 0, *p, np.nan)[1], abs=1e-11)
+        double_branches += count == 2
+    assert double_branches > 20
 
 
 def _eight_samples():
@@ -62,7 +62,7 @@ def _eight_samples():
     return 4.0 * angle / (2.0 * np.pi), points
 
 
-def test_a_ball_over_the_whole_curve_has_one_branch_and_one_across_the_seam_is_one():
+def test_one_branch_for_a_ball_over_the_whole_curve_or_across_the_seam():
     circle, found = Trajectory.circle(0.05, 4.0), np.empty((BRANCHES, 2))
     blob = circle.packed()
     for phase in (0.0, 1e-9, 4.0 - 1e-9, 0.01, 1.0):
@@ -75,7 +75,7 @@ def test_a_ball_over_the_whole_curve_has_one_branch_and_one_across_the_seam_is_o
 
 
 def _reference(rivers, p, v, admission, sigma):
-    """The smooth field by its formula, in NumPy, for circles and straight lines through densely sampled phases."""
+    """The smooth field by its formula in NumPy, with the nearest of densely sampled phases."""
     null, total, force = np.exp(-(admission**2) / (2 * sigma**2)), 0.0, np.zeros(3)
     for river in rivers:
         t = np.linspace(river.curve.start, river.curve.end, 200001)
@@ -91,7 +91,7 @@ def _reference(rivers, p, v, admission, sigma):
 
 
 @pytest.mark.slow
-def test_the_smooth_field_is_its_formula():
+def test_smooth_field_matches_its_formula():
     rng = np.random.default_rng(1)
     rivers = (straight_river(0.0), straight_river(40.0), River(Trajectory.circle(0.05, 4.0), 0.03, 0.02, 3.0))
     field = HigherOrder(_bundle(*rivers), *SCALE)
@@ -101,7 +101,7 @@ def test_the_smooth_field_is_its_formula():
         np.testing.assert_allclose(field.wrench(HandState.at(p, v)).force, expected, atol=2e-4)
 
 
-def test_at_crossings_a_hand_on_river_1_feels_the_documented_share_of_river_2():
+def test_hand_on_one_river_at_a_crossing_feels_the_documented_share_of_the_other():
     for degrees in range(0, 181, 5):
         row = crossing(float(degrees))
         gap = 2.0 * SPEED * np.sin(np.radians(degrees) / 2.0)
@@ -119,13 +119,13 @@ def test_at_crossings_a_hand_on_river_1_feels_the_documented_share_of_river_2():
 
 
 def _mismatch(river, hand):
-    """Of a straight river through the origin."""
+    """Mismatch [m/s] of a hand and a straight river through the origin."""
     x = river.curve.velocity(0.8)
     e, y = hand.v - x, (x * (x @ hand.p) / (x @ x) - hand.p) / river.tau
     return np.sqrt(e @ e - (e @ y) ** 2 / (y @ y + x @ x))
 
 
-def test_the_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
+def test_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
     rng = np.random.default_rng(2)
     compared = 0
     for _ in range(200):
@@ -141,7 +141,7 @@ def test_the_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
     assert compared > 100
 
 
-def test_direction_and_speed_decide():
+def test_direction_and_speed_decide_the_admission():
     bundle = _bundle(straight_river(0.0))
     field = HigherOrder(bundle, 0.3 * SPEED, 0.05 * SPEED, 0.0, "discrete")
     off = [0.0, 0.004, 0.0]
@@ -151,16 +151,16 @@ def test_direction_and_speed_decide():
 
 
 @pytest.mark.parametrize("form", ["smooth", "discrete"])
-def test_a_river_takes_the_speeds_that_it_admits_at_each_phase(form):
+def test_river_admits_the_speeds_of_its_interval_at_each_phase(form):
     line = straight_river(0.0)
     river = River(line.curve, drag=DRAG, speeds=[[0.02, 0.03], [0.10, 0.20]])
     field = HigherOrder(_bundle(river), 0.01, 0.001, 0.0, form)
     for share in (0.1, 0.5, 0.9):
         p = line.curve.point(1.6 * share) + np.array([0.0, 0.003, 0.0])
         least, greatest = 0.02 + 0.08 * share, 0.03 + 0.17 * share
-        for speed, taken in ((least - 0.015, 0), (least, 1), (greatest, 1), (greatest + 0.015, 0)):
+        for speed, admitted in ((least - 0.015, 0), (least, 1), (greatest, 1), (greatest + 0.015, 0)):
             force = np.linalg.norm(field.wrench(HandState.at(p, [speed, 0, 0])).force)
-            assert (force > 0.05) == taken
+            assert (force > 0.05) == admitted
 
 
 def test_hysteresis_keeps_a_hand_between_admission_and_release():
@@ -172,11 +172,11 @@ def test_hysteresis_keeps_a_hand_between_admission_and_release():
     assert memory[TRACE_RIVER] == 0.0
 
 
-def test_nearly_parallel_rivers_discrete_the_one_that_has_the_hand_keeps_it_to_the_edge_of_its_tube():
+def test_discrete_river_keeps_the_hand_to_the_edge_of_its_tube_at_nearly_parallel_rivers():
     bundle = _pair(4.0)
     program = HigherOrder(bundle, *SCALE, "discrete").program()
     x, second = straight_river(0.0).curve.velocity(0.8), straight_river(4.0).curve
-    # From the crossing a hand is carried along river 2 for 0.7 s, then off to where only river 2 is.
+    # The hand follows river 2 from the crossing for 0.7 s, then moves to where only river 2 is.
     hands = [HandState.at(second.point(t), x) for t in np.linspace(0.8, 1.5, 50)]
     forces, memory = _run(program, hands)
     assert memory[TRACE_RIVER] == 0.0
@@ -186,41 +186,41 @@ def test_nearly_parallel_rivers_discrete_the_one_that_has_the_hand_keeps_it_to_t
     assert memory[TRACE_RIVER] == 1.0
 
 
-def test_opposite_rivers_do_not_feel_each_other():
+def test_opposite_rivers_do_not_affect_each_other():
     row = crossing(180.0)
     assert row.discrete_passing < 1e-12
     assert row.smooth_passing < 1e-9
-    back = HigherOrder(_pair(180.0), *SCALE, "discrete").program()
-    _, memory = _run(back, [HandState.at([0, 0, 0], straight_river(180.0).curve.velocity(0.8))])
+    program = HigherOrder(_pair(180.0), *SCALE, "discrete").program()
+    _, memory = _run(program, [HandState.at([0, 0, 0], straight_river(180.0).curve.velocity(0.8))])
     assert memory[TRACE_RIVER] == 1.0
 
 
-def test_coincident_rivers_are_felt_as_one():
+def test_coincident_rivers_act_as_one():
     river = straight_river(0.0)
     hand = HandState.at([0.01, 0.004, 0.0], [0.9 * SPEED, 0.0, 0.01])
     one, three = (HigherOrder(_bundle(*[river] * n), *SCALE) for n in (1, 3))
-    alone = one.wrench(hand).force
-    # Only the null weight is shared out anew.
-    np.testing.assert_allclose(three.wrench(hand).force, alone, rtol=1e-3)
+    single = one.wrench(hand).force
+    # They differ only by the share of the null weight.
+    np.testing.assert_allclose(three.wrench(hand).force, single, rtol=1e-3)
     discrete = HigherOrder(_bundle(river, river), *SCALE, "discrete")
     np.testing.assert_allclose(discrete.wrench(hand).force, river.wrench(hand).force, atol=1e-15)
 
 
 @pytest.mark.parametrize("form", ["smooth", "discrete"])
-def test_a_mass_runs_straight_through_the_crossing_of_a_figure_of_eight(form):
+def test_mass_passes_straight_through_the_crossing_of_a_figure_eight(form):
     curve = eight()
     program = HigherOrder(_bundle(River(curve, 0.012, 0.013, DRAG)), *(2.0 * s for s in SCALE), form).program()
     path, memory = mass_in(program, curve.point(0.0), curve.velocity(0.0), np.zeros((8000, 3)))
-    # Two laps later it is where the river would have carried it.
+    # After two laps it is where the river should have carried it.
     assert memory[TRACE_PHASE] == pytest.approx(0.0, abs=0.05) or memory[TRACE_PHASE] == pytest.approx(4.0, abs=0.05)
-    quarter = path[2000:4000, 0]
+    second_half = path[2000:4000, 0]
     assert path[:2000, 0].min() > -0.004
-    assert quarter.max() < 0.004
+    assert second_half.max() < 0.004
     assert memory[TRACE_DISTANCE] < 1e-3
 
 
 def _carried_along_the_wave(form, lift):
-    """Memory and last point of a mass that starts on the wave and is pushed up at its crest, 1.5 s later."""
+    """Memory and position, after 1.5 s, of a mass that starts on the wave and is pushed up at its crest."""
     bundle = river_bundle(Trajectory.circle(0.0477, 4.0), 0.025, 4.0 / 300.0, 4.0, 0.012)
     wave, push = bundle["wave"].curve, np.zeros((1500, 3))
     # The wave touches the highest river at its crest, at 0.5 s, and is lowest at 1.5 s.
@@ -231,7 +231,7 @@ def _carried_along_the_wave(form, lift):
     return memory, path[-1]
 
 
-def test_at_a_tangential_crossing_a_hand_can_change_over_and_without_a_push_it_does_not():
+def test_hand_changes_rivers_at_a_tangential_crossing_only_if_pushed():
     memory, end = _carried_along_the_wave("discrete", 0.0)
     assert memory[TRACE_RIVER] == 1.0
     assert end[2] == pytest.approx(-0.015, abs=3e-4)
@@ -241,46 +241,46 @@ def test_at_a_tangential_crossing_a_hand_can_change_over_and_without_a_push_it_d
 
 
 @pytest.mark.parametrize("lift", [0.0, 0.3, 0.6])
-def test_the_smooth_field_blends_rivers_that_touch_and_does_not_throw_the_hand_out(lift):
+def test_smooth_field_blends_touching_rivers_without_losing_the_hand(lift):
     memory, _ = _carried_along_the_wave("smooth", lift)
     assert memory[TRACE_RIVER] >= 0.0
     assert memory[TRACE_DISTANCE] < 0.005
 
 
 def _through_a_crossing(degrees, sigma):
-    """Memory and last point of a mass that nobody pushes, 0.1 mm beside river 1, through a crossing."""
+    """Memory and last point of a free mass that passes a crossing 0.1 mm beside river 1."""
     program = HigherOrder(_pair(degrees), R, sigma).program()
     start, push = np.array([-0.045, 1e-4, 0.0]), np.zeros((1200, 3))
     path, memory = mass_in(program, start, np.array([SPEED, 0.0, 0.0]), push)
     return memory, path[-1]
 
 
-def test_the_smooth_mode_throws_no_hand_out_and_leaves_it_on_its_river_from_30_degrees_on():
+def test_smooth_field_loses_no_hand_and_keeps_it_on_its_river_from_30_degrees():
     for degrees in (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 45.0, 60.0, 90.0, 135.0, 180.0):
         memory, end = _through_a_crossing(degrees, SIGMA["smooth"] * SPEED)
         assert memory[TRACE_RIVER] >= 0.0
-        # Up to 20° a mass without friction may be taken along, or still be between the rivers, 45 mm on.
+        # Up to 25° a mass without friction may change rivers or still be between them after 45 mm.
         if degrees >= 30.0:
             assert memory[TRACE_RIVER] == 0.0
             assert abs(end[1]) < 2e-3
-    # A wider blend takes hands along between the rivers.
+    # A wider blend carries the hand between the rivers.
     memory, end = _through_a_crossing(30.0, 0.15 * SPEED)
     assert abs(end[1]) > 3e-3
 
 
 @pytest.mark.parametrize("form", ["smooth", "discrete"])
-def test_a_hand_that_springs_back_to_its_river_is_not_let_go_for_its_speed(form):
+def test_hand_returning_to_its_river_is_not_released_for_its_speed(form):
     circle = Trajectory.circle(0.05, 4.0)
     program = HigherOrder(_bundle(River(circle, 0.02, 4.0 / 300.0, DRAG)), *SCALE, form).program()
     away = circle.point(0.0) + np.array([0.006, 0.0, 0.004])
     path, memory = mass_in(program, away, circle.velocity(0.0), np.zeros((1000, 3)))
-    # It comes back with more than twice the speed of the current.
+    # It returns at more than twice the speed of the current.
     assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() / 1e-3 > 2.0 * SPEED
     assert memory[TRACE_RIVER] == 0.0
     assert memory[TRACE_DISTANCE] < 2e-4
 
 
-def test_the_smooth_field_has_no_jump_along_lines_through_edges_centres_and_crossings():
+def test_smooth_field_is_continuous_in_space():
     rng = np.random.default_rng(5)
     bundles = [
         _bundle(straight_river(0.0), straight_river(70.0), straight_river(110.0)),
@@ -296,7 +296,7 @@ def test_the_smooth_field_has_no_jump_along_lines_through_edges_centres_and_cros
             assert largest_jump(program, centre - direction, centre + direction, v) < 1e-9
 
 
-def test_the_smooth_field_is_continuous_in_velocity():
+def test_smooth_field_is_continuous_in_velocity():
     program = HigherOrder(_pair(60.0), *SCALE).program()
     rng = np.random.default_rng(6)
     for _ in range(20):
@@ -317,25 +317,25 @@ FIELDS = [
 
 @settings(max_examples=100)
 @given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3))
-def test_it_is_finite_everywhere(p, v):
+def test_force_is_finite_everywhere(p, v):
     for field in FIELDS:
         assert np.isfinite(field.wrench(HandState.at(p, v)).force).all()
 
 
-def test_it_is_finite_on_the_medial_axis_at_rest_and_where_samples_coincide():
+def test_force_is_finite_on_the_medial_axis_and_where_the_curve_halts():
     for field in FIELDS:
         for p in ([0, 0, 0], [0, 0, 0.01], [0.05, 0, 0], [0.02, 0, 0], [0.0201, 0, 0], [1e12, 0, 0]):
             for v in ([0, 0, 0], [SPEED, 0, 0], [1e9, 0, 0]):
                 assert np.isfinite(field.wrench(HandState.at(p, v)).force).all()
 
 
-def test_a_hand_that_is_not_finite_gives_no_number():
+def test_non_finite_hand_gives_nan():
     for field in FIELDS:
         assert np.isnan(field.wrench(HandState.at([np.nan, 0, 0])).force).all()
         assert np.isnan(field.wrench(HandState.at([0.05, 0, 0], [np.inf, 0, 0])).force).all()
 
 
-def test_from_python_it_is_the_compiled_loops_to_the_last_bit():
+def test_wrench_equals_the_compiled_program():
     rng = np.random.default_rng(7)
     for field in FIELDS:
         for _ in range(50):
@@ -344,9 +344,9 @@ def test_from_python_it_is_the_compiled_loops_to_the_last_bit():
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "message"),
     [((0.0, 1.0), "admission"), ((1.0, 0.0), "sigma"), ((1.0, 1.0, -1.0), "hysteresis"), ((1, 1, 0, "odd"), "odd")],
 )
-def test_bad_numbers_of_a_higher_order_field_are_refused(options, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_arguments_raise_parameter_error(options, message):
+    with pytest.raises(ParameterError, match=message):
         HigherOrder(_pair(90.0), *options)

@@ -1,4 +1,4 @@
-"""LEADING: what the hand feels, how the figure follows, that it turns only as support allows, and that it goes back."""
+"""LEADING: the force on the hand, the figure's path and its bounds by support, and walking back along it."""
 
 import casadi
 import numpy as np
@@ -36,7 +36,7 @@ RATE = 1e-3
 
 @njit
 def lead_along(units, ops, params, memory, walkers, hands, period, trail):
-    """A hand that is where it wants to be; s, speed and force after each tick."""
+    """Argument s, speed and force (n, 5) after each tick, for a hand that follows given positions."""
     hand, wrench = np.zeros(15), np.zeros(6)
     hand[4] = 1.0
     for k in range(len(hands)):
@@ -60,9 +60,9 @@ def walker_of(walkers):
     return walker_at.py_func(walkers.state, 0)
 
 
-def frames(walkers, places):
+def frames(walkers, arguments):
     path = walker_of(walkers).path
-    return np.array([[path_value(path, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in places])
+    return np.array([[path_value(path, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in arguments])
 
 
 def turn_rates(trail, walkers):
@@ -70,44 +70,44 @@ def turn_rates(trail, walkers):
     return np.abs(slopes * trail[:, 1])
 
 
-def feet(gait, s):
+def support_at(gait, s):
     lap = s / gait.stride
     return gait.support[(len(gait.support) * (lap - np.floor(lap))).astype(int)]
 
 
 def s_shaped(walking, seconds=5.0, pace=1.0):
-    """Places of a hand that leads along an S: at rest, along, at rest, each tick."""
+    """Positions at each tick of a hand that leads along an S, from rest to rest."""
     t = np.arange(0.0, seconds, RATE)
     ramp = np.clip(t / 0.5, 0.0, 1.0) * np.clip((seconds - t) / 0.5, 0.0, 1.0)
     angle = walking.heading + 0.7 * np.sin(2.0 * np.pi * t / seconds)
     steps = (
         RATE * pace * walking.gait.speed / walking.scale * ramp[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1)
     )
-    places = np.array(walking.start) + np.cumsum(steps, axis=0)
-    return np.column_stack([places, np.zeros(len(t))])
+    positions = np.array(walking.start) + np.cumsum(steps, axis=0)
+    return np.column_stack([positions, np.zeros(len(t))])
 
 
-def rest(place, seconds=2.0):
-    return np.tile(place, (round(seconds / RATE), 1))
+def resting(position, seconds=2.0):
+    return np.tile(position, (round(seconds / RATE), 1))
 
 
 def straight(start, end, seconds):
     return start + np.linspace(0.0, 1.0, round(seconds / RATE))[:, None] * (end - start)
 
 
-def wild(walking, seed, seconds=8.0):
-    """A hand that dashes about, smoothly, within 16 cm, forward more often than not."""
+def erratic(walking, seed, seconds=8.0):
+    """Positions of a hand that moves fast and smoothly within 16 cm, on average forward."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, RATE)
     waves = sum(
         rng.normal(size=2) * 0.05 / k * np.sin(2 * np.pi * 0.2 * k * t[:, None] + rng.uniform(0, 6, 2)) for k in (1, 2)
     )
-    way = np.outer(0.02 * t, [np.cos(walking.heading), np.sin(walking.heading)])
-    places = np.array(walking.start) + way + waves - waves[0]
-    return np.column_stack([places, np.zeros(len(t))])
+    advance = np.outer(0.02 * t, [np.cos(walking.heading), np.sin(walking.heading)])
+    positions = np.array(walking.start) + advance + waves - waves[0]
+    return np.column_stack([positions, np.zeros(len(t))])
 
 
-def at(along, across, height=0.0, walking=WALKING):
-    """Hand at a place ahead of and beside where the figure wants it, in metres on the floor."""
+def hand_at(along, across, height=0.0, walking=WALKING):
+    """Hand ahead of and beside the position that corresponds to the figure, in metres on the floor."""
     c, s = np.cos(walking.heading), np.sin(walking.heading)
     x, y = (along * c - across * s) / walking.scale, (along * s + across * c) / walking.scale
     return HandState.at([walking.start[0] + x, walking.start[1] + y, height])
@@ -119,59 +119,59 @@ def at(along, across, height=0.0, walking=WALKING):
         (0.0, 0.0, 0.0, 0.0),
         (0.9 * LEAD, 0.0, 0.0, 0.0),
         (LEAD + 0.3, 0.0, 0.3, 0.0),
-        # One metre on, an arc of curvature 1/m leads half a metre aside: no farther.
+        # After one metre the tightest arc, of curvature 1/m, is half a metre aside.
         (0.8, 0.5 * (0.8 + STEP) ** 2 - 0.03, 0.0, 0.0),
         (0.8, 0.7, 0.0, 0.7 - 0.5 * 0.8**2),
         (-0.3, 0.2, 0.0, 0.2),
         (-WALKING.backward * LEAD - 0.25, 0.0, -0.25, 0.0),
     ],
 )
-def test_the_hand_feels_what_of_its_lead_cannot_be_followed(along, across, excess_t, excess_n):
-    force = FIELD.wrench(at(along, across)).force
+def test_force_is_the_excess_of_the_lead_that_the_figure_cannot_follow(along, across, excess_t, excess_n):
+    force = FIELD.wrench(hand_at(along, across)).force
     c, s = np.cos(WALKING.heading), np.sin(WALKING.heading)
     felt = np.array([c * force[0] + s * force[1], c * force[1] - s * force[0]])
     expected = -FIELD.k_l / WALKING.scale * np.array([excess_t, excess_n])
-    # The path is laid up to one of its steps farther than D.
+    # The path extends up to one of its steps beyond D.
     tolerance = FIELD.k_l / WALKING.scale * STEP * (1.0 if along > 0.0 and across else 1e-6)
     np.testing.assert_allclose(felt, expected, atol=tolerance)
 
 
-def test_the_hand_is_kept_in_its_plane_and_damped():
-    force = FIELD.wrench(at(0.0, 0.0, 0.01)).force
+def test_force_holds_the_hand_in_its_plane_and_damps():
+    force = FIELD.wrench(hand_at(0.0, 0.0, 0.01)).force
     assert force[2] == pytest.approx(-0.01 * FIELD.k_z)
     hand = HandState.at([*WALKING.start, 0.0], [0.1, -0.2, 0.3])
     np.testing.assert_allclose(FIELD.wrench(hand).force, -FIELD.b * hand.v, atol=1e-12)
 
 
-def test_the_force_has_no_jump_along_random_lines():
+def test_force_is_continuous_along_random_lines():
     rng, program = np.random.default_rng(3), FIELD.program()
     for _ in range(4):
         ends = np.append(WALKING.start, 0.0) + rng.uniform(-0.06, 0.06, (2, 3))
         assert largest_jump(program, *ends, samples=150, hunts=3) < 1e-9
 
 
-@pytest.mark.parametrize("place", [[1e3, -1e3, 1e3], [-1e6, 0.0, 0.0], [0.0, 1e9, 0.0]])
-def test_the_force_is_finite_however_far_the_hand_is(place):
-    assert np.isfinite(force_of(FIELD.program(), HandState.at(place))).all()
+@pytest.mark.parametrize("position", [[1e3, -1e3, 1e3], [-1e6, 0.0, 0.0], [0.0, 1e9, 0.0]])
+def test_force_is_finite_at_any_distance(position):
+    assert np.isfinite(force_of(FIELD.program(), HandState.at(position))).all()
 
 
-def test_what_is_not_finite_reaches_the_limiter_and_not_the_path():
+def test_non_finite_hand_gives_nan_force_and_leaves_the_path():
     hands = s_shaped(WALKING)
     _, walkers = led(FIELD, hands[:2000])
-    kept = walkers.state.copy()
-    bad, _ = led(FIELD, np.full((3, 3), np.nan), walkers)
-    assert np.isnan(bad[:, 2:]).all()
-    np.testing.assert_array_equal(walkers.state, kept)
+    before = walkers.state.copy()
+    trail, _ = led(FIELD, np.full((3, 3), np.nan), walkers)
+    assert np.isnan(trail[:, 2:]).all()
+    np.testing.assert_array_equal(walkers.state, before)
 
 
-def test_python_and_the_compiled_program_feel_the_same_to_the_last_bit():
+def test_wrench_equals_the_compiled_program():
     rng = np.random.default_rng(8)
     for _ in range(20):
         hand = HandState.at(rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.1)
         np.testing.assert_array_equal(FIELD.wrench(hand).force, force_of(FIELD.program(), hand))
 
 
-def test_the_compiled_law_is_the_symbolic_one():
+def test_compiled_law_matches_casadi():
     mode = casadi.GlobalOptions.getNumpyMode()
     casadi.GlobalOptions.setNumpyMode(1)
     symbols = [casadi.SX.sym(f"x{i}") for i in range(15)]
@@ -184,11 +184,11 @@ def test_the_compiled_law_is_the_symbolic_one():
 
 @pytest.mark.parametrize("gait", [_WALK, _RUN], ids=["walk", "run"])
 @pytest.mark.parametrize("seed", range(3))
-def test_turning_and_inertia_are_bounded_whatever_the_hand_does(gait, seed):
+def test_turn_rate_and_acceleration_are_bounded_for_any_hand(gait, seed):
     walking = Walking(gait, (-0.06, 0.0), scale=32.0 * gait.speed)
     field = Leading(walking)
-    trail, walkers = led(field, wild(walking, seed))
-    rates, support = turn_rates(trail, walkers), feet(gait, trail[:, 0])
+    trail, walkers = led(field, erratic(walking, seed))
+    rates, support = turn_rates(trail, walkers), support_at(gait, trail[:, 0])
     bounds = np.array([0.0, walking.turn_one, walking.turn_two])[support]
     assert np.all(rates <= bounds + 1e-9)
     assert np.all(rates[support == 0] == 0.0)
@@ -200,51 +200,51 @@ def test_turning_and_inertia_are_bounded_whatever_the_hand_does(gait, seed):
     assert np.abs(np.diff(trail[:, 1])).max() > 0.9 * RATE * walking.pull
 
 
-def test_a_figure_on_two_feet_turns_more_than_on_one():
-    trail, walkers = led(FIELD, wild(WALKING, 1))
-    rates, support = turn_rates(trail, walkers), feet(_WALK, trail[:, 0])
+def test_figure_turns_faster_on_two_feet_than_on_one():
+    trail, walkers = led(FIELD, erratic(WALKING, 1))
+    rates, support = turn_rates(trail, walkers), support_at(_WALK, trail[:, 0])
     assert rates[support == 2].max() > 1.1 * rates[support == 1].max()
 
 
 @pytest.mark.parametrize("gait", [_WALK, _RUN], ids=["walk", "run"])
-def test_led_along_an_s_and_straight_back_it_retraces_its_path(gait):
+def test_hand_led_straight_back_retraces_the_path(gait):
     walking = Walking(gait, (-0.06, 0.0), scale=32.0 * gait.speed)
     field = Leading(walking)
-    forth = np.vstack([s_shaped(walking), rest(s_shaped(walking)[-1], 5.0)])
-    back = np.vstack([straight(forth[-1], forth[0], 8.0), rest(forth[0], 4.0)])
+    forth = np.vstack([s_shaped(walking), resting(s_shaped(walking)[-1], 5.0)])
+    back = np.vstack([straight(forth[-1], forth[0], 8.0), resting(forth[0], 4.0)])
     trail, walkers = led(field, forth)
-    way = frames(walkers, trail[:, 0])
+    outward = frames(walkers, trail[:, 0])
     returning, walkers = led(field, back, walkers)
-    again = frames(walkers, returning[:, 0])
+    homeward = frames(walkers, returning[:, 0])
     assert trail[-1, 0] > 3.0 * gait.speed
     assert returning[-1, 0] < 0.05 * trail[-1, 0]
-    for place in again[(returning[:, 0] >= 0.0) & (returning[:, 0] <= trail[-1, 0])][::50]:
-        k = int(np.argmin(np.hypot(*(way[:, :2] - place[:2]).T)))
-        assert np.hypot(*(way[k, :2] - place[:2])) < 0.01
-        assert abs(way[k, 2] - place[2]) < np.radians(2.0)
-    # The hand comes straight, the figure by the S: the force guided it there, and more than a little.
+    for position in homeward[(returning[:, 0] >= 0.0) & (returning[:, 0] <= trail[-1, 0])][::50]:
+        k = int(np.argmin(np.hypot(*(outward[:, :2] - position[:2]).T)))
+        assert np.hypot(*(outward[k, :2] - position[:2])) < 0.01
+        assert abs(outward[k, 2] - position[2]) < np.radians(2.0)
+    # The hand returns straight, the figure along the S, so the force must be considerable.
     assert np.linalg.norm(returning[:, 2:4], axis=1).max() > 0.2
 
 
-def test_forward_again_it_enters_its_path_and_goes_on_beyond_its_end():
-    forth = np.vstack([s_shaped(WALKING), rest(s_shaped(WALKING)[-1])])
+def test_forward_again_re_enters_the_path_and_extends_it():
+    forth = np.vstack([s_shaped(WALKING), resting(s_shaped(WALKING)[-1])])
     trail, walkers = led(FIELD, forth)
     front = path_front(walker_of(walkers).path)
-    places = np.linspace(0.0, front, 300)
-    before = frames(walkers, places)
+    arguments = np.linspace(0.0, front, 300)
+    before = frames(walkers, arguments)
     half = forth[len(forth) // 3]
-    _, walkers = led(FIELD, np.vstack([straight(forth[-1], half, 5.0), rest(half)]), walkers)
+    _, walkers = led(FIELD, np.vstack([straight(forth[-1], half, 5.0), resting(half)]), walkers)
     middle = float(walker_of(walkers).argument[0])
     assert 0.2 * trail[-1, 0] < middle < 0.6 * trail[-1, 0]
     assert path_front(walker_of(walkers).path) == front
     ahead = forth[-1] + 0.04 * np.array([np.cos(before[-1, 2]), np.sin(before[-1, 2]), 0.0])
-    way = np.vstack([straight(half, forth[-1], 5.0), straight(forth[-1], ahead, 2.0), rest(ahead)])
-    _, walkers = led(FIELD, way, walkers)
-    np.testing.assert_array_equal(frames(walkers, places), before)
+    hands = np.vstack([straight(half, forth[-1], 5.0), straight(forth[-1], ahead, 2.0), resting(ahead)])
+    _, walkers = led(FIELD, hands, walkers)
+    np.testing.assert_array_equal(frames(walkers, arguments), before)
     assert walker_of(walkers).argument[0] > trail[-1, 0] + 1.0
 
 
-def test_an_endless_walk_needs_no_more_memory_and_can_go_back_as_far_as_it_remembers():
+def test_endless_walk_has_constant_memory_and_retraces_what_it_stores():
     t = np.arange(0.0, 75.0, RATE)
     radius = 2.2 / WALKING.scale
     angle = np.clip(t - 0.5, 0.0, None) * 0.55
@@ -264,20 +264,20 @@ def test_an_endless_walk_needs_no_more_memory_and_can_go_back_as_far_as_it_remem
     assert returning[-1, 0] < oldest + 3.0
 
 
-def test_the_same_tick_again_moves_nothing():
+def test_repeated_tick_changes_nothing():
     _, walkers = led(FIELD, s_shaped(WALKING)[:1500])
     program, wrenches = FIELD.program(), np.empty((2, 6))
     hand = HandState.at([0.0, 0.0, 0.0], t=2.0).vector()
-    memory, places = program.fresh_memory(), []
+    memory, arguments = program.fresh_memory(), []
     for wrench in wrenches:
         feed_walkers(walkers, program.params, memory, hand)
         evaluate(*program.compiled(), memory, hand, wrench)
-        places.append(float(walker_of(walkers).argument[0]))
-    assert places[0] == places[1]
+        arguments.append(float(walker_of(walkers).argument[0]))
+    assert arguments[0] == arguments[1]
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: Leading(WALKING, k_l=-1.0), "k_l must be finite and at least 0 N/m, got -1.0"),
         (lambda: Walking(_WALK, scale=0.0), "scale"),
@@ -287,17 +287,17 @@ def test_the_same_tick_again_moves_nothing():
         (lambda: Gait(1.0, 1.0, np.array([1, 3]), 0.3), "0, 1 or 2 feet"),
     ],
 )
-def test_bad_numbers_are_refused(make, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_arguments_raise_parameter_error(make, message):
+    with pytest.raises(ParameterError, match=message):
         make()
 
 
-def test_laws_that_lead_one_figure_read_one_walker():
+def test_laws_that_lead_the_same_figure_share_one_walker():
     field = FIELD + Leading(WALKING, k_l=0.0, k_z=0.0, b=1.0)
     program, hands = field.program(), s_shaped(WALKING)
     assert len(program.fresh_walkers().state) == len(WALKING.fresh())
-    alone, walkers = led(FIELD, hands)
-    both, shared = led(field, hands)
-    # These hands have no velocity, which the other law damps; the nearest point is searched twice a tick.
-    np.testing.assert_allclose(both, alone, atol=1e-9)
+    trail, walkers = led(FIELD, hands)
+    trail_of_both, shared = led(field, hands)
+    # These hands have no velocity for the other law to damp; the nearest point is searched twice a tick.
+    np.testing.assert_allclose(trail_of_both, trail, atol=1e-9)
     np.testing.assert_allclose(shared.state, walkers.state, atol=1e-9)

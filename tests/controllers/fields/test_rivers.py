@@ -1,4 +1,4 @@
-"""Rivers: what the flow does, how long it takes, and that its force is FOLLOW."""
+"""Rivers: their flow, its settling time, and that their force equals FOLLOW."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ CIRCLE = Trajectory.circle(0.05, 4.0)
 
 
 def _knot() -> Trajectory:
-    """A closed curve whose speed and curvature change all the time; its reach is 16 mm."""
+    """A closed curve of varying speed and curvature, with a reach of 16 mm."""
     angle = np.linspace(0.0, 2.0 * np.pi, 65)
     radius = 0.05 + 0.008 * np.cos(3.0 * angle)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.02 * np.sin(2.0 * angle)], axis=1)
@@ -27,7 +27,7 @@ RIVERS = [River(CIRCLE, 0.03, 0.02), River(_knot(), 0.012, 0.05)]
 
 
 def settling_time(start: float, end: float, epsilon: float, tau: float) -> float:
-    r"""Time [s] of the flow from one distance to a smaller one: ḋ = −w(d/ε) d/τ, whatever the curve, so with q = (d/ε)²
+    r"""Time [s] of the flow from one distance to a smaller one: ḋ = −w(d/ε) d/τ for any curve, so with q = (d/ε)²
 
     T = τ/2 (G(q_0) − G(q_1)), G(q) = ln(q/(1 − q)) + 1/(1 − q) + 1/(2 (1 − q)²).
     """
@@ -37,7 +37,7 @@ def settling_time(start: float, end: float, epsilon: float, tau: float) -> float
 
 
 @pytest.mark.parametrize("river", RIVERS, ids=["circle", "knot"])
-def test_from_a_point_of_the_curve_the_integral_curve_is_the_curve_itself(river):
+def test_flow_from_a_point_of_the_curve_follows_the_curve(river):
     start = 0.3
     course = integrate(river.flow, river.curve.point(start), np.linspace(0.0, river.curve.duration, 201))
     away = np.linalg.norm(course.points - river.curve.point(start + course.times), axis=1)
@@ -45,7 +45,7 @@ def test_from_a_point_of_the_curve_the_integral_curve_is_the_curve_itself(river)
 
 
 @pytest.mark.parametrize("river", RIVERS, ids=["circle", "knot"])
-def test_from_within_the_tube_the_flow_is_at_the_curve_after_the_derived_time(river):
+def test_flow_from_within_the_tube_reaches_the_curve_after_the_settling_time(river):
     rng = np.random.default_rng(1)
     assert river.curve.reach > river.epsilon
     for _ in range(50):
@@ -57,32 +57,32 @@ def test_from_within_the_tube_the_flow_is_at_the_curve_after_the_derived_time(ri
         time = settling_time(distance, 1e-3, river.epsilon, river.tau)
         course = integrate(river.flow, start, [0.0, time])
         dense = river.curve.point(np.linspace(0.0, river.curve.duration, 20001))
-        left = np.linalg.norm(dense - course.points[-1], axis=1).min()
-        # Not a bound only: ḋ = −w d/τ is the same for every curve, so the time is exact.
-        assert left == pytest.approx(1e-3, abs=2e-6)
+        remaining = np.linalg.norm(dense - course.points[-1], axis=1).min()
+        # The time is exact, not only a bound: ḋ = −w d/τ holds for every curve.
+        assert remaining == pytest.approx(1e-3, abs=2e-6)
 
 
-def test_outside_its_tube_a_river_does_not_flow_and_is_not_felt():
+def test_river_has_no_flow_and_no_force_outside_its_tube():
     river = RIVERS[0]
     p = np.array([0.081, 0.0, 0.0])
     assert not river.flow(0.0, p).any()
     assert not river.wrench(HandState.at(p, [0.3, 0.1, 0.2])).force.any()
 
 
-def test_as_a_force_a_river_is_what_a_viscous_current_does_and_thus_follow():
+def test_force_is_viscous_drag_towards_the_flow_and_equals_follow():
     rng = np.random.default_rng(2)
     river = River(_knot(), 0.03, 0.02, 5.0)
     follow = Follow(river.curve, 250.0, 5.0, 0.03)
     for _ in range(50):
         p = river.curve.point(rng.uniform(0, 6)) + rng.uniform(-0.01, 0.01, 3)
         v = rng.normal(scale=0.1, size=3)
-        phase_distance = np.linalg.norm(river.curve.point(np.linspace(0, 2 * np.pi, 50001)) - p, axis=1).min()
-        w = max(0.0, 1.0 - (phase_distance / 0.03) ** 2) ** 3
+        distance = np.linalg.norm(river.curve.point(np.linspace(0, 2 * np.pi, 50001)) - p, axis=1).min()
+        w = max(0.0, 1.0 - (distance / 0.03) ** 2) ** 3
         np.testing.assert_allclose(river.wrench(HandState.at(p, v)).force, 5.0 * (river.flow(0, p) - w * v), atol=1e-6)
         np.testing.assert_array_equal(river.wrench(HandState.at(p, v)).force, follow.wrench(HandState.at(p, v)).force)
 
 
-def test_the_force_of_a_river_and_of_a_bundle_has_no_jump_along_lines_through_tube_edge_and_centre():
+def test_force_of_rivers_and_bundles_is_continuous():
     rng = np.random.default_rng(3)
     bundle = RiverBundle(tuple(RIVERS), ("circle", "knot")).program()
     for program, epsilon in ((RIVERS[0].program(), 0.03), (bundle, 0.03)):
@@ -94,7 +94,7 @@ def test_the_force_of_a_river_and_of_a_bundle_has_no_jump_along_lines_through_tu
             assert largest_jump(program, centre - direction, centre + direction, rng.normal(size=3) * 0.1) < 1e-9
 
 
-def test_a_bundle_is_the_sum_of_its_rivers_and_finds_them_by_name():
+def test_bundle_is_the_sum_of_its_rivers_and_indexes_them_by_name():
     bundle = RiverBundle(tuple(RIVERS), ("circle", "knot"))
     hand = HandState.at([0.05, 0.01, 0.005], [0.1, 0.0, 0.0])
     total = RIVERS[0].wrench(hand).force + RIVERS[1].wrench(hand).force
@@ -109,7 +109,7 @@ def test_a_bundle_is_the_sum_of_its_rivers_and_finds_them_by_name():
         RiverBundle(tuple(RIVERS), ("same", "same"))
 
 
-def test_a_bundle_comes_back_from_its_arrays_to_the_last_bit():
+def test_bundle_round_trips_through_arrays():
     path = Trajectory([0.0, 0.5, 1.0], [[0, 0, 0], [0.02, 0.01, 0], [0.05, 0, 0.01]], ends="clamped")
     rivers = (*RIVERS, River(path, 0.01, 0.1, 2.0, [[0.01, 0.05], [0.02, 0.1]]))
     bundle = RiverBundle(rivers, ("circle", "knot", "a/path"))
@@ -124,7 +124,7 @@ def test_a_bundle_comes_back_from_its_arrays_to_the_last_bit():
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "message"),
     [
         ({"tau": 0.0}, "tau must be finite and at least 0.0001 s"),
         ({"epsilon": -1.0}, "epsilon"),
@@ -133,6 +133,6 @@ def test_a_bundle_comes_back_from_its_arrays_to_the_last_bit():
         ({"speeds": [[0.1, 0.2], [0.2, 0.1]]}, "row 1"),
     ],
 )
-def test_bad_numbers_of_a_river_are_refused(options, says):
-    with pytest.raises(ControllerError, match=says):
+def test_invalid_arguments_raise_controller_error(options, message):
+    with pytest.raises(ControllerError, match=message):
         River(CIRCLE, **options)

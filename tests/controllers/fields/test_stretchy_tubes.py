@@ -1,4 +1,4 @@
-"""STRETCHY TUBES: sought, held, bent, pushed from outside, undone by clicks, and then performed."""
+"""STRETCHY TUBES: seeking, holding, bending, pushing from outside, undo by clicks, and following the result."""
 
 import casadi
 import numpy as np
@@ -20,7 +20,7 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class Session:
-    """A run of a field, tick by tick, by a hand that is put where the test wants it."""
+    """A run of a field, tick by tick, with prescribed hand positions."""
 
     def __init__(self, field: StretchyTubes, program: Program | None = None):
         self.field = field
@@ -55,14 +55,14 @@ class Session:
         return len(self.field.edits(self.memory))
 
 
-def test_an_open_switch_seeks_the_nearest_point_by_a_spring_and_damps() -> None:
+def test_open_switch_pulls_to_the_nearest_point_and_damps() -> None:
     session = Session(StretchyTubes(CIRCLE, k_f=150.0, k_s=200.0, b=3.0))
     p, v = np.array([0.04, 0.06, 0.02]), np.array([0.1, -0.2, 0.3])
     nearest = 0.05 * np.array([0.04, 0.06, 0.0]) / np.hypot(0.04, 0.06)
     np.testing.assert_allclose(session.at(p, v=v), 150.0 * (nearest - p) - 3.0 * v, atol=1e-4)
 
 
-def test_a_held_point_is_at_the_stylus_and_pulls_back_to_where_it_was() -> None:
+def test_held_point_follows_the_stylus_and_pulls_back_to_its_origin() -> None:
     session = Session(TUBES)
     start = np.array([0.052, 0.0, 0.001])
     session.at(start)
@@ -78,7 +78,7 @@ def test_a_held_point_is_at_the_stylus_and_pulls_back_to_where_it_was() -> None:
     assert 0.0 <= TUBES.held_off(session.memory) < 1e-9
 
 
-def test_the_curve_is_unchanged_away_from_the_hand_and_committed_by_letting_go() -> None:
+def test_edit_is_local_and_committed_on_release() -> None:
     session = Session(TUBES)
     session.at([0.0, 0.05, 0.0])
     before = session.curve
@@ -87,32 +87,32 @@ def test_the_curve_is_unchanged_away_from_the_hand_and_committed_by_letting_go()
     outside = np.abs(PHASES - 1.0) > 0.5625
     np.testing.assert_array_equal(session.curve.point(PHASES[outside]), before.point(PHASES[outside]))
     np.testing.assert_allclose(session.curve.point(1.0), [0.0, 0.065, 0.02], atol=1e-9)
-    # The hand is on the curve that it made: nothing to seek.
+    # The hand is on the edited curve, so there is no force.
     np.testing.assert_allclose(session.at([0.0, 0.065, 0.02]), 0.0, atol=1e-9)
 
 
-def test_a_short_click_undoes_and_a_long_one_redoes_to_the_last_bit() -> None:
+def test_short_click_undoes_and_long_click_redoes_exactly() -> None:
     session = Session(TUBES)
     session.at([0.05, 0.0, 0.0])
-    place = CIRCLE.point(3.7)
+    on_tube = CIRCLE.point(3.7)
     states = [session.curve.coefficients]
     for phase in (0.5, 1.2, 2.0, 2.9):
         p = session.curve.point(phase)
         session.drag(p, p * 1.2 + [0.0, 0.0, 0.01])
         states.append(session.curve.coefficients)
     for state in reversed(states[:-1]):
-        session.click(place, 0.5 * CLICK_TIME)
+        session.click(on_tube, 0.5 * CLICK_TIME)
         np.testing.assert_array_equal(session.curve.coefficients, state)
-    session.click(place, 0.5 * CLICK_TIME)
+    session.click(on_tube, 0.5 * CLICK_TIME)
     assert session.edits == 0
     for state in states[1:]:
-        session.click(place, 2.0 * CLICK_TIME)
+        session.click(on_tube, 2.0 * CLICK_TIME)
         np.testing.assert_array_equal(session.curve.coefficients, state)
-    session.click(place, 2.0 * CLICK_TIME)
+    session.click(on_tube, 2.0 * CLICK_TIME)
     assert session.edits == 4
 
 
-def test_a_click_away_from_every_tube_does_nothing() -> None:
+def test_click_away_from_the_tube_does_nothing() -> None:
     session = Session(TUBES)
     session.at([0.05, 0.0, 0.0])
     session.drag([0.05, 0.0, 0.0], [0.06, 0.0, 0.0])
@@ -120,10 +120,10 @@ def test_a_click_away_from_every_tube_does_nothing() -> None:
     assert session.edits == 1
 
 
-def test_a_tube_is_pushed_from_outside_and_resists_like_rubber() -> None:
+def test_tube_pushed_from_outside_resists_elastically() -> None:
     session = Session(TUBES)
-    free = [session.at([0.0, y, 0.0], switch=y < 0.08) for y in (0.08, 0.075, 0.07, 0.0581)]
-    np.testing.assert_array_equal(free[1:], 0.0)
+    untouched = [session.at([0.0, y, 0.0], switch=y < 0.08) for y in (0.08, 0.075, 0.07, 0.0581)]
+    np.testing.assert_array_equal(untouched[1:], 0.0)
     for y in (0.0579, 0.055, 0.05, 0.03, 0.04):
         force = session.at([0.0, y, 0.0], switch=True)
         np.testing.assert_allclose(force, [0.0, 200.0 * (0.058 - y), 0.0], atol=1e-3)
@@ -138,7 +138,7 @@ def test_a_tube_is_pushed_from_outside_and_resists_like_rubber() -> None:
     np.testing.assert_allclose(session.curve.point(1.0), [0.0, 0.027, 0.0], atol=1e-6)
 
 
-def test_the_force_does_not_leap_while_the_switch_stays_as_it_is() -> None:
+def test_force_is_continuous_while_the_switch_is_unchanged() -> None:
     rng = np.random.default_rng(1)
     for switch in (False, True):
         for _ in range(15):
@@ -149,20 +149,20 @@ def test_the_force_does_not_leap_while_the_switch_stays_as_it_is() -> None:
             for s in np.linspace(0.0, 0.02, 120):
                 pair = [session.at(start + (s + d) * direction, switch) for d in (0.0, 1e-12)]
                 assert np.abs(pair[1] - pair[0]).max() < 1e-9
-    # A probe meets the tube without a blow.
+    # The force is continuous where a probe touches the tube.
     session = Session(TUBES)
     session.at([0.0, 0.07, 0.0])
     pair = [session.at([0.0, y, 0.0], True) for y in (0.07, 0.058 + 2e-8, 0.058 - 2e-8)]
     assert np.abs(pair[2] - pair[1]).max() < 2e-5
 
 
-def test_with_one_stiffness_taking_hold_is_no_blow_either() -> None:
+def test_force_is_continuous_over_the_grab_with_equal_stiffnesses() -> None:
     session = Session(StretchyTubes(CIRCLE, 150.0, 150.0))
     p = [0.054, 0.0, 0.002]
     np.testing.assert_allclose(session.at(p, True), session.at(p), atol=1e-12)
 
 
-def test_where_nothing_can_be_held_the_switch_moves_nothing() -> None:
+def test_fixed_ends_of_an_open_curve_cannot_be_moved() -> None:
     open_curve = Trajectory(np.linspace(0.0, 4.0, 9), np.linspace([-0.05, 0.0, 0.0], [0.05, 0.0, 0.01], 9))
     session = Session(StretchyTubes(open_curve, 150.0, 200.0))
     before = session.curve
@@ -174,7 +174,7 @@ def test_where_nothing_can_be_held_the_switch_moves_nothing() -> None:
     assert session.edits == 1
 
 
-def test_stretched_then_followed_is_follow_on_the_bent_curve() -> None:
+def test_stretched_curve_is_followed_after_stretching_ends() -> None:
     follow = Follow(CIRCLE, 300.0, 4.0, 0.25)
     session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, until=1.0, then=follow))
     session.at([0.05, 0.0, 0.0])
@@ -184,12 +184,12 @@ def test_stretched_then_followed_is_follow_on_the_bent_curve() -> None:
     for phase in np.linspace(0.0, 4.0, 23):
         p, v = session.curve.point(phase) + np.array([0.004, 0.0, 0.003]), [0.1, 0.0, -0.1]
         expected = performed.wrench(HandState.at(p, v)).force
-        # The switch means nothing any more.
+        # The switch has no effect any more.
         np.testing.assert_allclose(session.at(p, phase > 2.0, v=v), expected, atol=1e-9)
     assert session.edits == 1
 
 
-def test_the_search_goes_over_into_follow_without_a_jump() -> None:
+def test_force_eases_continuously_from_seeking_into_follow() -> None:
     session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, 2.0, until=1.0, then=Follow(CIRCLE, 300.0, 4.0), ease=0.8))
     p, v = CIRCLE.point(1.0) + np.array([0.0, 0.0, 0.003]), np.array([0.01, -0.02, 0.0])
     full, forces = Follow(CIRCLE, 300.0, 4.0).wrench(HandState.at(p, v)).force, [session.at(p, v=v)]
@@ -197,7 +197,7 @@ def test_the_search_goes_over_into_follow_without_a_jump() -> None:
         session.time = 1.0 + 0.8 * share
         forces.append(session.at(p, v=v, after=0.0))
     eased = np.array(forces)
-    # What it felt before is what it feels at first; at half time half of each, and at last FOLLOW.
+    # First the force of before, at half time the mean of both, at last that of FOLLOW.
     np.testing.assert_allclose(eased[1], eased[0], atol=1e-12)
     np.testing.assert_allclose(eased[51], 0.5 * (eased[0] + full), atol=1e-9)
     np.testing.assert_allclose(eased[101:], np.tile(full, (21, 1)), atol=1e-12)
@@ -206,7 +206,7 @@ def test_the_search_goes_over_into_follow_without_a_jump() -> None:
     assert steps.max() < 0.01 * 15.0 / 8.0 + 1e-6
 
 
-def test_an_edit_under_way_when_stretching_ends_is_kept() -> None:
+def test_edit_in_progress_is_committed_when_stretching_ends() -> None:
     session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, until=1.0, then=Follow(CIRCLE, 300.0, 4.0)))
     session.at([0.05, 0.0, 0.0], True)
     session.at([0.07, 0.0, 0.0], True)
@@ -215,7 +215,7 @@ def test_an_edit_under_way_when_stretching_ends_is_kept() -> None:
     np.testing.assert_allclose(session.curve.point(0.0), [0.07, 0.0, 0.0], atol=1e-9)
 
 
-def test_two_tubes_share_a_space_and_each_bends_its_own_curve() -> None:
+def test_each_of_two_tubes_bends_its_own_curve() -> None:
     upper = StretchyTubes(Trajectory.circle(0.05, 4.0, (0.0, 0.0, 0.05)), 50.0, 200.0, 0.0)
     program = TUBES.program() + upper.program()
     session = Session(TUBES, program)
@@ -226,7 +226,7 @@ def test_two_tubes_share_a_space_and_each_bends_its_own_curve() -> None:
     np.testing.assert_allclose(upper.edited(session.memory, slots[1]).point(0.0), [0.065, 0.0, 0.05], atol=1e-9)
 
 
-def test_what_is_not_finite_reaches_the_limiter_and_not_the_curve() -> None:
+def test_non_finite_hand_gives_nan_force_and_leaves_the_curve() -> None:
     session = Session(TUBES)
     session.at([0.05, 0.0, 0.0])
     session.at([0.05, 0.0, 0.0], True)
@@ -237,17 +237,17 @@ def test_what_is_not_finite_reaches_the_limiter_and_not_the_curve() -> None:
 
 @pytest.mark.parametrize("p", [[0.0, 0.0, 0.0], [1e6, 0.0, 0.0], [0.0, 0.0, 0.03], [0.05, 0.0, 0.0]])
 @pytest.mark.parametrize("switch", [False, True])
-def test_it_is_finite_everywhere(p: list[float], switch: bool) -> None:
+def test_force_is_finite_everywhere(p: list[float], switch: bool) -> None:
     session = Session(TUBES)
     for _ in range(3):
         assert np.isfinite(session.at(p, switch)).all()
-    # A probe that leaps onto the curve itself finds no side to push to.
+    # For a probe that jumps onto the curve itself there is no side to push to.
     session.at([0.2, 0.0, 0.0])
     session.at([0.2, 0.0, 0.0], True)
     assert np.isfinite(session.at([0.05, 0.0, 0.0], True)).all()
 
 
-def test_from_python_and_from_the_program_the_force_is_the_same_to_the_last_bit() -> None:
+def test_wrench_equals_the_compiled_program() -> None:
     rng = np.random.default_rng(2)
     for _ in range(10):
         hand = HandState.at(rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.1, 0.3)
@@ -257,7 +257,7 @@ def test_from_python_and_from_the_program_the_force_is_the_same_to_the_last_bit(
         np.testing.assert_array_equal(TUBES.wrench(hand).force, wrench[:3])
 
 
-def test_the_law_is_also_symbolic() -> None:
+def test_stretch_force_matches_casadi() -> None:
     symbols = [casadi.SX.sym(name) for name in ("p", "v", "target", "k", "b")]
     symbolic = casadi.Function("F", symbols, [stretch_force.py_func(*symbols)])
     numbers = (0.04, -0.2, 0.05, 150.0, 3.0)
@@ -265,7 +265,7 @@ def test_the_law_is_also_symbolic() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "says"),
+    ("arguments", "error", "message"),
     [
         ({"k_f": -1.0, "k_s": 1.0}, ParameterError, "k_f must be finite and at least 0 N/m, got -1.0"),
         ({"k_f": 1.0, "k_s": np.nan}, ParameterError, "k_s"),
@@ -274,6 +274,6 @@ def test_the_law_is_also_symbolic() -> None:
         ({"k_f": 1.0, "k_s": 1.0, "width": 9.0}, CurveError, "got 9.0"),
     ],
 )
-def test_what_makes_no_sense_is_refused_with_the_numbers(arguments, error, says) -> None:
-    with pytest.raises(error, match=says):
+def test_invalid_arguments_raise(arguments, error, message) -> None:
+    with pytest.raises(error, match=message):
         StretchyTubes(CIRCLE, **arguments).program()

@@ -1,4 +1,4 @@
-"""Known changes from clip to clip: what is shown at the gate and after it, its derivative, and what is refused."""
+"""Prepared changes from clip to clip: the pose at the gate and after it, its Jacobian, and validation."""
 
 from itertools import pairwise
 
@@ -23,23 +23,24 @@ from controllers.haptic_map.river_memory import (
     take_course,
 )
 from tests.controllers.clips_for_maps import LEG, difference, swinging
+from tests.derivatives import central_differences
 
-LAP, GATE, LASTS = 4.0, 1.0, 1.5
+LAP, GATE, DURATION = 4.0, 1.0, 1.5
 CURVES = [Trajectory.circle(0.05, LAP), Trajectory.circle(0.05, LAP, wave=0.01)]
-PLAIN = RiverClips(CURVES, [(swinging(1, travel=1.3), 30.0), (swinging(2, turns=1.0), 30.0)], 0.02, [LEG])
-SIZE = 3 + 3 * ((PLAIN.nq - 3) // 4)
+MAP_WITHOUT_CHANGES = RiverClips(CURVES, [(swinging(1, travel=1.3), 30.0), (swinging(2, turns=1.0), 30.0)], 0.02, [LEG])
+SIZE = 3 + 3 * ((MAP_WITHOUT_CHANGES.nq - 3) // 4)
 
 
 def _offsets() -> np.ndarray:
-    """Some that decay within the time of the change, with three derivatives."""
-    s = np.arange(round((LASTS + LEAD_IN) * FPS) + 1) / FPS - LEAD_IN
-    left = np.clip(1.0 - s / LASTS, 0.0, None) ** 4
-    way = np.random.default_rng(3).normal(scale=0.4, size=SIZE)
-    return left[:, None] * (way + 0.2 * np.sin(3.0 * s[:, None] + np.arange(SIZE)))
+    """Random offsets that decay within the time of the change, with three continuous derivatives."""
+    s = np.arange(round((DURATION + LEAD_IN) * FPS) + 1) / FPS - LEAD_IN
+    decay = np.clip(1.0 - s / DURATION, 0.0, None) ** 4
+    direction = np.random.default_rng(3).normal(scale=0.4, size=SIZE)
+    return decay[:, None] * (direction + 0.2 * np.sin(3.0 * s[:, None] + np.arange(SIZE)))
 
 
 OFFSETS = _offsets()
-MAP = PLAIN.with_changes([ClipChange(0, 1, np.array([GATE, 3.0]), OFFSETS)])
+MAP = MAP_WITHOUT_CHANGES.with_changes([ClipChange(0, 1, np.array([GATE, 3.0]), OFFSETS)])
 
 
 def _stylus(curve: int, phase: float) -> np.ndarray:
@@ -54,51 +55,53 @@ def _memory(phase: float, changing: bool = True) -> np.ndarray:
     return memory
 
 
-def test_what_is_shown_is_the_second_clip_moved_by_the_offset_and_in_the_end_itself() -> None:
-    for since in (-0.05, 0.0, 0.3, 1.0, LASTS - 1e-6):
-        phase = GATE + since
-        row = (since + LEAD_IN) * FPS
+def test_changing_pose_is_the_second_clip_moved_by_the_offset_and_ends_as_that_clip() -> None:
+    for elapsed in (-0.05, 0.0, 0.3, 1.0, DURATION - 1e-6):
+        phase = GATE + elapsed
+        row = (elapsed + LEAD_IN) * FPS
         offset = OFFSETS[int(row)] + (row - int(row)) * (
             OFFSETS[min(int(row) + 1, len(OFFSETS) - 1)] - OFFSETS[int(row)]
         )
-        second = PLAIN.pose(_stylus(1, phase), _memory(phase, False))
+        second = MAP_WITHOUT_CHANGES.pose(_stylus(1, phase), _memory(phase, False))
         shown = MAP.pose(_stylus(1, phase), _memory(phase))
         away = difference(shown, second)
-        # The root's place in its own frame.
-        away[:3] = _turned_back(second[3:7], away[:3])
+        # The root's displacement in its own frame.
+        away[:3] = _inversely_rotated(second[3:7], away[:3])
         np.testing.assert_allclose(away, offset, atol=2e-3)
-    memory = _memory(GATE + LASTS)
+    memory = _memory(GATE + DURATION)
     np.testing.assert_allclose(
-        MAP.pose(_stylus(1, GATE + LASTS + 0.01), memory),
-        PLAIN.pose(_stylus(1, GATE + LASTS + 0.01), _memory(GATE + LASTS, False)), atol=1e-12,
+        MAP.pose(_stylus(1, GATE + DURATION + 0.01), memory),
+        MAP_WITHOUT_CHANGES.pose(_stylus(1, GATE + DURATION + 0.01), _memory(GATE + DURATION, False)), atol=1e-12,
     )  # fmt: skip
     assert memory[CHANGE] == -1.0
 
 
-def _turned_back(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _inversely_rotated(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     w, u = q[0], -q[1:]
     return v + 2.0 * w * np.cross(u, v) + 2.0 * np.cross(u, np.cross(u, v))
 
 
-def test_the_derivative_in_a_change_is_that_of_the_pose() -> None:
-    for since, ahead in ((0.2, 0.0), (0.9, 0.08), (1.3, -0.1)):
-        p = CURVES[1].point(GATE + since) + np.array([1e-3, -2e-3, 1e-3])
+def test_jacobian_during_a_change_matches_finite_differences() -> None:
+    for elapsed, ahead in ((0.2, 0.0), (0.9, 0.08), (1.3, -0.1)):
+        p = CURVES[1].point(GATE + elapsed) + np.array([1e-3, -2e-3, 1e-3])
 
-        def at(point: np.ndarray, since: float = since, ahead: float = ahead) -> tuple[np.ndarray, np.ndarray]:
-            memory = _memory(GATE + since)
+        def arguments_at(
+            point: np.ndarray, elapsed: float = elapsed, ahead: float = ahead
+        ) -> tuple[np.ndarray, np.ndarray]:
+            memory = _memory(GATE + elapsed)
             memory[AHEAD] = ahead
             return np.concatenate([point, [1.0, 0.0, 0.0, 0.0]]), memory
 
-        jacobian = MAP.jacobian(*at(p))
+        jacobian = MAP.jacobian(*arguments_at(p))
         assert np.abs(jacobian[:, :3]).max() > 1.0
-        for k in range(3):
-            step = np.eye(3)[k] * 1e-6
-            ends = [MAP.pose(*at(p + sign * step)) for sign in (1.0, -1.0)]
-            np.testing.assert_allclose(jacobian[:, k], difference(*ends) / 2e-6, atol=2e-5 * np.abs(jacobian).max())
+        numeric = central_differences(
+            lambda point, arguments_at=arguments_at: MAP.pose(*arguments_at(point)), p, 1e-6, difference
+        )
+        np.testing.assert_allclose(jacobian[:, :3], numeric, atol=2e-5 * np.abs(jacobian).max())
         np.testing.assert_array_equal(jacobian[:, 3:], 0.0)
 
 
-def test_a_gate_is_passed_once_in_a_lap_and_over_its_seam() -> None:
+def test_gate_is_passed_once_per_lap_also_over_the_seam() -> None:
     changes = packed_changes([ClipChange(0, 1, np.array([0.0, 2.5]), OFFSETS), ClipChange(0, 1, [1.2], OFFSETS)])
     phases = np.arange(0.05, 9.0, 0.03)
     passed = [(gate_behind(changes, 0.0, 1.0, a % LAP, b % LAP, LAP), b) for a, b in pairwise(phases.tolist())]
@@ -107,20 +110,20 @@ def test_a_gate_is_passed_once_in_a_lap_and_over_its_seam() -> None:
     for (k, gate), now in passed:
         if k >= 0:
             assert 0.0 <= (now - gate) % LAP < 0.03
-    # Not by a hand that goes back, and of no other rivers.
+    # Not backwards, and not between other rivers.
     assert gate_behind(changes, 0.0, 1.0, 1.21, 1.19, LAP)[0] == -1
     assert gate_behind(changes, 1.0, 0.0, 1.19, 1.21, LAP)[0] == -1
     assert known_between(changes, 0.0, 1.0)
     assert not known_between(changes, 1.0, 0.0)
 
 
-def test_a_clip_that_another_river_times_goes_on_without_a_jump_and_comes_to_be_with_the_hand() -> None:
+def test_clip_timed_by_another_river_continues_smoothly_and_catches_up_with_the_hand() -> None:
     params, memory = MAP.compiled().params, MAP.compiled().memory.copy()
     times = np.arange(0.3, 3.5, 0.01)
     change_clip(params, memory, 1.0, times[0])
     shown = []
     for t in times:
-        # On the level river, below or above the wave whose clip plays.
+        # The hand is on the level river, below or above the wave whose clip plays.
         x = _stylus(0, t)
         MAP.pose(x, memory)
         shown.append(memory[SHOWN])
@@ -136,7 +139,7 @@ def test_a_clip_that_another_river_times_goes_on_without_a_jump_and_comes_to_be_
     assert memory[AHEAD] == 0.0
 
 
-def test_a_clip_that_stands_still_knows_no_change_and_a_stop_ends_one() -> None:
+def test_stopped_clip_has_no_known_change_and_a_stop_ends_a_change() -> None:
     params, memory = MAP.compiled().params, MAP.compiled().memory.copy()
     change_clip(params, memory, 0.0, 0.5)
     assert knows_change(params, memory, 1.0)
@@ -151,7 +154,7 @@ def test_a_clip_that_stands_still_knows_no_change_and_a_stop_ends_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (ClipChange(0, 2, np.array([1.0]), OFFSETS), "from river 0 to 2 is not between two of 2 rivers"),
         (ClipChange(1, 1, np.array([1.0]), OFFSETS), "from river 1 to 1 is not between two of 2 rivers"),
@@ -161,13 +164,13 @@ def test_a_clip_that_stands_still_knows_no_change_and_a_stop_ends_one() -> None:
         (ClipChange(0, 1, np.array([1.0]), OFFSETS[:5]), "lasts -0.07 s"),
     ],
 )
-def test_a_change_that_cannot_be_is_refused(change: ClipChange, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        PLAIN.with_changes([change])
+def test_invalid_changes_raise_parameter_error(change: ClipChange, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        MAP_WITHOUT_CHANGES.with_changes([change])
 
 
-def test_a_change_between_laps_that_differ_is_refused() -> None:
+def test_change_between_rivers_of_different_laps_raises_parameter_error() -> None:
     clips = [(swinging(1, travel=1.3), 30.0), (swinging(2, turns=1.0), 30.0)]
-    uneven = RiverClips([CURVES[0], Trajectory.circle(0.05, 5.0)], clips, 0.02, [LEG])
+    rivers = RiverClips([CURVES[0], Trajectory.circle(0.05, 5.0)], clips, 0.02, [LEG])
     with pytest.raises(ParameterError, match=r"between laps of 4\.0 and 5\.0 s"):
-        uneven.with_changes([ClipChange(0, 1, np.array([1.0]), OFFSETS)])
+        rivers.with_changes([ClipChange(0, 1, np.array([1.0]), OFFSETS)])

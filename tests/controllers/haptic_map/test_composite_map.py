@@ -1,4 +1,4 @@
-"""The composite map: whose joints come from which clip, its derivative, its feet."""
+"""The composite map: which clip each joint comes from, and its Jacobian."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
-from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, numeric_jacobian, stylus, swinging
 
 R = (0.03, 0.07)
 LOWER, RED, BLUE = (
@@ -17,62 +17,60 @@ LOWER, RED, BLUE = (
 )
 MAP = Composite(LOWER, RED, BLUE, (3,), R)
 # Each clip alone, with the same alignment, at the corners of a cylinder.
-ALONE = Cylindrical([LOWER, RED, BLUE, LOWER], R, (-0.01, 0.01))
+SINGLE_CLIPS = Cylindrical([LOWER, RED, BLUE, LOWER], R, (-0.01, 0.01))
 IN_LOWER, IN_RED, IN_BLUE = (R[0], -0.01), (R[1], -0.01), (R[0], 0.01)
 
 
-def alone(corner, angle):
-    return ALONE.pose(stylus(corner[0], angle, corner[1]))
+def single_clip_pose(corner, angle):
+    return SINGLE_CLIPS.pose(stylus(corner[0], angle, corner[1]))
 
 
 @pytest.mark.parametrize("angle", [0.3, 2.1, 5.9])
-def test_the_lower_body_is_one_clips_and_the_upper_turns_from_red_to_blue(angle):
+def test_lower_body_is_of_one_clip_and_upper_body_blends_the_others(angle):
     for r, upper in ((0.01, IN_RED), (R[0], IN_RED), (R[1], IN_BLUE), (0.1, IN_BLUE)):
         pose = MAP.pose(stylus(r, angle, 0.05))
-        np.testing.assert_allclose(difference(pose, alone(IN_LOWER, angle))[:12], 0.0, atol=1e-9)
-        np.testing.assert_allclose(difference(pose, alone(upper, angle))[12:], 0.0, atol=1e-9)
+        np.testing.assert_allclose(difference(pose, single_clip_pose(IN_LOWER, angle))[:12], 0.0, atol=1e-9)
+        np.testing.assert_allclose(difference(pose, single_clip_pose(upper, angle))[12:], 0.0, atol=1e-9)
     middle = MAP.pose(stylus(0.05, angle, 0.0))
-    to_red, to_blue = (np.linalg.norm(difference(middle, alone(end, angle))[12:]) for end in (IN_RED, IN_BLUE))
+    to_red, to_blue = (
+        np.linalg.norm(difference(middle, single_clip_pose(end, angle))[12:]) for end in (IN_RED, IN_BLUE)
+    )
     assert to_red == pytest.approx(to_blue, rel=1e-6)
     assert to_red > 0.05
 
 
 @pytest.mark.parametrize("angle", [0.3, 2.1, 5.9])
-def test_a_lower_body_that_bears_no_other_arms_keeps_its_own(angle):
+def test_share_of_other_arms_scales_their_difference(angle):
     none, some = MAP.with_share(0.0), MAP.with_share(0.25)
-    own, red = alone(IN_LOWER, angle), alone(IN_RED, angle)
-    np.testing.assert_allclose(difference(none.pose(stylus(0.05, angle, 0.0)), own), 0.0, atol=1e-9)
-    part = difference(some.pose(stylus(R[0], angle, 0.0)), own)[12:]
-    assert np.linalg.norm(part) == pytest.approx(0.25 * np.linalg.norm(difference(red, own)[12:]), rel=0.15)
+    lower, red = single_clip_pose(IN_LOWER, angle), single_clip_pose(IN_RED, angle)
+    np.testing.assert_allclose(difference(none.pose(stylus(0.05, angle, 0.0)), lower), 0.0, atol=1e-9)
+    part = difference(some.pose(stylus(R[0], angle, 0.0)), lower)[12:]
+    assert np.linalg.norm(part) == pytest.approx(0.25 * np.linalg.norm(difference(red, lower)[12:]), rel=0.15)
     assert (MAP.remarks, len(some.remarks)) == ((), 1)
     with pytest.raises(ParameterError, match="from 0 to 1"):
         MAP.with_share(-0.1)
 
 
-def test_the_derivative_agrees_with_differences_on_the_manifold():
+def test_jacobian_matches_finite_differences_on_the_manifold():
     lower_leg = Limb((1, 2, 3), LEG.offsets, LEG.axis, LEG.points)
     four = [(np.hstack([poses, swinging(9, len(poses) - 1)[:, 7:11]]), fps) for poses, fps in (LOWER, RED, BLUE)]
     h_map = Composite(*four, (4,), R, [lower_leg]).with_share(0.6)
-    rng, step, worst = np.random.default_rng(0), 1e-5, 0.0
+    rng, worst = np.random.default_rng(0), 0.0
     for _ in range(100):
         x = stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.04, 0.04))
         jacobian = h_map.jacobian(x)
-        for axis in range(3):
-            d = step * np.eye(7)[axis]
-            near = difference(h_map.pose(x + d), h_map.pose(x - d)) / (2 * step)
-            far = difference(h_map.pose(x + 2 * d), h_map.pose(x - 2 * d)) / (4 * step)
-            error = np.abs((4.0 * near - far) / 3.0 - jacobian[:, axis]).max()
-            worst = max(worst, error / (1.0 + np.abs(jacobian).max()))
+        error = np.abs(numeric_jacobian(h_map, x, 1e-5) - jacobian[:, :3]).max()
+        worst = max(worst, error / (1.0 + np.abs(jacobian).max()))
         np.testing.assert_array_equal(jacobian[:, 2:], 0.0)
     assert worst < 1e-6
 
 
-def test_the_compiled_entry_gives_the_same_to_the_last_bit():
+def test_compiled_map_is_identical():
     assert_same_compiled(MAP, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(
-    ("upper", "r_range", "limbs", "says"),
+    ("upper", "r_range", "limbs", "message"),
     [
         ((4,), R, (), "the poses have joints 1 to 3, a group wants 4"),
         ((0,), R, (), "the poses have joints 1 to 3, a group wants 0"),
@@ -80,6 +78,6 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
         ((3,), (0.0, 0.05), (), "r_range must increase from 1 mm or more"),
     ],
 )
-def test_what_cannot_be_composed_is_refused(upper, r_range, limbs, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_arguments_raise_parameter_error(upper, r_range, limbs, message):
+    with pytest.raises(ParameterError, match=message):
         Composite(LOWER, RED, BLUE, upper, r_range, limbs)

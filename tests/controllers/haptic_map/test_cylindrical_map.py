@@ -1,4 +1,4 @@
-"""The cylindrical map: its corners, its smoothness, its seam, its derivative."""
+"""The cylindrical map: its corners, its smoothness, its seam and its Jacobian."""
 
 from itertools import pairwise
 
@@ -18,9 +18,11 @@ from tests.controllers.clips_for_maps import (
     assert_same_compiled,
     difference,
     matrices,
+    numeric_jacobian,
     stylus,
     swinging,
 )
+from tests.derivatives import central_differences
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]
@@ -39,8 +41,8 @@ MOVING = Cylindrical(
 )
 
 
-def test_a_corner_is_its_clip():
-    # The first clip keeps its own phase, so frame k is at k laps / frames; the others are shifted as a whole.
+def test_corner_plays_its_clip():
+    # The first clip keeps its own phase, so frame k is at k laps / frames; the others are shifted in phase.
     for k in range(0, 120, 7):
         pose = STILL.pose(stylus(*_at(0, k / 120)))
         np.testing.assert_allclose(
@@ -54,7 +56,7 @@ def _at(corner, s):
     return r, 2.0 * np.pi * s, z
 
 
-def test_blending_a_clip_with_itself_changes_nothing_anywhere():
+def test_blend_of_a_clip_with_itself_is_the_clip_everywhere():
     same = Cylindrical([CLIPS[0]] * 4, R, Z)
     for r, z in ((0.03, -0.03), (0.05, 0.0), (0.06, 0.02), (0.2, 0.5), (0.001, -0.5)):
         for s in (0.1, 0.45, 0.8):
@@ -63,7 +65,7 @@ def test_blending_a_clip_with_itself_changes_nothing_anywhere():
 
 
 @pytest.mark.parametrize("owner", range(4))
-def test_root_and_legs_can_be_one_clips_everywhere(owner):
+def test_root_and_legs_of_one_clip_do_not_depend_on_the_corner(owner):
     arms = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=owner)
     for corner in range(4):
         for s in (0.1, 0.45, 0.8):
@@ -75,42 +77,43 @@ def test_root_and_legs_can_be_one_clips_everywhere(owner):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_a_share_of_other_joints_goes_that_part_of_the_way_to_them(share):
+def test_share_of_other_joints_scales_their_rotation(share):
     arms = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=1)
     some = arms.with_share(share)
     for corner in range(4):
         for s in (0.1, 0.45, 0.8):
             x = stylus(*_at(corner, s))
-            own, others = (
+            part, whole = (
                 difference(some.pose(x), arms.with_share(0.0).pose(x)),
                 difference(arms.pose(x), arms.with_share(0.0).pose(x)),
             )
-            np.testing.assert_allclose(own[:12], 0.0, atol=1e-12)
+            np.testing.assert_allclose(part[:12], 0.0, atol=1e-12)
             # The chordal mean of two rotations lies between them; its angle is near the share of theirs.
-            np.testing.assert_allclose(np.cross(own[12:], others[12:]), 0.0, atol=1e-9)
-            assert np.linalg.norm(own[12:]) == pytest.approx(share * np.linalg.norm(others[12:]), rel=0.15)
+            np.testing.assert_allclose(np.cross(part[12:], whole[12:]), 0.0, atol=1e-9)
+            assert np.linalg.norm(part[12:]) == pytest.approx(share * np.linalg.norm(whole[12:]), rel=0.15)
     assert (f"{100 * share:.0f} % of the others' arms" in some.remarks[0]) == (share < 1.0)
 
 
-@pytest.mark.parametrize("made", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "too much"])
-def test_only_legs_of_one_clip_take_a_share_from_0_to_1(made):
+@pytest.mark.parametrize("haptic_map", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "above 1"])
+def test_share_out_of_range_or_without_legs_of_one_clip_raises_parameter_error(haptic_map):
     with pytest.raises(ParameterError, match="share of other joints from 0 to 1"):
-        made.with_share(1.1 if made.upper else 0.5)
+        haptic_map.with_share(1.1 if haptic_map.upper else 0.5)
 
 
-def test_beyond_the_edges_nothing_is_extrapolated():
+def test_pose_beyond_the_edges_equals_that_at_the_edge():
     for k, (r, z) in enumerate([(0.005, -0.2), (0.3, -0.1), (0.02, 0.2), (0.2, 0.31)]):
         np.testing.assert_array_equal(STILL.pose(stylus(r, 1.0, z)), STILL.pose(stylus(*_at(k, 1.0 / (2 * np.pi)))))
 
 
-def test_the_blend_weight_eases_in_and_is_linear_between():
+def test_blend_weight_eases_at_the_ends_and_is_linear_between():
     assert eased(-1.0) == (0.0, 0.0)
     assert eased(2.0) == (1.0, 0.0)
     assert eased(0.5)[0] == pytest.approx(0.5)
-    s, h = np.linspace(-0.2, 1.2, 1401), 1e-6
+    s = np.linspace(-0.2, 1.2, 1401)
     weight, slope = np.array([eased(v) for v in s]).T
     assert (np.diff(weight) >= 0.0).all()
-    np.testing.assert_allclose(slope, [(eased(v + h)[0] - eased(v - h)[0]) / (2 * h) for v in s], atol=1e-5)
+    numeric = [central_differences(lambda v: eased(v)[0], v, 1e-6) for v in s]
+    np.testing.assert_allclose(slope, numeric, atol=1e-5)
     # C²: the slope has no kink either.
     assert np.abs(np.diff(slope, 2)).max() < 1e-3
     np.testing.assert_allclose(np.diff(weight[(s > 0.2) & (s < 0.8)], 2), 0.0, atol=1e-15)
@@ -120,19 +123,14 @@ ARMS = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=2).with_share(0.5)
 
 
 @pytest.mark.parametrize("h_map", [STILL, MOVING, ARMS], ids=["still", "moving", "arms"])
-def test_the_derivative_agrees_with_differences_on_the_manifold(h_map):
-    rng = np.random.default_rng(0)
-    step, worst = 1e-5, 0.0
+def test_jacobian_matches_finite_differences_on_the_manifold(h_map):
+    rng, worst = np.random.default_rng(0), 0.0
     for _ in range(150):
         x = stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.04, 0.04))
         jacobian = h_map.jacobian(x)
         assert jacobian.shape == (h_map.nv, 6) == (6 + 3 * JOINTS, 6)
-        for axis in range(3):
-            d = step * np.eye(7)[axis]
-            near = difference(h_map.pose(x + d), h_map.pose(x - d)) / (2 * step)
-            far = difference(h_map.pose(x + 2 * d), h_map.pose(x - 2 * d)) / (4 * step)
-            error = np.abs((4.0 * near - far) / 3.0 - jacobian[:, axis]).max()
-            worst = max(worst, error / (1.0 + np.abs(jacobian).max()))
+        error = np.abs(numeric_jacobian(h_map, x, 1e-5) - jacobian[:, :3]).max()
+        worst = max(worst, error / (1.0 + np.abs(jacobian).max()))
         np.testing.assert_array_equal(jacobian[:, 3:], 0.0)
     assert worst < 1e-6
 
@@ -144,12 +142,12 @@ def test_pose_does_not_depend_on_the_stylus_orientation():
     np.testing.assert_array_equal(STILL.pose(x), STILL.pose(turned))
 
 
-@pytest.mark.parametrize("where", [(0.03, -0.03), (0.05, 0.0), (0.06, 0.02), (0.03, 0.03)])
-def test_pose_velocity_and_acceleration_are_continuous_over_the_seam(where):
+@pytest.mark.parametrize("position", [(0.03, -0.03), (0.05, 0.0), (0.06, 0.02), (0.03, 0.03)])
+def test_pose_velocity_and_acceleration_are_continuous_over_the_seam(position):
     memory, step, poses = MOVING.compiled().memory, 2e-3, []
     for k in range(-40, 41):
         # The seam lies between two samples, as at a servo's ticks.
-        poses.append(MOVING.pose(stylus(where[0], (k + 0.4) * step, where[1]), memory))
+        poses.append(MOVING.pose(stylus(position[0], (k + 0.4) * step, position[1]), memory))
     velocity = np.array([difference(b, a) for a, b in pairwise(poses)]) / step
     change = np.abs(np.diff(velocity, axis=0)).max(axis=1)
     assert memory[LAPS] == 1.0
@@ -158,7 +156,7 @@ def test_pose_velocity_and_acceleration_are_continuous_over_the_seam(where):
     assert change.max() < 0.2
 
 
-def test_a_lap_there_and_back_returns_to_the_same_pose():
+def test_lap_there_and_back_returns_to_the_same_pose():
     memory = MOVING.compiled().memory
     path = np.concatenate([np.linspace(0.1, 15.0, 400), np.linspace(15.0, 0.1, 400)])
     poses = [MOVING.pose(stylus(0.045, angle, 0.012), memory) for angle in path]
@@ -167,7 +165,7 @@ def test_a_lap_there_and_back_returns_to_the_same_pose():
     assert memory[LAPS] == 0.0
 
 
-def test_clips_that_return_make_a_map_without_a_memory():
+def test_memory_has_no_effect_for_clips_without_drift():
     memory = STILL.compiled().memory
     for angle in np.linspace(0.1, 40.0, 500):
         x = stylus(0.05, angle, 0.0)
@@ -175,7 +173,7 @@ def test_clips_that_return_make_a_map_without_a_memory():
     assert memory[LAP_X] == memory[LAP_HEADING] == 0.0
 
 
-def test_a_walk_goes_on_by_its_stride_a_lap():
+def test_walk_advances_by_its_stride_each_lap():
     memory = MOVING.compiled().memory
     start = MOVING.pose(stylus(*_at(0, 0.3)), memory)
     for s in np.linspace(0.3, 3.3, 200):
@@ -184,7 +182,7 @@ def test_a_walk_goes_on_by_its_stride_a_lap():
     np.testing.assert_allclose(difference(end, start)[2:], 0.0, atol=1e-9)
 
 
-def test_the_kernels_means_are_those_of_the_eigenvectors():
+def test_mean_rotation_is_the_dominant_eigenvector():
     stacked = np.stack([clip[:60] for clip, _ in CLIPS], axis=1)
     weights = np.array([0.1, 0.2, 0.3, 0.4])
     for frame in range(0, 60, 11):
@@ -197,7 +195,7 @@ def test_the_kernels_means_are_those_of_the_eigenvectors():
 
 @settings(max_examples=60)
 @given(st.tuples(*[st.floats(-10.0, 10.0)] * 3))
-def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
+def test_pose_is_finite_with_unit_quaternions_everywhere(p):
     x = np.array([*p, 1.0, 0.0, 0.0, 0.0])
     for h_map in (STILL, MOVING):
         pose = h_map.pose(x)
@@ -205,12 +203,12 @@ def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
         np.testing.assert_allclose(np.linalg.norm(pose[3:].reshape(-1, 4), axis=1), 1.0, atol=1e-12)
 
 
-def test_the_compiled_entry_gives_the_same_to_the_last_bit():
+def test_compiled_map_is_identical():
     assert_same_compiled(MOVING, stylus(0.05, 2.0, 0.01))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         ((CLIPS[:3], R, Z), "blends 4 clips, got 3"),
         ((CLIPS, (0.07, 0.03), Z), "r_range must increase"),
@@ -220,6 +218,6 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
         (([*CLIPS[:3], (CLIPS[3][0][:, :11], 30.0)], R, Z), r"same size, got \[19, 19, 19, 11\]"),
     ],
 )
-def test_what_cannot_be_blended_is_refused_with_the_numbers(arguments, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_arguments_raise_parameter_error(arguments, message):
+    with pytest.raises(ParameterError, match=message):
         Cylindrical(*arguments)

@@ -1,4 +1,4 @@
-"""The expressive map: the base at an upright stylus, its derivative, the ends of the joints' ranges, and C² edges."""
+"""The expressive map: the base at an upright stylus, its Jacobian, joint limits, and C² edges."""
 
 import itertools
 
@@ -10,11 +10,12 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, stylus_turn, yielded
-from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging, wxyz
+from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, displaced, stylus, swinging, wxyz
+from tests.derivatives import extrapolated_differences
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
 BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))
-# The clips swing farther than these ranges: all that the ends do to the derivative is met.
+# The clips exceed these ranges, so that the effect of the limits on the Jacobian is covered.
 HEAD = ExpressiveJoint(3, (0.1, 0.6, -0.7), (-0.6, -0.4, -0.5), (0.5, 0.7, 0.6))
 TRUNK = ExpressiveJoint(1, (0.5, 0.3, 0.2), (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
 MAP = Expressive(BASE, (TRUNK, HEAD))
@@ -24,35 +25,31 @@ def turned(x, rotation):
     return np.concatenate([x[:3], wxyz(rotation)])
 
 
-def anywhere(rng, largest=np.pi):
-    """A stylus within the map's domain, turned by up to an angle about any axis."""
+def random_stylus(rng, largest=np.pi):
+    """A random stylus pose within the map's domain, turned by up to `largest` about a random axis."""
     axis = rng.normal(size=3)
     turn = Rotation.from_rotvec(rng.uniform(0.0, largest) * axis / np.linalg.norm(axis))
     return turned(stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.03, 0.03)), turn)
 
 
-def moved(x, tangent):
-    return turned(x[:3] + tangent[:3], Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1)))
-
-
-def room_left(x):
-    """The least distance of a joint that is turned from the ends of its range."""
+def distance_to_limits(x):
+    """The least distance [rad] of the expressive joints from their limits in the base map."""
     pose = BASE.pose(x)
-    there = [(j, Rotation.from_quat(np.roll(pose[3 + 4 * j.joint :][:4], -1)).as_rotvec()) for j in (TRUNK, HEAD)]
-    return min(min((joint.high - v).min(), (v - joint.low).min()) for joint, v in there)
+    current = [(j, Rotation.from_quat(np.roll(pose[3 + 4 * j.joint :][:4], -1)).as_rotvec()) for j in (TRUNK, HEAD)]
+    return min(min((joint.high - v).min(), (v - joint.low).min()) for joint, v in current)
 
 
-def test_an_upright_stylus_gives_the_base_map_to_the_last_bit():
+def test_upright_stylus_gives_the_base_map_exactly():
     rng = np.random.default_rng(3)
     for _ in range(200):
-        x = turned(anywhere(rng), Rotation.identity())
+        x = turned(random_stylus(rng), Rotation.identity())
         np.testing.assert_array_equal(MAP.pose(x), BASE.pose(x))
         np.testing.assert_array_equal(MAP.pose(-x * [-1, -1, -1, 1, 1, 1, 1]), BASE.pose(x))
         jacobian = MAP.jacobian(x)
         np.testing.assert_allclose(jacobian[:, :3], BASE.jacobian(x)[:, :3], atol=1e-14)
 
 
-def test_small_turns_turn_each_joint_by_its_gains_and_nothing_else():
+def test_small_rotation_turns_each_joint_by_its_gains_alone():
     x, small = stylus(0.05, 1.0, 0.0), np.array([2e-5, -3e-5, 1e-5])
     change = difference(MAP.pose(turned(x, Rotation.from_rotvec(small))), MAP.pose(x))
     free = Expressive(BASE, (ExpressiveJoint(2, (0.5, 0.3, 0.2), (-3.0,) * 3, (3.0,) * 3),))
@@ -64,24 +61,20 @@ def test_small_turns_turn_each_joint_by_its_gains_and_nothing_else():
 
 
 @pytest.mark.slow
-def test_the_derivative_agrees_with_differences_on_the_manifold():
+def test_jacobian_matches_finite_differences_on_the_manifold():
     lower_leg = Composite(
         *[(np.hstack([poses, swinging(9, len(poses) - 1)[:, 7:11]]), fps) for poses, fps in CLIPS[:3]],
         (4,), (0.03, 0.07), [LEG],
     )  # fmt: skip
     upper = Expressive(lower_leg, (ExpressiveJoint(4, HEAD.gain, HEAD.low, HEAD.high),))
-    rng, step = np.random.default_rng(0), 1e-5
+    rng = np.random.default_rng(0)
     for h_map in (MAP, upper):
         errors, largest = [], 0.0
         for _ in range(500):
-            x = anywhere(rng)
+            x = random_stylus(rng)
             jacobian = h_map.jacobian(x)
-            numeric = np.empty_like(jacobian)
-            for axis in range(6):
-                d = step * np.eye(6)[axis]
-                near = difference(h_map.pose(moved(x, d)), h_map.pose(moved(x, -d))) / (2 * step)
-                far = difference(h_map.pose(moved(x, 2 * d)), h_map.pose(moved(x, -2 * d))) / (4 * step)
-                numeric[:, axis] = (4.0 * near - far) / 3.0
+            pose_at = lambda d, h_map=h_map, x=x: h_map.pose(displaced(x, d))  # noqa: E731
+            numeric = extrapolated_differences(pose_at, np.zeros(6), 1e-5, difference)
             errors.append(np.abs(numeric - jacobian).max() / (1.0 + np.abs(jacobian).max()))
             largest = max(largest, np.abs(jacobian[:, 3:]).max())
         assert max(errors) < 1e-6
@@ -90,12 +83,12 @@ def test_the_derivative_agrees_with_differences_on_the_manifold():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
-def test_twice_differentiable_along_lines_through_every_edge(seed):
-    """A turn about an axis by 0 to 360°: past the rooms' ends, into the fade, through half a turn and back."""
+def test_pose_is_twice_differentiable_over_every_edge(seed):
+    """Along rotations by 0 to 360° about an axis: beyond the joint limits, through half a turn and back."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
-    x = next(x for x in (anywhere(rng) for _ in range(1000)) if room_left(x) > 0.2)
+    x = next(x for x in (random_stylus(rng) for _ in range(1000)) if distance_to_limits(x) > 0.2)
 
     def roughness(steps):
         angles = np.linspace(0.0, 2.0 * np.pi, steps + 1)
@@ -106,25 +99,25 @@ def test_twice_differentiable_along_lines_through_every_edge(seed):
 
     coarse, fine = roughness(1500), roughness(6000)
     assert coarse[0] > 1e-3
-    # A jump would not shrink, a corner of h_* only as the step does: its second difference shrinks with the square.
+    # Without jump or kink of the Jacobian its second difference goes with the square of the step.
     assert fine[0] < 0.3 * coarse[0]
     assert fine[1] < 0.3 * coarse[1]
     assert fine[2] < 0.12 * coarse[2]
 
 
-def test_a_joint_yields_smoothly_to_the_end_of_its_range_and_never_passes_it():
-    there, low, high = 0.2, -0.5, 0.9
-    wanted = np.linspace(-30.0, 30.0, 6001)
-    passed = np.array([yielded(y, there, low, high)[0] for y in wanted])
-    assert (np.diff(passed) >= 0.0).all()
-    assert low < there + passed.min() < low + 0.03
-    assert high - 0.03 < there + passed.max() < high
-    np.testing.assert_allclose(passed[np.abs(wanted) < 0.2], wanted[np.abs(wanted) < 0.2], rtol=0.02)
-    # Also where the clip is past the end already: no room, and not turned back.
+def test_joint_yields_smoothly_to_its_limit_and_never_exceeds_it():
+    current, low, high = 0.2, -0.5, 0.9
+    requested = np.linspace(-30.0, 30.0, 6001)
+    applied = np.array([yielded(y, current, low, high)[0] for y in requested])
+    assert (np.diff(applied) >= 0.0).all()
+    assert low < current + applied.min() < low + 0.03
+    assert high - 0.03 < current + applied.max() < high
+    np.testing.assert_allclose(applied[np.abs(requested) < 0.2], requested[np.abs(requested) < 0.2], rtol=0.02)
+    # Where the clip exceeds the limit already, it is neither turned further nor back.
     assert 0.0 <= yielded(1.0, 1.1, low, high)[0] < 1e-3
 
 
-def test_a_half_turn_one_way_is_the_half_turn_the_other_way():
+def test_half_turn_either_way_gives_no_rotation():
     turn, rates = np.empty(3), np.empty((3, 3))
     for axis in np.random.default_rng(1).normal(size=(20, 3)):
         vector = np.pi * axis / np.linalg.norm(axis)
@@ -134,13 +127,13 @@ def test_a_half_turn_one_way_is_the_half_turn_the_other_way():
             np.testing.assert_allclose(rates, 0.0, atol=1e-12)
 
 
-def test_the_compiled_entry_gives_the_same_to_the_last_bit():
+def test_compiled_map_is_identical():
     rng = np.random.default_rng(5)
     for _ in range(20):
-        assert_same_compiled(MAP, anywhere(rng))
+        assert_same_compiled(MAP, random_stylus(rng))
 
 
-def test_the_lap_of_the_base_goes_on():
+def test_lap_memory_of_the_base_is_kept():
     memory, alone = MAP.compiled().memory, BASE.compiled().memory
     for angle in np.linspace(0.1, 13.0, 200):
         x = stylus(0.05, angle, 0.0)
@@ -154,7 +147,7 @@ def test_the_lap_of_the_base_goes_on():
 
 
 @pytest.mark.parametrize(
-    ("joints", "says"),
+    ("joints", "message"),
     [
         ((), "at least one joint"),
         ((ExpressiveJoint(0, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression wants to turn 0"),
@@ -163,11 +156,11 @@ def test_the_lap_of_the_base_goes_on():
         ((ExpressiveJoint(1, (1.0,) * 3, (1.0,) * 3, (1.0,) * 3),), "range of joint 1 must be three intervals"),
     ],
 )
-def test_what_cannot_be_expressed_is_refused(joints, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_joints_raise_parameter_error(joints, message):
+    with pytest.raises(ParameterError, match=message):
         Expressive(BASE, joints)
 
 
-def test_an_expressive_map_is_not_wrapped_again():
+def test_expressive_map_of_an_expressive_map_raises_parameter_error():
     with pytest.raises(ParameterError, match="give all joints to one of them"):
         Expressive(MAP, (HEAD,))

@@ -1,4 +1,4 @@
-"""The lifted map: every clip exact on its own curve, smooth between them, held at the edges."""
+"""The lifted map: every clip exact on its own curve, and legs of one clip with arms of others."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,13 @@ def ring(m, radius=0.012, centre=(0.05, 0.0)):
     return np.stack([centre[0] + size * np.cos(around), centre[1] + size * np.sin(around)], axis=-1)
 
 
-def once_round(frames, start=0.0, span=TURN, unevenness=0.25):
+def angles_once_round(frames, start=0.0, span=TURN, unevenness=0.25):
     """Angles of frames: increasing, at an uneven pace."""
     s = np.linspace(0.0, 1.0, frames)
     return start + span * (s + unevenness * np.sin(TURN * s) / TURN)
 
 
-# Two that close, of which one walks, one turns and one is cut open.
+# A walk, a clip on the spot, a turn, and an open part of a clip.
 CLIPS = [
     (swinging(1, 120, travel=1.3), 30.0),
     (swinging(2, 90), 25.0),
@@ -34,7 +34,12 @@ CLIPS = [
     (swinging(6, 200)[:140], 30.0),
 ]
 CLOSED = [True, True, True, False]
-ANGLES = [once_round(121), once_round(91, 1.2), once_round(151, 4.0), once_round(140, 0.3, TURN - 0.9)]
+ANGLES = [
+    angles_once_round(121),
+    angles_once_round(91, 1.2),
+    angles_once_round(151, 4.0),
+    angles_once_round(140, 0.3, TURN - 0.9),
+]
 MAP = Lifted(CLIPS, CLOSED, ANGLES, ring(4), [LEG], ("walk", "still", "turn", "cut"))
 
 
@@ -54,7 +59,7 @@ def test_every_frame_of_every_clip_is_exact_on_its_curve():
 
 
 @pytest.mark.parametrize("i", range(4))
-def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
+def test_frames_at_many_angles_are_identical_to_the_kernel(i):
     clip = MAP._placed_clips[i]
     spline = lap_spline(clip.angles, clip.remainder, 4, clip.closed)
     angles = np.concatenate([np.linspace(0.0, TURN, 200), np.mod(spline[0], TURN), [np.nextafter(TURN, 0.0)]])
@@ -64,11 +69,11 @@ def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
         np.testing.assert_array_equal(row, value)
 
 
-def test_the_compiled_entry_gives_the_same_to_the_last_bit():
+def test_compiled_map_is_identical():
     assert_same_compiled(MAP, stylus(0.05, 2.0, 0.004))
 
 
-def test_a_clip_is_moved_over_the_ground_as_a_whole():
+def test_clips_are_displaced_rigidly_over_the_ground():
     for i, (poses, _) in enumerate(CLIPS):
         placed = MAP.placed(i)
         np.testing.assert_array_equal(placed[:, 2], poses[:, 2])
@@ -78,14 +83,14 @@ def test_a_clip_is_moved_over_the_ground_as_a_whole():
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "message"),
     [
         ({"closed": [True] * 4}, "clip cut: a|clip cut is closed: its angles must go once round"),
         ({"closed": CLOSED[:3]}, "4 clips, 3 closed"),
         ({"names": ("a", "a", "b", "c")}, "a name of its own"),
         ({"angles": [*ANGLES[:3], ANGLES[3][:-1]]}, r"clip cut has 140 frames, its angles have shape \(139,\)"),
         ({"angles": [*ANGLES[:3], ANGLES[3][::-1]]}, "must be finite and increase"),
-        ({"angles": [*ANGLES[:3], once_round(140, 0.3, TURN)]}, "leave a gap of 0.05 rad or more"),
+        ({"angles": [*ANGLES[:3], angles_once_round(140, 0.3, TURN)]}, "leave a gap of 0.05 rad or more"),
         (
             {"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]},
             "clip cut: two of its frames are 3.12 rad",
@@ -97,63 +102,63 @@ def test_a_clip_is_moved_over_the_ground_as_a_whole():
         ({"margin": 0.0}, "margin of a lifted map"),
     ],
 )
-def test_what_cannot_be_lifted_is_refused(change, says):
+def test_invalid_arguments_raise_parameter_error(change, message):
     arguments = {
         "clips": CLIPS, "closed": CLOSED, "angles": ANGLES, "sites": ring(4), "limbs": [LEG],
         "names": ("walk", "still", "turn", "cut"),
     }  # fmt: skip
-    with pytest.raises(ParameterError, match=says):
+    with pytest.raises(ParameterError, match=message):
         Lifted(**(arguments | change))
 
 
-def test_a_clip_that_should_close_and_does_not_is_refused():
+def test_closed_clip_with_a_gap_raises_parameter_error():
     poses = CLIPS[3][0]
     assert closing_gap(poses) > 0.1
     with pytest.raises(ParameterError, match=r"clip 0 is to be closed, but its last frame is 0\.\d+ from its first"):
-        Lifted([(poses, 30.0)], [True], [once_round(140)], ring(1))
+        Lifted([(poses, 30.0)], [True], [angles_once_round(140)], ring(1))
 
 
-FREE = Lifted(CLIPS, CLOSED, ANGLES, ring(4), (), ("walk", "still", "turn", "cut"))
+MAP_WITHOUT_LIMBS = Lifted(CLIPS, CLOSED, ANGLES, ring(4), (), ("walk", "still", "turn", "cut"))
 ARMS = [2, 3]
-"""A map without limbs, of which the second and third joint are left to all clips."""
+"""The joints of the map without limbs that are left to all clips."""
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4, 0.0])
-def test_legs_are_one_clips_wherever_the_hand_is_and_arms_have_their_share_of_the_others(share):
+def test_legs_are_of_one_clip_and_arms_have_their_share_of_the_others(share):
     owner, rng = 1, np.random.default_rng(5)
-    owned = FREE.with_legs_of(owner, ARMS, share)
+    owned = MAP_WITHOUT_LIMBS.with_legs_of(owner, ARMS, share)
     for r, angle, z in rng.uniform([0.03, 0.1, -0.02], [0.07, 6.2, 0.02], (60, 3)):
-        x, own = stylus(r, angle, z), FREE.site(owner, np.array(angle))
-        alone = FREE.pose(stylus(own[0], angle, own[1]))
+        x, own = stylus(r, angle, z), MAP_WITHOUT_LIMBS.site(owner, np.array(angle))
+        alone = MAP_WITHOUT_LIMBS.pose(stylus(own[0], angle, own[1]))
         pose = owned.pose(x)
         np.testing.assert_allclose(difference(pose, alone)[:9], 0.0, atol=1e-9)
         # The chordal mean of clips is the dominant eigenvector of their weighted sum of q qᵀ (Markley et al. 2007).
-        weights, sum_of = share * FREE.weights(x) + (1.0 - share) * np.eye(4)[owner], np.zeros((2, 4, 4))
+        weights, moments = share * MAP_WITHOUT_LIMBS.weights(x) + (1.0 - share) * np.eye(4)[owner], np.zeros((2, 4, 4))
         for i, weight in enumerate(weights):
-            at = FREE.site(i, np.array(angle))
-            clip = FREE.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)
-            sum_of += weight * clip[:, :, None] * clip[:, None, :]
-        mean = np.linalg.eigh(sum_of)[1][:, :, -1].ravel()
+            at = MAP_WITHOUT_LIMBS.site(i, np.array(angle))
+            clip = MAP_WITHOUT_LIMBS.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)
+            moments += weight * clip[:, :, None] * clip[:, None, :]
+        mean = np.linalg.eigh(moments)[1][:, :, -1].ravel()
         np.testing.assert_allclose(difference(pose, np.concatenate([pose[:11], mean]))[9:], 0.0, atol=1e-6)
 
 
-def test_the_map_that_gives_its_legs_away_stays_as_it_is():
-    before, x = FREE.pose(stylus(0.05, 2.0, 0.004)), stylus(0.05, 2.0, 0.004)
-    owned = FREE.with_legs_of(2, ARMS, 0.5)
+def test_with_legs_of_leaves_the_original_map_unchanged():
+    before, x = MAP_WITHOUT_LIMBS.pose(stylus(0.05, 2.0, 0.004)), stylus(0.05, 2.0, 0.004)
+    owned = MAP_WITHOUT_LIMBS.with_legs_of(2, ARMS, 0.5)
     assert np.abs(difference(owned.pose(x), before)).max() > 0.01
-    np.testing.assert_array_equal(FREE.pose(x), before)
-    assert (FREE.remarks, FREE.legs_of) == ((), None)
+    np.testing.assert_array_equal(MAP_WITHOUT_LIMBS.pose(x), before)
+    assert (MAP_WITHOUT_LIMBS.remarks, MAP_WITHOUT_LIMBS.legs_of) == ((), None)
     assert owned.remarks == (
         "legs and trunk are those of turn wherever the hand is pushed, which bear 50 % of the others' arms",
     )
 
 
 @pytest.mark.parametrize(("clip", "upper", "share"), [(4, ARMS, 1.0), (0, [4], 1.0), (0, [0], 1.0), (0, ARMS, 1.5)])
-def test_legs_that_cannot_be_given_are_refused(clip, upper, share):
+def test_invalid_legs_raise_parameter_error(clip, upper, share):
     with pytest.raises(ParameterError, match="a lifted map takes the legs of clip 0 to 3"):
-        FREE.with_legs_of(clip, upper, share)
+        MAP_WITHOUT_LIMBS.with_legs_of(clip, upper, share)
 
 
-def test_joints_of_a_limb_are_not_left_to_the_others():
+def test_joints_of_a_limb_cannot_be_left_to_other_clips():
     with pytest.raises(ParameterError, match="no limb's"):
         MAP.with_legs_of(0, [2], 1.0)

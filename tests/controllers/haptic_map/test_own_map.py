@@ -1,4 +1,4 @@
-"""A map of one's own says a pose: its size, its derivative and its kernel follow from that."""
+"""User-defined maps: size, Jacobian and kernel follow from their pose; errors are stored and reported."""
 
 import copy
 import pickle
@@ -35,8 +35,8 @@ def kernel_of(haptic_map: HapticMap, x: np.ndarray, rows: int) -> tuple[np.ndarr
     return pose, jacobian
 
 
-def asked_in_a_run(haptic_map: HapticMap, *points: np.ndarray) -> list[np.ndarray]:
-    """Poses that the tick gets at points of one run."""
+def poses_in_a_run(haptic_map: HapticMap, *points: np.ndarray) -> list[np.ndarray]:
+    """Poses that the kernel gives at successive points of one run."""
     stages, params, memory, _ = haptic_map.compiled()
     poses = [np.empty(11) for _ in points]
     for x, pose in zip(points, poses, strict=True):
@@ -44,28 +44,28 @@ def asked_in_a_run(haptic_map: HapticMap, *points: np.ndarray) -> list[np.ndarra
     return poses
 
 
-def test_sizes_and_derivative_follow_from_the_pose() -> None:
-    made = Turned()
-    assert (made.nq, made.nv) == (11, 9)
+def test_sizes_and_jacobian_follow_from_the_pose() -> None:
+    own = Turned()
+    assert (own.nq, own.nv) == (11, 9)
     expected = np.zeros((9, 6))
     expected[:3, :3] = np.eye(3)
     expected[5, 0] = RATE
     # ω_H turns the joint about H's axes; its own frame is turned by R, so ω = Rᵀ ω_H.
     w, y = X[3], X[5]
     expected[6:, 3:] = np.array([[w * w - y * y, 0, 2 * w * y], [0, 1, 0], [-2 * w * y, 0, w * w - y * y]]).T
-    np.testing.assert_allclose(made.jacobian(X), expected, atol=1e-8)
+    np.testing.assert_allclose(own.jacobian(X), expected, atol=1e-8)
 
 
-def test_the_kernel_asks_the_map() -> None:
-    made = Turned()
-    pose, jacobian = kernel_of(made, X, made.nv)
-    np.testing.assert_array_equal(pose, made.pose(X))
-    np.testing.assert_array_equal(jacobian, made.jacobian(X))
-    assert kernel_of(made, X, 0)[0].tolist() == pose.tolist()  # without the derivative
+def test_kernel_calls_pose_and_jacobian_of_the_map() -> None:
+    own = Turned()
+    pose, jacobian = kernel_of(own, X, own.nv)
+    np.testing.assert_array_equal(pose, own.pose(X))
+    np.testing.assert_array_equal(jacobian, own.jacobian(X))
+    assert kernel_of(own, X, 0)[0].tolist() == pose.tolist()  # without the derivative
 
 
-def given(jacobian: Callable[[np.ndarray], object]) -> HapticMap:
-    """The same map with a derivative of its own."""
+def with_jacobian(jacobian: Callable[[np.ndarray], object]) -> HapticMap:
+    """The map `Turned` with a given Jacobian."""
 
     class Given(Turned):
         def jacobian(self, x, memory=None):
@@ -74,15 +74,15 @@ def given(jacobian: Callable[[np.ndarray], object]) -> HapticMap:
     return Given()
 
 
-def test_a_derivative_that_is_given_is_taken() -> None:
-    rounded = given(lambda x: np.round(Turned().jacobian(x), 6))
+def test_own_jacobian_is_used() -> None:
+    rounded = with_jacobian(lambda x: np.round(Turned().jacobian(x), 6))
     rounded.check_jacobian(X[None, :3])
-    _, taken = kernel_of(rounded, X, 9)
+    _, used = kernel_of(rounded, X, 9)
     rounded.check()
-    np.testing.assert_array_equal(taken, rounded.jacobian(X))
+    np.testing.assert_array_equal(used, rounded.jacobian(X))
 
 
-SHAPES = [
+MALFORMED_JACOBIANS = [
     (lambda x: np.zeros((3, 3)), r"a jacobian of shape \(3, 3\); expected \(9, 6\), or none"),
     (lambda x: np.zeros(6), r"a jacobian of shape \(6,\); expected \(9, 6\)"),
     (lambda x: 0.0, r"a jacobian of shape \(\); expected \(9, 6\)"),
@@ -90,18 +90,18 @@ SHAPES = [
 ]
 
 
-@pytest.mark.parametrize(("jacobian", "said"), SHAPES)
-def test_a_derivative_of_another_shape_or_not_finite_is_refused_before_a_run_and_in_a_tick(jacobian, said: str) -> None:
-    wrong = given(jacobian)
-    with pytest.raises(ParameterError, match=said):
+@pytest.mark.parametrize(("jacobian", "message"), MALFORMED_JACOBIANS)
+def test_malformed_jacobian_raises_before_the_run_and_in_a_tick(jacobian, message: str) -> None:
+    wrong = with_jacobian(jacobian)
+    with pytest.raises(ParameterError, match=message):
         wrong.check_jacobian(X[None, :3])
     kernel_of(wrong, X, 9)
-    with pytest.raises(ParameterError, match=said):
+    with pytest.raises(ParameterError, match=message):
         wrong.check()
 
 
 @pytest.mark.parametrize(
-    ("jacobian", "said"),
+    ("jacobian", "message"),
     [
         (
             lambda x: -Turned().jacobian(x),
@@ -111,12 +111,12 @@ def test_a_derivative_of_another_shape_or_not_finite_is_refused_before_a_run_and
         (lambda x: 1.01 * Turned().jacobian(x), r"is 3\.03 in row 5, column 0"),
     ],
 )
-def test_a_derivative_that_is_not_that_of_the_poses_is_refused(jacobian, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        given(jacobian).check_jacobian(X[None, :3])
+def test_jacobian_inconsistent_with_the_pose_raises_parameter_error(jacobian, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        with_jacobian(jacobian).check_jacobian(X[None, :3])
 
 
-def test_a_derivative_is_not_compared_where_the_map_has_a_kink() -> None:
+def test_jacobian_is_not_compared_at_a_kink_of_the_pose() -> None:
     class Kinked(Turned):
         def pose(self, x):
             return super().pose(np.concatenate([np.abs(x[:3] - X[:3]) + X[:3], x[3:]]))
@@ -130,18 +130,18 @@ def test_a_derivative_is_not_compared_where_the_map_has_a_kink() -> None:
         Kinked().check_jacobian(X[None, :3] - 100 * beside)
 
 
-def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
+def test_exception_in_pose_is_stored_and_the_last_pose_kept() -> None:
     class Fails(Turned):
         def pose(self, x):
             if x[0] > 0.05:
                 raise ZeroDivisionError("beyond")
             return super().pose(x) if x[0] > 0.03 else super().pose(x)[: 11 if x[0] > -0.03 else 10]
 
-    made = Fails()
-    before, after = asked_in_a_run(made, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
+    own = Fails()
+    before, after = poses_in_a_run(own, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
     np.testing.assert_array_equal(after, before)
     with pytest.raises(ZeroDivisionError, match="beyond"):
-        made.check()
+        own.check()
     wrong = Fails()
     kernel_of(wrong, np.array([-0.04, 0, 0, 1.0, 0, 0, 0]), 0)
     with pytest.raises(ParameterError, match=r"gave a pose of shape \(10,\) at p = .*; expected 11 finite numbers"):
@@ -149,7 +149,7 @@ def test_what_goes_wrong_in_a_map_is_kept_and_the_pose_stays() -> None:
 
 
 class Scaled(Turned):
-    """Moved along x by a number that may be changed; a large one is an error away from the origin."""
+    """Moved along x by a gain that may be changed; a large gain raises away from the origin."""
 
     gain = 1.0
 
@@ -164,57 +164,57 @@ class Slotted(Scaled):
 
 
 @pytest.mark.parametrize("kind", [Scaled, Slotted])
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda made: pickle.loads(pickle.dumps(made))])
-def test_a_copy_of_a_map_that_ran_is_asked_itself(copied: Callable[[HapticMap], HapticMap], kind) -> None:
-    made = kind()
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda own: pickle.loads(pickle.dumps(own))])
+def test_copy_of_a_used_map_calls_itself(copied: Callable[[HapticMap], HapticMap], kind) -> None:
+    own = kind()
     if kind is Slotted:
-        made.note = "kept"
-    kernel_of(made, X, 0)
-    other = copied(made)
+        own.note = "kept"
+    kernel_of(own, X, 0)
+    other = copied(own)
     other.gain = 2.0
     np.testing.assert_array_equal(kernel_of(other, X, 0)[0], other.pose(X))
-    np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
+    np.testing.assert_array_equal(kernel_of(own, X, 0)[0], own.pose(X))
     assert getattr(other, "note", "kept") == "kept"
 
 
-def test_a_map_that_is_asked_elsewhere_meanwhile_gives_each_its_own_pose() -> None:
+def test_concurrent_calls_of_one_map_return_their_own_poses() -> None:
     class Shared(Turned):
         def jacobian(self, x, memory=None):
-            asked_of(params, -X)  # as another run of a sweep does in its thread
+            pose_of(params, -X)  # as another run of a sweep does in its own thread
             return super().jacobian(x)
 
-    def asked_of(params: np.ndarray, x: np.ndarray, rows: int = 0) -> np.ndarray:
+    def pose_of(params: np.ndarray, x: np.ndarray, rows: int = 0) -> np.ndarray:
         pose = np.empty(11)
         own_map(params, x, np.zeros(1), pose, np.empty((rows, 6)))
         return pose
 
-    made = Shared()
-    params = made.compiled().params
-    np.testing.assert_array_equal(asked_of(params, X, 9), made.pose(X))
+    own = Shared()
+    params = own.compiled().params
+    np.testing.assert_array_equal(pose_of(params, X, 9), own.pose(X))
 
 
-def test_a_map_that_was_repaired_after_an_error_begins_anew() -> None:
-    made = Scaled()
-    made.gain = 1e9
-    kernel_of(made, X, 0)
+def test_repaired_map_runs_again_after_an_error() -> None:
+    own = Scaled()
+    own.gain = 1e9
+    kernel_of(own, X, 0)
     with pytest.raises(ZeroDivisionError):
-        made.check()
-    made.gain = 2.0
-    np.testing.assert_array_equal(kernel_of(made, X, 0)[0], made.pose(X))
-    made.check()
+        own.check()
+    own.gain = 2.0
+    np.testing.assert_array_equal(kernel_of(own, X, 0)[0], own.pose(X))
+    own.check()
 
 
 def upright(**numbers: object) -> np.ndarray:
-    """A pose of the figure, with other numbers, by place (`at5`)."""
+    """An upright pose of the figure with some numbers replaced, by index (`at5`)."""
     pose = np.zeros(75)
     pose[3::4] = 1.0
-    for place, number in numbers.items():
-        pose[int(place[2:])] = number
+    for key, number in numbers.items():
+        pose[int(key[2:])] = number
     return pose
 
 
 @pytest.mark.parametrize(
-    ("pose", "said"),
+    ("pose", "message"),
     [
         (
             1.5 * upright(),
@@ -228,19 +228,19 @@ def upright(**numbers: object) -> np.ndarray:
         (None, r"the pose of map Given at p = .* is None; expected numbers"),
     ],
 )
-def test_a_pose_that_is_none_of_the_figure_is_refused_with_its_map_and_its_place(pose: object, said: str) -> None:
+def test_invalid_pose_raises_with_map_and_position(pose: object, message: str) -> None:
     class Given(HapticMap):
         def pose(self, x):
             return pose if x[0] == X[0] else upright()
 
-    made = Given()
-    kernel_of(made, X, 0)
-    with pytest.raises(ParameterError, match=said) as told:
-        made.check()
-    assert "map Given" in str(told.value)
+    own = Given()
+    kernel_of(own, X, 0)
+    with pytest.raises(ParameterError, match=message) as error:
+        own.check()
+    assert "map Given" in str(error.value)
 
 
-def test_a_map_that_returns_nothing_is_told_before_its_poses_are_counted() -> None:
+def test_map_that_returns_none_raises_when_its_size_is_read() -> None:
     class Nothing(HapticMap):
         def pose(self, x):
             pass
@@ -249,38 +249,38 @@ def test_a_map_that_returns_nothing_is_told_before_its_poses_are_counted() -> No
         _ = Nothing().nq
 
 
-def test_quaternions_of_single_precision_are_taken() -> None:
+def test_single_precision_quaternions_are_accepted() -> None:
     class Rounded(HapticMap):
         def pose(self, x):
             return (upright(at3=np.cos(x[0]), at4=np.sin(x[0]))).astype(np.float32)
 
-    made = Rounded()
-    pose, *_ = kernel_of(made, X, 0)
-    made.check()
-    np.testing.assert_array_equal(pose, made.pose(X))
+    own = Rounded()
+    pose, *_ = kernel_of(own, X, 0)
+    own.check()
+    np.testing.assert_array_equal(pose, own.pose(X))
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
-def test_ctrl_c_within_a_map_is_kept_like_an_error_and_the_pose_is_written(kind: type[BaseException]) -> None:
+def test_interrupt_within_a_map_is_stored_and_the_last_pose_written(kind: type[BaseException]) -> None:
     class Interrupted(Turned):
         def pose(self, x):
             if x[0] > 0.05:
                 raise kind
             return super().pose(x)
 
-    made = Interrupted()
-    before, after = asked_in_a_run(made, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
+    own = Interrupted()
+    before, after = poses_in_a_run(own, X, X + np.array([0.02, 0, 0, 0, 0, 0, 0]))
     np.testing.assert_array_equal(after, before)
     with pytest.raises(kind):
-        made.check()
+        own.check()
 
 
-def test_a_kernel_in_plain_python_is_refused_where_its_class_is_made() -> None:
+def test_plain_python_kernel_raises_when_its_class_is_defined() -> None:
     with pytest.raises(ParameterError, match="expected a function compiled by numba's njit"):
         type("Plain", (KernelMap,), {"map_kernel": staticmethod(lambda params, x, memory, pose, jacobian: None)})
 
 
-def test_a_compiled_map_of_one_s_own_needs_no_entry_in_the_library() -> None:
+def test_compiled_own_map_needs_no_registration() -> None:
     rate = RATE  # a kernel of one process, which reads a number of this function
 
     @njit
@@ -295,9 +295,9 @@ def test_a_compiled_map_of_one_s_own_needs_no_entry_in_the_library() -> None:
         map_kernel = staticmethod(slide)
         nq, nv = 3, 3
 
-    made = Slide(np.array([2.0]))
-    assert_same_compiled(made, X)
-    np.testing.assert_array_equal(map_poses(made, X[None]), 2.0 * RATE * X[None, :3])
+    own = Slide(np.array([2.0]))
+    assert_same_compiled(own, X)
+    np.testing.assert_array_equal(map_poses(own, X[None]), 2.0 * RATE * X[None, :3])
 
 
 @njit
@@ -310,21 +310,21 @@ class Still(KernelMap):
     map_kernel = staticmethod(still)
 
 
-def test_a_compiled_map_that_says_no_sizes_has_those_of_the_figure_and_takes_a_list() -> None:
-    made = Still([0.5, 2])
-    assert (made.nq, made.nv) == (75, 57)
-    np.testing.assert_array_equal(made.pose(X), np.full(75, 0.5))
-    np.testing.assert_array_equal(made.jacobian(X), np.full((57, 6), 2.0))
+def test_compiled_map_without_sizes_has_those_of_the_figure_and_takes_a_list() -> None:
+    own = Still([0.5, 2])
+    assert (own.nq, own.nv) == (75, 57)
+    np.testing.assert_array_equal(own.pose(X), np.full(75, 0.5))
+    np.testing.assert_array_equal(own.jacobian(X), np.full((57, 6), 2.0))
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: Still([[1.0, 2.0]]), r"params of Still have the shape \(1, 2\); expected one row"),
         (lambda: Still("soft"), "params of Still is 'soft'; expected numbers"),
         (lambda: type("Bare", (KernelMap,), {})([1.0]), "Bare has no kernel; expected map_kernel"),
     ],
 )
-def test_a_compiled_map_without_a_kernel_or_with_other_parameters_is_refused(make, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
+def test_invalid_kernel_map_raises_parameter_error(make, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         make()

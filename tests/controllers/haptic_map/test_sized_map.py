@@ -1,11 +1,10 @@
-"""A map of a figure of another size: all points of the body in proportion, its derivative, and what it wraps."""
+"""The map of a figure of another size: body points in proportion, the Jacobian, and the order of its kernels."""
 
 import mujoco
 import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import finite_differences
 from controllers.haptic_map.cylindrical import Cylindrical, cylindrical_map
 from controllers.haptic_map.expressive import express
 from controllers.haptic_map.map_stages import first_params, kernels_of
@@ -13,7 +12,8 @@ from controllers.haptic_map.sized import Sized, size_pose
 from experiments.setups.parts.expression import expressive_figure
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.mocap.library import embedded
-from tests.controllers.clips_for_maps import assert_same_compiled, stylus
+from tests.controllers.clips_for_maps import assert_same_compiled, difference, displaced, stylus
+from tests.derivatives import central_differences
 
 WALK = embedded("walk")
 BASE = expressive_figure(Cylindrical([(WALK.poses, WALK.fps)] * 4, (0.03, 0.07), (-0.02, 0.02)))
@@ -30,19 +30,20 @@ def soles(stature: float, pose: np.ndarray) -> np.ndarray:
     return data.geom_xpos[[figure.geom(name).id for name in FOOT_CONTACTS]]
 
 
-def test_every_point_of_the_body_is_in_proportion() -> None:
+def test_sole_points_scale_with_the_figure() -> None:
     np.testing.assert_allclose(soles(1.2, MAP.pose(STYLUS)), SIZE * soles(1.75, BASE.pose(STYLUS)), atol=1e-12)
 
 
-def test_the_derivative_is_that_of_the_pose() -> None:
-    np.testing.assert_allclose(MAP.jacobian(STYLUS), finite_differences(MAP.pose, STYLUS), rtol=2e-6, atol=2e-6)
+def test_jacobian_matches_finite_differences() -> None:
+    numeric = central_differences(lambda d: MAP.pose(displaced(STYLUS, d)), np.zeros(6), 1e-5, difference)
+    np.testing.assert_allclose(MAP.jacobian(STYLUS), numeric, rtol=2e-6, atol=2e-6)
 
 
-def test_the_tick_evaluates_it_as_python_does() -> None:
+def test_compiled_map_is_identical() -> None:
     assert_same_compiled(MAP, STYLUS)
 
 
-def test_its_kernels_are_called_after_those_of_all_that_it_is_made_of() -> None:
+def test_kernels_run_after_those_of_the_wrapped_maps() -> None:
     stages, params, _, size = MAP.compiled()
     assert kernels_of(stages) == (cylindrical_map, express, size_pose)
     np.testing.assert_array_equal(first_params.py_func(stages, params), BASE.base.compiled().params)
@@ -50,6 +51,6 @@ def test_its_kernels_are_called_after_those_of_all_that_it_is_made_of() -> None:
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, np.inf, np.nan])
-def test_a_size_that_none_has_is_refused(size: float) -> None:
+def test_invalid_size_raises_parameter_error(size: float) -> None:
     with pytest.raises(ParameterError, match="expected more than 0, and finite"):
         Sized(BASE, size)

@@ -1,4 +1,4 @@
-"""Feet of in-betweens: one at a time, still while they stand, and nothing changed in a clip alone."""
+"""Foot corrections of blends: feet step one at a time and stand still, and a single clip is unchanged."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ REST = 3 + 4 * 7
 
 
 def bump(start, end):
-    """A step's way from 0 to 1 over an interval of the lap, and a lift over it."""
+    """Progress of a step from 0 to 1 over an interval of the lap, and its lift."""
     x = np.clip((S - start) / (end - start), 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), np.sin(np.pi * x) ** 2
 
@@ -32,7 +32,7 @@ def clip(left, right):
 
 
 def kicking(limb, start, end, height=0.1, ahead=0.3):
-    """One foot kicks forwards and comes back, the other stands."""
+    """Channels of a clip in which one foot kicks forwards and returns while the other stands."""
     _, lift = bump(start, end)
     feet = [np.zeros((N, 3)), np.zeros((N, 3))]
     feet[0][:, 1], feet[1][:, 1] = 0.1, -0.1
@@ -41,74 +41,74 @@ def kicking(limb, start, end, height=0.1, ahead=0.3):
 
 
 def walking(length, height):
-    """Two steps a lap in the frame of the drift: each foot is still over the ground but for its own step."""
+    """Channels of a walk of two steps a lap in the frame of the drift: each foot stands except in its own step."""
     feet = []
     for y, start, end in ((0.1, 0.05, 0.45), (-0.1, 0.55, 0.95)):
-        way, lift = bump(start, end)
-        feet.append(np.stack([length * (way - S), np.full(N, y), height * lift], axis=1))
+        progress, lift = bump(start, end)
+        feet.append(np.stack([length * (progress - S), np.full(N, y), height * lift], axis=1))
     return clip(*feet)
 
 
 def paths(clips, drifts, weights):
-    """Corrected feet over the ground at one mixture: places (N, 2, 2) and heights (N, 2)."""
+    """Corrected feet in the world for given weights: positions (N, 2, 2) and heights (N, 2)."""
     channels, weights = np.stack(clips, axis=1), np.asarray(weights)
     d = foot_corrections(channels, drifts, LEGS, weights[None])[:, 0, ROOT:].reshape(N, 2, FOOT)
     ends = np.einsum("m,nmk->nk", weights, channels)[:, REST:].reshape(N, 2, 4)
     shift, angle = plane_exponential(S[:, None] * (weights @ drifts))
-    places = turned(angle[:, None], ends[..., :2] + d[..., :2]) + shift[:, None]
-    return places, ends[..., 2] + d[..., 2]
+    positions = turned(angle[:, None], ends[..., :2] + d[..., :2]) + shift[:, None]
+    return positions, ends[..., 2] + d[..., 2]
 
 
 CLIPS = [kicking(0, 0.1, 0.4), kicking(1, 0.2, 0.5)]
-STILL = np.zeros((2, 3))
+NO_DRIFT = np.zeros((2, 3))
 
 
-def test_a_clip_alone_is_left_as_it_is():
+def test_correction_is_zero_for_a_single_clip():
     for weights in np.eye(2):
-        d = foot_corrections(np.stack(CLIPS, axis=1), STILL, LEGS, weights[None])
+        d = foot_corrections(np.stack(CLIPS, axis=1), NO_DRIFT, LEGS, weights[None])
         np.testing.assert_allclose(d, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
-def test_of_two_feet_lifted_at_once_one_stands_and_does_not_move(share):
-    places, heights = paths(CLIPS, STILL, [1.0 - share, share])
+def test_one_of_two_feet_lifted_at_once_stands_still(share):
+    positions, heights = paths(CLIPS, NO_DRIFT, [1.0 - share, share])
     mean = np.einsum("m,nmk->nk", [1.0 - share, share], np.stack(CLIPS, axis=1))[:, REST:].reshape(N, 2, 4)
     assert mean[..., 2].min(axis=1).max() > 0.01
     np.testing.assert_allclose(heights.min(axis=1), 0.0, atol=2e-3)
     for j in range(2):
-        # Where the mean has this foot as the lower one, it drags it along.
+        # The uncorrected mean drags this foot along while it is the lower one.
         lower = mean[:, j, 2] <= mean[:, 1 - j, 2]
         dragged = np.abs(np.diff(mean[:, j, 0]))[lower[1:] & lower[:-1]].sum()
         stands = heights[:, j] < 1e-3
-        moved = np.linalg.norm(np.diff(places[:, j], axis=0), axis=1)
+        moved = np.linalg.norm(np.diff(positions[:, j], axis=0), axis=1)
         assert moved.sum() > 0.05
         assert moved[stands[1:] & stands[:-1]].sum() < 0.15 * dragged
 
 
-def test_a_small_share_of_a_step_is_lifted_enough_and_still_made():
+def test_small_share_of_a_step_is_still_lifted_and_made():
     standing = clip(*(np.tile([0.0, y, 0.0], (N, 1)) for y in (0.1, -0.1)))
     drifts = np.array([[0.6, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    places, heights = paths([walking(0.6, 0.03), standing], drifts, [0.1, 0.9])
+    positions, heights = paths([walking(0.6, 0.03), standing], drifts, [0.1, 0.9])
     for j in range(2):
-        x = places[:, j, 0]
+        x = positions[:, j, 0]
         assert heights[:, j].max() > 0.006
         low = heights[:, j] < 0.003
-        # The mean would make a quarter of its 6 cm so near to the ground.
+        # The uncorrected mean would move a quarter of its 6 cm this close to the floor.
         assert np.abs(np.diff(x))[low[1:] & low[:-1]].sum() < 0.004
         assert x[-1] - x[0] == pytest.approx(0.06, abs=0.02)
 
 
-def test_a_height_at_which_all_clips_fly_stays():
+def test_height_at_which_all_clips_fly_is_unchanged():
     _, lift = bump(0.6, 0.9)
     flying = [c.copy() for c in CLIPS]
     for c in flying:
         for column in (2, 6):
             c[:, REST + column] += 0.2 * lift
-    _, heights = paths(flying, STILL, [0.5, 0.5])
+    _, heights = paths(flying, NO_DRIFT, [0.5, 0.5])
     np.testing.assert_allclose(heights[S > 0.55], np.outer(0.2 * lift[S > 0.55], [1.0, 1.0]), atol=1e-3)
 
 
-def test_what_turns_with_the_lap_closes():
+def test_correction_of_a_turning_mixture_closes_over_the_lap():
     drifts = np.array([[0.0, 0.0, 2.0 * np.pi], [0.0, 0.0, 0.0]])
     d = foot_corrections(np.stack(CLIPS, axis=1), drifts, LEGS, np.array([[0.5, 0.5]]))[:, 0]
     jumps = np.abs(np.diff(d, axis=0)).max(axis=0)

@@ -1,4 +1,4 @@
-"""A gait that flies, kept on the ground: no flight is left, feet stand where they stood, legs are long enough."""
+"""The grounded form of a gait with flight: no flight, feet stand where they do in the clip, legs are long enough."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import pose_difference
 from tests.controllers.figure_soles import slide, soles
+from tests.derivatives import central_differences
 
 
 def walker(s, held):
@@ -28,20 +29,20 @@ def run(figure):
     return led_map(embedded("run"), figure)
 
 
-def test_runs_of_a_mask_go_round():
+def test_runs_of_a_cyclic_mask_wrap_round():
     assert runs(np.array([1, 1, 0, 0, 1], dtype=bool)) == [(4, 7)]
     assert runs(np.array([0, 1, 1, 0, 1, 0], dtype=bool)) == [(1, 3), (4, 5)]
     assert runs(np.ones(4, dtype=bool)) == []
     assert runs(np.zeros(4, dtype=bool)) == []
 
 
-def test_no_flight_is_left_and_feet_do_not_slide(figure, run):
+def test_grounded_run_has_no_flight_and_no_foot_skate(figure, run):
     led, gait = run
-    places = np.arange(0.0, gait.stride, 0.01)
-    flown, held = (soles(figure, [led.pose(walker(s, u)) for s in places]) for u in (0.0, 1.0))
+    arguments = np.arange(0.0, gait.stride, 0.01)
+    flown, held = (soles(figure, [led.pose(walker(s, u)) for s in arguments]) for u in (0.0, 1.0))
     lowest = held[..., 2].min(axis=1)
     assert flown[..., 2].min(axis=1).max() > 0.03
-    # By less than which the physical figure's contact points count as on the floor (`sim.body.figure_state`).
+    # Less than the tolerance of the physical figure's contact points (`sim.body.figure_state`).
     assert lowest.max() < 0.005
     assert lowest.min() > -0.005
     assert slide(held) < 0.01
@@ -51,14 +52,14 @@ def test_no_flight_is_left_and_feet_do_not_slide(figure, run):
 
 def test_feet_stand_where_they_stand_in_the_clip(figure, run):
     led, gait = run
-    places = np.arange(0.0, gait.stride, 0.01)
-    flown, held = (soles(figure, [led.pose(walker(s, u)) for s in places]) for u in (0.0, 1.0))
+    arguments = np.arange(0.0, gait.stride, 0.01)
+    flown, held = (soles(figure, [led.pose(walker(s, u)) for s in arguments]) for u in (0.0, 1.0))
     flat = (flown[..., 2] < 0.003) & (held[..., 2] < 0.003)
     assert flat.sum() > 500
     assert np.linalg.norm(flown[..., :2] - held[..., :2], axis=-1)[flat].max() < 0.02
 
 
-def test_the_root_keeps_its_height_and_no_knee_is_locked(run):
+def test_root_height_is_nearly_constant_and_knees_stay_bendable(run):
     led, gait = run
     poses = np.array([led.pose(walker(s, 1.0)) for s in np.arange(0.0, gait.stride, 0.02)])
     clip = np.array([led.pose(walker(s, 0.0)) for s in np.arange(0.0, gait.stride, 0.02)])
@@ -71,19 +72,17 @@ def test_the_root_keeps_its_height_and_no_knee_is_locked(run):
 
 
 @pytest.mark.parametrize("held", [0.0, 0.3, 1.0])
-def test_the_derivatives_by_place_and_form_are_those_of_the_pose(run, held):
+def test_jacobian_by_argument_and_blend_matches_finite_differences(run, held):
     led, gait = run
-    h = 1e-6
+    tangent = lambda end, start: pose_difference(start, end)  # noqa: E731
     for s in np.random.default_rng(5).uniform(0.0, gait.stride, 25):
         jacobian = led.jacobian(walker(s, held))
-        by_s = pose_difference(led.pose(walker(s - h, held)), led.pose(walker(s + h, held))) / (2.0 * h)
-        by_u = pose_difference(led.pose(walker(s, held - h)), led.pose(walker(s, held + h))) / (2.0 * h)
-        np.testing.assert_allclose(jacobian[:, 0], by_s, atol=2e-6)
-        np.testing.assert_allclose(jacobian[:, 1], by_u, atol=2e-6)
-        assert np.abs(by_u).max() > 0.05
+        numeric = central_differences(lambda x: led.pose(walker(*x)), [s, held], 1e-6, tangent)
+        np.testing.assert_allclose(jacobian[:, :2], numeric, atol=2e-6)
+        assert np.abs(numeric[:, 1]).max() > 0.05
 
 
-def test_a_walk_has_one_form_only(figure):
+def test_walk_has_no_grounded_form(figure):
     led, gait = led_map(embedded("walk"), figure)
     assert not led.grounds
     assert not gait.flies
@@ -91,11 +90,11 @@ def test_a_walk_has_one_form_only(figure):
     np.testing.assert_array_equal(led.jacobian(walker(0.7, 1.0))[:, 1], 0.0)
 
 
-def test_who_hops_on_one_foot_cannot_be_kept_on_the_ground(figure):
+def test_one_legged_hop_cannot_be_grounded(figure):
     clip = embedded("run")
     standing = contacts(clip).planted[:-1]
     hop = np.column_stack([standing.any(axis=1), np.zeros(len(standing), dtype=bool)])
     hop[: len(hop) // 2] = False
     assert Led((clip.poses, clip.fps), figure_legs(figure), standing=standing).grounds
-    # A flight of more than half a lap from a foot to itself: sooner and later it would stand twice at once.
+    # After a flight of more than half a lap onto the same foot its earlier and later stances would overlap.
     assert not Led((clip.poses, clip.fps), figure_legs(figure), standing=hop).grounds

@@ -1,4 +1,4 @@
-"""A limb that steps: where its joints would leap its foot gives way, and elsewhere it is where it is asked for."""
+"""Stepping limbs: the foot is placed exactly, except where it deviates to avoid jumps of the joints."""
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ STANDING = np.zeros(STEP)
 
 
 def _pose() -> np.ndarray:
-    """Knees a little bent, as clips have them."""
+    """A pose with slightly bent knees, as in clips."""
     pose = FIGURE.qpos0.copy()
     half = 0.4
     for joint, angle in (("left_hip", -half), ("left_knee", 2 * half), ("left_ankle", -half)):
@@ -39,7 +39,7 @@ def _put(end: np.ndarray, share: float) -> np.ndarray:
     return pose
 
 
-def _leaps(ends: np.ndarray, share: float) -> float:
+def _largest_jump(ends: np.ndarray, share: float) -> float:
     """Largest second difference of a joint along a path of the foot, over the time step of 1 ms [rad/s]."""
     poses = np.array([_put(end, share) for end in ends])
     return float(np.abs(np.diff(pose_difference(poses[:-1], poses[1:]), axis=0)).max() / 1e-3)
@@ -52,32 +52,32 @@ def _path(start: np.ndarray, velocity: np.ndarray, seconds: float) -> np.ndarray
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_a_foot_within_easy_reach_is_where_it_is_asked_for(share: float) -> None:
+def test_reachable_foot_is_placed_exactly(share: float) -> None:
     end = _end(_pose())
     end[:3] += [0.1, 0.02, 0.1]
     np.testing.assert_allclose(_end(_put(end, share))[:3], end[:3], atol=1e-9)
 
 
-def test_a_foot_that_is_left_behind_does_not_snap_the_knee_straight() -> None:
-    # A root that goes on at 3 m/s, from a leg within reach to one far beyond it.
+def test_foot_left_behind_does_not_snap_the_knee_straight() -> None:
+    # The root moves on at 3 m/s until the foot is far out of reach.
     ends = _path(_end(_pose()), np.array([-3.0, 0.0, 0.0]), 0.3)
-    assert _leaps(ends, 1.0) < 2.0
-    assert _leaps(ends, 0.0) > 10.0
+    assert _largest_jump(ends, 1.0) < 2.0
+    assert _largest_jump(ends, 0.0) > 10.0
     bent = [np.linalg.norm(pose_difference(FIGURE.qpos0, _put(end, 1.0))[KNEE : KNEE + 3]) for end in ends]
     assert min(bent) > 0.2
 
 
-def test_a_foot_that_passes_its_hip_closely_goes_by_below_it() -> None:
+def test_foot_passing_close_to_its_hip_goes_below_it() -> None:
     hip = np.array([0.0, LEG[4], _pose()[2] + LEG[5]])
     start = _end(_pose())
     start[:3] = hip + np.array([-0.4, 0.02, -0.12])
     ends = _path(start, np.array([4.0, 0.0, 0.0]), 0.2)
-    assert _leaps(ends, 1.0) < 0.5 * _leaps(ends, 0.0)
+    assert _largest_jump(ends, 1.0) < 0.5 * _largest_jump(ends, 0.0)
     ankles = np.array([_end(_put(end, 1.0))[:3] for end in ends])
     assert np.linalg.norm(ankles - hip, axis=1).min() > 0.2 * LENGTH
 
 
-def test_the_root_has_to_go_down_by_what_the_leg_is_too_short() -> None:
+def test_shortfall_is_the_descent_of_the_root_that_the_leg_needs() -> None:
     pose, step = _pose(), STANDING.copy()
     end = _end(pose)
     data = mujoco.MjData(FIGURE)
@@ -91,7 +91,7 @@ def test_the_root_has_to_go_down_by_what_the_leg_is_too_short() -> None:
     expected = -line[2] - np.sqrt((0.95 * LENGTH) ** 2 - line[0] ** 2 - line[1] ** 2)
     assert expected > 0.03
     assert shortfall(LEG, step, pose, end) == pytest.approx(expected, abs=0.01)
-    # A foot in the air does not ask for it, nor one that is within reach.
+    # Neither for a foot in the air nor for one within reach.
     step[FLOOR] = end[2] - 0.3
     assert shortfall(LEG, step, pose, end) == 0.0
     assert shortfall(LEG, STANDING, pose, _end(pose)) == 0.0

@@ -1,4 +1,4 @@
-"""Captures that are led: noise above the cutoff goes, what is below stays, round the lap."""
+"""Low-pass filter of captures over the closed lap."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ N, DURATION = 256, 1.25
 
 
 def waves(frequency: float, size: float) -> np.ndarray:
-    """A lap whose root moves up and down, and whose one joint is bent, at a frequency [Hz]."""
+    """A lap of a root that moves vertically and turns, both at one frequency [Hz]."""
     t = DURATION * np.arange(N) / N
     wave = size * np.sin(2.0 * np.pi * frequency * t)
     quaternions = Rotation.from_rotvec(np.outer(wave, [0.0, 1.0, 0.0])).as_quat(scalar_first=True)
@@ -21,7 +21,7 @@ def waves(frequency: float, size: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("cycles", [1, 4, 8, 16, 32])
-def test_each_frequency_is_let_through_as_the_filter_says(cycles: int) -> None:
+def test_each_frequency_is_attenuated_by_the_filter_response(cycles: int) -> None:
     frequency, cutoff = cycles / DURATION, 5.0
     size = 0.01
     passed = low_passed(waves(frequency, size), DURATION, cutoff)
@@ -32,7 +32,7 @@ def test_each_frequency_is_let_through_as_the_filter_says(cycles: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(passed[:, 3:], axis=1), 1.0, atol=1e-15)
 
 
-def test_it_is_what_a_butterworth_filter_does_forwards_and_backwards() -> None:
+def test_low_pass_matches_a_zero_phase_butterworth_filter() -> None:
     rng = np.random.default_rng(1)
     lap = waves(0.8, 0.1)
     lap[:, 2] += 0.02 * rng.normal(size=N)
@@ -42,7 +42,7 @@ def test_it_is_what_a_butterworth_filter_does_forwards_and_backwards() -> None:
     np.testing.assert_allclose(low_passed(lap, DURATION, 5.0)[:, 2], twice, atol=2e-4)
 
 
-def test_a_rotation_that_comes_back_with_the_opposite_sign_is_one() -> None:
+def test_rotation_that_returns_as_its_negative_is_continuous() -> None:
     angle = 2.0 * np.pi * np.arange(N) / N
     turning = Rotation.from_rotvec(np.outer(angle, [0.0, 0.0, 1.0])).as_quat(scalar_first=True)
     # Followed continuously, one turn ends at −q.
@@ -55,6 +55,6 @@ def test_a_rotation_that_comes_back_with_the_opposite_sign_is_one() -> None:
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 5.0, 0.75), (0.02, np.nan, 0.75), (0.02, 5.0, -1.0)])
-def test_a_capture_has_positive_numbers(numbers: tuple[float, float, float]) -> None:
+def test_invalid_capture_parameters_raise_parameter_error(numbers: tuple[float, float, float]) -> None:
     with pytest.raises(ParameterError, match="all positive"):
         Capture(*numbers)

@@ -1,4 +1,4 @@
-"""Clips as loops: drift, closing, alignment in time."""
+"""Clips as loops: drift, closing and temporal alignment."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,12 @@ from tests.controllers.clips_for_maps import matrices, swinging, wxyz
 
 def _loop(poses, fps=30.0):
     return closed_loop(checked_clip(poses, fps, "clip"), fps)
+
+
+def _mean_heading(poses):
+    """Mean heading [rad]: the angle of the mean of exp(iα), of the rotations' twists α about the vertical."""
+    w, _, _, z = poses[:, 3:7].T
+    return np.angle(np.sum((w + 1j * z) ** 2))
 
 
 def _somersault(frames=60):
@@ -30,70 +36,88 @@ def _somersault(frames=60):
         (swinging(4, turns=-2.0), [0.0, 0.0, -4 * np.pi]),
         (_somersault(), [0.0, 0.0, 0.0]),
     ],
-    ids=["stays", "walks", "spins", "spins twice", "somersault"],
+    ids=["in place", "walk", "spin", "double spin", "somersault"],
 )
-def test_drift_is_what_a_lap_moves_and_turns(poses, drift):
+def test_drift_is_displacement_and_turn_per_lap(poses, drift):
     loop = _loop(poses)
+    # Loops face +x on average, so the drift is turned back by the clip's mean heading.
+    expected = Rotation.from_rotvec([0.0, 0.0, -_mean_heading(poses)]).apply([*drift[:2], 0.0])[:2]
     np.testing.assert_allclose(np.hypot(*loop.drift[:2]), np.hypot(*drift[:2]), atol=1e-9)
+    np.testing.assert_allclose(loop.drift[:2], expected, atol=1e-9)
     assert loop.drift[2] == pytest.approx(drift[2], abs=1e-9)
     assert loop.duration == pytest.approx((len(poses) - 1) / 30.0)
 
 
-def test_a_walk_in_a_curve_repeats_round_its_circle():
+def _curved_walk():
     poses = swinging(5, travel=0.0)
     s = np.linspace(0.0, 1.0, len(poses))
     shift, angle = plane_exponential(s[:, None] * [1.2, 0.1, 0.7])
     poses[:, :2], poses[:, 3:7] = turned(angle, poses[:, :2]) + shift, yawed(angle, poses[:, 3:7])
-    loop = _loop(poses)
+    return poses
+
+
+@pytest.mark.parametrize(("heading", "displacement"), [(0.0, [3.0, -2.0]), (2.1, [0.0, 0.0]), (-2.9, [-40.0, 7.0])])
+def test_drift_of_a_rigidly_moved_clip_is_unchanged_in_its_own_frame(heading, displacement):
+    poses = _curved_walk()
+    moved, turn = poses.copy(), Rotation.from_euler("z", heading)
+    moved[:, :3] = turn.apply(poses[:, :3]) + np.append(displacement, 0.0)
+    moved[:, 3:7] = wxyz(turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True))
+    before, after = _loop(poses).drift, _loop(moved).drift
+    assert np.hypot(*before[:2]) > 1.0
+    assert np.hypot(*after[:2]) == pytest.approx(np.hypot(*before[:2]), abs=1e-9)
+    # Each loop faces +x on average: these are directions relative to the clip's own heading.
+    assert np.arctan2(after[1], after[0]) == pytest.approx(np.arctan2(before[1], before[0]), abs=1e-9)
+    assert after[2] == pytest.approx(before[2], abs=1e-9)
+
+
+def test_curved_walk_has_a_periodic_remainder():
+    loop = _loop(_curved_walk())
     assert loop.drift[2] == pytest.approx(0.7, abs=1e-9)
-    # The step of the lap does not depend on where the clip stood, its twist's translation does.
-    step, _ = plane_exponential(np.array([0.0, 0.0, 0.7]))
-    assert np.abs(step).max() == 0.0
     remainder = loop.channels(np.array([0.0, 1.0 - 1e-12]), np.zeros(2))
     np.testing.assert_allclose(remainder[0], remainder[1], atol=1e-8)
 
 
 @pytest.mark.parametrize("turns", [-1.0, 1.0, 2.0])
-def test_who_turns_round_as_he_goes_is_not_pulled_shut_over_the_seam(turns):
+def test_closed_loop_keeps_heading_drift_of_spinning_walk(turns):
     poses = swinging(2, travel=1.3)
     s = np.linspace(0.0, 1.0, len(poses))
     poses[:, 3:7] = yawed((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
     loop = _loop(poses)
     assert loop.drift[2] == pytest.approx(-0.24, abs=1e-9)
-    made = loop.channels(s, s)
-    np.testing.assert_allclose(made[:, 2], poses[:, 2], atol=1e-6)
-    heading = Rotation.from_quat(made[:, [4, 5, 6, 3]]) * Rotation.from_quat(poses[:, [4, 5, 6, 3]]).inv()
+    channels = loop.channels(s, s)
+    np.testing.assert_allclose(channels[:, 2], poses[:, 2], atol=1e-6)
+    heading = Rotation.from_quat(channels[:, [4, 5, 6, 3]]) * Rotation.from_quat(poses[:, [4, 5, 6, 3]]).inv()
     np.testing.assert_allclose(heading.as_matrix(), heading[0].as_matrix()[None].repeat(len(s), 0), atol=1e-6)
 
 
-def test_a_loop_put_together_again_is_the_clip_where_it_was_moved_to():
+def test_loop_with_drift_reconstructs_the_clip():
     poses = swinging(2, travel=1.3)
     loop = _loop(poses)
     s = np.linspace(0.0, 1.0, len(poses))[:-1]
     shift, angle = plane_exponential(s[:, None] * loop.drift)
-    again = loop.channels(s, np.zeros(len(s)))
-    root = turned(angle, again[:, :2]) + shift
-    # Up to one displacement of the plane, the same path and the same joints.
+    channels = loop.channels(s, np.zeros(len(s)))
+    root = turned(angle, channels[:, :2]) + shift
+    # The same path up to a rigid displacement, and the same joints.
     np.testing.assert_allclose(
         np.linalg.norm(np.diff(root, axis=0), axis=1),
         np.linalg.norm(np.diff(poses[:-1, :2], axis=0), axis=1),
         atol=1e-9,
     )
-    np.testing.assert_allclose(matrices(again[:, 7:11]), matrices(poses[:-1, 7:11]), atol=1e-12)
-    np.testing.assert_allclose(again[:, 2], poses[:-1, 2], atol=1e-12)
+    np.testing.assert_allclose(matrices(channels[:, 7:11]), matrices(poses[:-1, 7:11]), atol=1e-12)
+    np.testing.assert_allclose(channels[:, 2], poses[:-1, 2], atol=1e-12)
 
 
-def test_an_open_clip_is_closed_smoothly_at_its_ends_only():
+def test_open_clip_is_closed_smoothly_at_its_ends_only():
     whole = swinging(6, 200)
     poses = whole[:140]
-    # So fast that its ends are in the middle of the motion: it is not played there and back.
+    # Too fast at its ends to be played there and back.
     loop = closed_loop(checked_clip(poses, 240.0, "clip"), 240.0)
     assert np.abs(poses[-1, 7:] - poses[0, 7:]).max() > 0.02
     s = np.arange(139) / 139
     found = loop.channels(s, np.zeros(139))
     inside = (s > 0.2) & (s < 0.8)
     np.testing.assert_allclose(matrices(found[inside, 7:11]), matrices(poses[:-1][inside, 7:11]), atol=1e-12)
-    # Twice differentiable over the seam: second differences there are no larger than elsewhere in the loop.
+    # Twice differentiable over the seam: second differences have no outliers there.
     fine = loop.channels(np.arange(-60, 60) / 3000.0, np.zeros(120))[:, 7:11]
     rotations = Rotation.from_matrix(matrices(fine))
     velocity = (rotations[:-1].inv() * rotations[1:]).as_rotvec() * 3000.0
@@ -101,14 +125,14 @@ def test_an_open_clip_is_closed_smoothly_at_its_ends_only():
     assert jumps.max() < 6.0 * np.median(jumps) + 1e-6
 
 
-def test_a_clip_of_two_frames_and_one_that_stands_still_are_loops():
+def test_clips_of_two_frames_and_still_clips_are_loops():
     for poses in (swinging(7)[[0, 40]], np.tile(swinging(7)[:1], (50, 1))):
         values = _loop(poses).channels(np.linspace(0.0, 1.0, 20), np.zeros(20))
         assert np.isfinite(values).all()
         np.testing.assert_allclose(np.linalg.norm(values[:, 7:11], axis=1), 1.0)
 
 
-def test_clips_shifted_and_warped_in_time_come_out_together():
+def test_time_shifted_and_warped_clips_are_aligned():
     reference = swinging(8, 240)
     s = np.linspace(0.0, 1.0, 241)
     warped = s + 0.03 * np.sin(2.0 * np.pi * s)
@@ -127,7 +151,7 @@ def _angles(a, b):
 
 
 @pytest.mark.parametrize(
-    ("poses", "fps", "says"),
+    ("poses", "fps", "message"),
     [
         (np.zeros((5, 18)), 30.0, r"shape \(n, 7 \+ 4 joints\), got \(5, 18\)"),
         (swinging(1)[:1], 30.0, "at least 2 frames, got 1"),
@@ -136,12 +160,12 @@ def _angles(a, b):
         (swinging(1) * 2.0, 30.0, "is not unit"),
     ],
 )
-def test_what_is_no_clip_is_refused(poses, fps, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_clips_raise_parameter_error(poses, fps, message):
+    with pytest.raises(ParameterError, match=message):
         checked_clip(poses, fps, "clip 2")
 
 
-def test_an_open_clip_that_rests_is_played_there_and_back():
+def test_open_clip_at_rest_is_played_there_and_back():
     t = np.linspace(0.0, 1.0, 121)
     share = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2))[:, None]
     poses = np.zeros((121, 11))
@@ -153,6 +177,6 @@ def test_an_open_clip_that_rests_is_played_there_and_back():
     np.testing.assert_allclose(folded[[0, len(folded) // 2, -1]], poses[[0, -1, 0]], atol=1e-6)
     loop = closed_loop(folded, 60.0)
     assert np.abs(loop.drift).max() < 1e-9
-    # What is closed, or in the middle of a motion at an end, stays as it is.
+    # A clip that is closed already, or moves at an end, is unchanged.
     for clip, fps in ((folded, 60.0), (poses[:60], 240.0)):
         np.testing.assert_array_equal(there_and_back(clip, fps), clip)

@@ -1,4 +1,4 @@
-"""Inertialisation: the quintic has the ends that it is to have, and nobody turns back on the way to rest."""
+"""Inertialisation: end conditions of the quintic offset, and no reversal on the way to rest."""
 
 import numpy as np
 import pytest
@@ -9,61 +9,61 @@ T = 0.4
 RNG = np.random.default_rng(11)
 
 
-def _derivatives(change: np.ndarray, s: float) -> np.ndarray:
+def _derivatives(start: np.ndarray, s: float) -> np.ndarray:
     """o, ȯ, ö by finite differences on five points inside [0, T], shape (3, n)."""
     h = 1e-3
     s = min(max(s, 2.0 * h), T - 2.0 * h)
-    rows = np.empty((5, change.shape[1]))
+    rows = np.empty((5, start.shape[1]))
     for k in range(5):
-        offset_left(change, T, s + (k - 2) * h, rows[k])
+        offset_left(start, T, s + (k - 2) * h, rows[k])
     polynomial = np.polynomial.polynomial.polyfit(np.arange(-2, 3) * h, rows, 4)
     return np.array([polynomial[0], polynomial[1], 2.0 * polynomial[2]])
 
 
-def test_it_begins_with_the_offset_and_its_rates_and_ends_with_none() -> None:
-    change = RNG.normal(size=(3, 5)) * [[0.3], [2.0], [20.0]]
+def test_offset_is_the_quintic_with_given_start_and_zero_end() -> None:
+    start = RNG.normal(size=(3, 5)) * [[0.3], [2.0], [20.0]]
     times = np.linspace(0.0, T, 12)
     rows = np.empty((12, 5))
     for time, row in zip(times, rows, strict=True):
-        offset_left(change, T, time, row)
-    # Independently: the one quintic through the six conditions, by its linear equations.
+        offset_left(start, T, time, row)
+    # Independent solution: the quintic with these six end conditions, by its linear equations.
     powers = np.arange(6)
     ends = [
         [np.prod(powers[:, None] - np.arange(d), axis=1) * t ** np.maximum(powers - d, 0) for d in range(3)]
         for t in (0.0, T)
     ]
     matrix = np.array(ends).reshape(6, 6)
-    coefficients = np.linalg.solve(matrix, np.vstack([change, np.zeros((3, 5))]))
+    coefficients = np.linalg.solve(matrix, np.vstack([start, np.zeros((3, 5))]))
     np.testing.assert_allclose(rows, np.polynomial.polynomial.polyval(times, coefficients).T, atol=1e-12)
-    np.testing.assert_array_equal(rows[0], change[0])
+    np.testing.assert_array_equal(rows[0], start[0])
     np.testing.assert_array_equal(rows[-1], 0.0)
 
 
-def test_a_motion_that_begins_a_stopping_way_ahead_is_reached_without_coming_back() -> None:
+def test_offset_ends_without_reversal_after_the_stopping_distance() -> None:
     for speed, acceleration in ((1.3, 0.0), (-0.8, -2.0), (2.0, 4.0)):
-        way = stopping_way(speed, acceleration, T)
-        change = np.array([[-way], [speed], [acceleration]])
+        distance = stopping_way(speed, acceleration, T)
+        start = np.array([[-distance], [speed], [acceleration]])
         offsets = np.empty((200, 1))
         for time, row in zip(np.linspace(0.0, T, 200), offsets, strict=True):
-            offset_left(change, T, time, row)
+            offset_left(start, T, time, row)
         steps = np.diff(offsets[:, 0]) * np.sign(speed)
         assert steps.min() > -1e-12
-        # A fixed end without that way: the figure would come back.
+        # Without the stopping distance the figure would have to come back.
         for time, row in zip(np.linspace(0.0, T, 200), offsets, strict=True):
-            offset_left(change * [[0.0], [1.0], [1.0]], T, time, row)
+            offset_left(start * [[0.0], [1.0], [1.0]], T, time, row)
         assert (np.diff(offsets[:, 0]) * np.sign(speed)).min() < -1e-4
 
 
-def test_between_the_ends_it_moves_smoothly() -> None:
-    change = RNG.normal(size=(3, 3)) * [[0.3], [2.0], [20.0]]
-    before = _derivatives(change, 0.1)
-    after = _derivatives(change, 0.1001)
+def test_offset_is_smooth_between_its_ends() -> None:
+    start = RNG.normal(size=(3, 3)) * [[0.3], [2.0], [20.0]]
+    before = _derivatives(start, 0.1)
+    after = _derivatives(start, 0.1001)
     np.testing.assert_allclose(before, after, atol=1.0)
-    assert np.abs(_derivatives(change, T)[2]).max() < 2.0
+    assert np.abs(_derivatives(start, T)[2]).max() < 2.0
 
 
 @pytest.mark.parametrize("joints", [0, 3])
-def test_an_offset_moves_the_root_in_the_world_and_turns_joints_in_their_own_frames(joints: int) -> None:
+def test_offset_moves_the_root_in_the_world_and_joints_in_their_own_frames(joints: int) -> None:
     from scipy.spatial.transform import Rotation
 
     pose = np.zeros(7 + 4 * joints)

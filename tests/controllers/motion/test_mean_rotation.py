@@ -1,4 +1,4 @@
-"""The chordal mean of rotations: global, blind to signs, and its derivative."""
+"""The chordal mean of rotations: global optimum, independent of quaternion signs, and its derivative."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.motion.mean import mean_derivative, mean_rotation
 from tests.controllers.clips_for_maps import matrices, wxyz
+from tests.derivatives import central_differences
 
 RNG = np.random.default_rng(3)
 
@@ -23,30 +24,30 @@ def _case(spread):
 
 
 @pytest.mark.parametrize("spread", [0.0, 1e-8, 0.3, 1.0, 3.0])
-def test_it_is_the_dominant_eigenvector_for_any_spread(spread):
+def test_mean_is_the_dominant_eigenvector_for_any_spread(spread):
     for _ in range(100):
         unit, weights = _case(spread)
         values, vectors = np.linalg.eigh(np.einsum("i,ij,ik->jk", weights, unit, unit))
-        # Where two eigenvalues meet the mean is not unique, and rounding decides.
+        # Where two eigenvalues coincide the mean is not unique.
         if values[-1] - values[-2] > 1e-3:
             assert abs(_mean(unit, weights) @ vectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.3, 1.0, 3.0])
-def test_with_negative_weights_it_is_still_the_eigenvector_of_the_largest_eigenvalue(spread):
-    told = 0
+def test_mean_with_negative_weights_is_the_dominant_eigenvector(spread):
+    compared = 0
     for _ in range(200):
         unit, weights = _case(spread)
         weights[:2] -= RNG.uniform(0.0, 0.5, 2)
         weights /= weights.sum()
         values, vectors = np.linalg.eigh(np.einsum("i,ij,ik->jk", weights, unit, unit))
         if weights.max() < 3.0 and values[-1] - values[-2] > 1e-2:
-            told += 1
+            compared += 1
             assert abs(_mean(unit, weights) @ vectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
-    assert told > 50
+    assert compared > 50
 
 
-def test_it_minimises_the_chordal_distance():
+def test_mean_minimises_the_chordal_distance():
     for _ in range(20):
         unit, weights = _case(0.8)
         q = _mean(unit, weights)
@@ -59,14 +60,14 @@ def test_it_minimises_the_chordal_distance():
             assert cost(matrices(q) @ Rotation.from_rotvec(RNG.normal(size=3) * 0.05).as_matrix()) > best
 
 
-def test_one_rotation_alone_and_equal_rotations_are_their_own_mean():
+def test_mean_of_one_or_of_equal_rotations_is_that_rotation():
     unit, _ = _case(2.0)
     np.testing.assert_allclose(_mean(unit, np.array([0.0, 0.0, 1.0, 0.0])), unit[2], atol=1e-15)
     same = np.tile(unit[0], (4, 1)) * np.array([1.0, -1.0, 1.0, -1.0])[:, None]
     assert abs(_mean(same, np.full(4, 0.25)) @ unit[0]) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_half_a_turn_apart_it_follows_the_heavier_and_stays_finite_in_equal_parts():
+def test_mean_of_rotations_half_a_turn_apart_is_the_heavier_and_finite_for_equal_weights():
     unit = wxyz(Rotation.from_rotvec([[0, 0, 0], [np.pi, 0, 0], [0, 0, 0], [0, 0, 0]]))
     assert abs(_mean(unit, np.array([0.51, 0.49, 0.0, 0.0])) @ unit[0]) == pytest.approx(1.0, abs=1e-12)
     assert abs(_mean(unit, np.array([0.49, 0.51, 0.0, 0.0])) @ unit[1]) == pytest.approx(1.0, abs=1e-12)
@@ -75,7 +76,7 @@ def test_half_a_turn_apart_it_follows_the_heavier_and_stays_finite_in_equal_part
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.3, 0.8])
-def test_its_derivative_agrees_with_differences(spread):
+def test_derivative_matches_finite_differences(spread):
     for _ in range(20):
         unit, weights = _case(spread)
         spin, change = RNG.normal(size=(4, 3)), RNG.normal(size=(2, 4)) * 0.1
@@ -83,14 +84,12 @@ def test_its_derivative_agrees_with_differences(spread):
         tangent = np.empty((3, 2))
         q = _mean(unit, weights)
         mean_derivative(unit, spin, weights, change, q, tangent)
-        rotations, h = Rotation.from_quat(np.roll(unit, -1, axis=1)), 1e-5
+        rotations = Rotation.from_quat(np.roll(unit, -1, axis=1))
 
-        def moved(spun, weighed, rotations=rotations, spin=spin, weights=weights, change=change):
-            q = _mean(wxyz(rotations * Rotation.from_rotvec(spun * spin)), weights + weighed @ change)
+        def mean_at(x, rotations=rotations, spin=spin, weights=weights, change=change):
+            # The first parameter turns the rotations and changes the weights, the second changes the weights alone.
+            q = _mean(wxyz(rotations * Rotation.from_rotvec(x[0] * spin)), weights + x @ change)
             return Rotation.from_quat(np.roll(q, -1))
 
-        # The first parameter turns the rotations and changes the weights, the second changes the weights alone.
-        first, second = np.array([h, 0.0]), np.array([0.0, h])
-        by_spin = (moved(-h, -first).inv() * moved(h, first)).as_rotvec() / (2 * h)
-        by_weight = (moved(0.0, -second).inv() * moved(0.0, second)).as_rotvec() / (2 * h)
-        np.testing.assert_allclose(tangent, np.column_stack([by_spin, by_weight]), atol=2e-7)
+        numeric = central_differences(mean_at, np.zeros(2), 1e-5, lambda end, start: (start.inv() * end).as_rotvec())
+        np.testing.assert_allclose(tangent, numeric, atol=2e-7)

@@ -1,4 +1,4 @@
-"""Travelling clips that repeat themselves take as many strides a lap as the first."""
+"""Strides per lap: travelling clips are trimmed or repeated to the number of strides of the first."""
 
 import numpy as np
 import pytest
@@ -29,11 +29,11 @@ def test_repeats_are_counted(times):
     assert strides(loop(repeated(1, times, 1.1))) == times
 
 
-def test_a_clip_that_stands_still_repeats_once():
+def test_still_clip_repeats_once():
     assert strides(loop(np.tile(swinging(1, 2)[:1], (9, 1)))) == 1
 
 
-def test_clips_that_travel_take_the_strides_of_the_first():
+def test_travelling_clips_take_as_many_strides_as_the_first():
     still, walk, run, step = swinging(4), repeated(1, 2, 1.1), repeated(2, 3, 2.0), swinging(3, travel=0.4)
     loops = [loop(poses) for poses in (still, walk, run, step)]
     adjusted = in_step(loops)
@@ -43,12 +43,12 @@ def test_clips_that_travel_take_the_strides_of_the_first():
     np.testing.assert_allclose(adjusted[2].channels(s, 0.0 * s), loops[2].channels(s * 2 / 3, 0.0 * s), atol=1e-12)
 
 
-def test_poses_and_stride_of_a_clip_that_was_cut_are_the_clips():
+def test_trimmed_clip_keeps_its_poses_and_stride():
     walk, run = repeated(1, 2, 1.1), repeated(2, 3, 2.0)
     r, z = (0.03, 0.07), (-0.03, 0.03)
-    h_map, alone = (Cylindrical([(c, 30.0) for c in clips], r, z) for clips in ([walk, run] * 2, [run] * 4))
-    # In the run's own map a lap has three strides, in this one two, begun wherever they agree best with the walk's.
-    own = [alone.pose(stylus(r[0], angle, 0.0)) for angle in np.linspace(0.0, 2 * np.pi, 721)[:-1]]
+    h_map, run_only = (Cylindrical([(c, 30.0) for c in clips], r, z) for clips in ([walk, run] * 2, [run] * 4))
+    # In the run's own map a lap has three strides; here it has two, from where they agree best with the walk.
+    own = [run_only.pose(stylus(r[0], angle, 0.0)) for angle in np.linspace(0.0, 2 * np.pi, 721)[:-1]]
     for angle in (0.3, 2.0, 4.4):
         pose = h_map.pose(stylus(r[1], angle, 0.0))
         assert min(np.abs(difference(pose, other)[2:]).max() for other in own) < 0.02
@@ -58,13 +58,13 @@ def test_poses_and_stride_of_a_clip_that_was_cut_are_the_clips():
     np.testing.assert_allclose(np.hypot(*(pose - first)[:2]), 4.0, atol=1e-6)
 
 
-def test_a_lap_plays_each_clip_as_often_as_it_fits():
-    # 2 s on the spot, a walk of two strides in 4 s, a run of three in 6 s.
+def test_lap_of_given_duration_plays_each_clip_a_fitting_number_of_times():
+    # 2 s in place, a walk of two strides in 4 s, a run of three in 6 s.
     loops = [loop(poses) for poses in (swinging(4, 60), repeated(1, 2, 1.1), repeated(2, 3, 2.0))]
     durations = np.array([one.duration for one in loops])
     adjusted = in_step(loops, 6.0)
     assert adjusted[0].share == 3.0
-    # Those that travel have as many strides, here three: 1.5 laps of the walk and one of the run.
+    # Travelling clips have the same number of strides, here three: 1.5 times the walk and once the run.
     strides_a_lap = [adjusted[1].share * 2, adjusted[2].share * 3]
     assert strides_a_lap[0] == strides_a_lap[1] == 3.0
     for before, one in zip(loops, adjusted, strict=True):
@@ -72,16 +72,16 @@ def test_a_lap_plays_each_clip_as_often_as_it_fits():
     np.testing.assert_allclose([one.duration for one in adjusted], durations * [one.share for one in adjusted])
 
 
-def test_clips_that_need_not_be_in_step_are_each_near_their_own_pace():
-    # Cycles of 2 and 0.9 s: two and four of them, where in step they would be three and three.
+def test_clips_not_in_step_keep_nearly_their_own_pace():
+    # Cycles of 2 and 0.9 s: two and four of them; in step their numbers are equal.
     loops = [loop(repeated(1, 2, 1.1)), loop(repeated(2, 3, 2.0, 27))]
     durations = [one.duration for one in in_step(loops, 4.1, apart=True)]
     np.testing.assert_allclose(durations, [4.0, 3.6])
     np.testing.assert_allclose([one.duration for one in in_step(loops, 4.1)], [4.0, 1.8])
 
 
-def test_in_the_natural_lap_the_first_clip_is_at_its_own_pace():
-    # A cycle of 0.5 s beside one of 2.1 s that goes on the spot, and one of 0.9 s.
+def test_natural_lap_plays_the_first_clip_at_its_own_pace():
+    # Cycles of 0.5 s, of 2.1 s in place, and of 0.9 s.
     loops = [loop(repeated(1, 1, 1.1, 15)), loop(swinging(3, 63)), loop(repeated(2, 1, 1.3, 27))]
     for first in range(3):
         order = loops[first:] + loops[:first]
@@ -90,7 +90,7 @@ def test_in_the_natural_lap_the_first_clip_is_at_its_own_pace():
         assert 3.0 <= lap <= 6.0
 
 
-def test_the_natural_lap_plays_clips_at_their_own_pace_where_that_can_be():
+def test_natural_lap_plays_all_clips_near_their_own_pace_if_possible():
     loops = [loop(swinging(seed, frames)) for seed, frames in ((4, 30), (5, 45), (6, 90))]
     lap = natural_lap(loops)
     paces = [one.duration / lap for one in in_step(loops, lap)]

@@ -1,4 +1,4 @@
-"""The tank bounds what a field injects, and leaves alone what takes energy away."""
+"""The energy tank bounds the energy that a field injects and does not affect dissipating forces."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ TANK = EnergyTank(1e-3, power=0.02, capacity=0.05)
 
 
 def _push_a_mass(tank, law, seconds, mass=0.1):
-    """A mass under a law of force through the tank: energy injected up to each tick, and speeds."""
+    """Energy injected up to each tick, and speeds, of a mass under a force law guarded by the tank."""
     memory, params, period = tank.fresh_memory(), tank.params(), tank.period
     p, v, force = np.zeros(3), np.array([0.01, 0.0, 0.0]), np.zeros(3)
     injected, speeds = [0.0], []
@@ -25,18 +25,18 @@ def _push_a_mass(tank, law, seconds, mass=0.1):
 
 
 @pytest.mark.parametrize("period", [2.5e-4, 1e-3, 4e-3])
-def test_an_active_field_injects_no_more_than_its_budget(period):
+def test_active_field_injects_at_most_its_budget(period):
     tank = EnergyTank(period, 0.02, 0.05)
     injected, _ = _push_a_mass(tank, lambda p, v: 5.0 * v, 3.0)
     time = period * np.arange(len(injected))
     assert injected[-1] > 0.5 * (0.05 + 0.02 * 3.0)
-    # One period's change of speed is booked a period late.
+    # The change of speed over a period is accounted for one period late.
     assert np.all(injected <= 0.05 + 0.02 * time + 1e-3)
-    bare = EnergyTank(period, 1e6, 1e6)
-    assert _push_a_mass(bare, lambda p, v: 5.0 * v, 0.2)[0][-1] > 5.0
+    unlimited = EnergyTank(period, 1e6, 1e6)
+    assert _push_a_mass(unlimited, lambda p, v: 5.0 * v, 0.2)[0][-1] > 5.0
 
 
-def test_a_force_that_takes_energy_is_not_touched():
+def test_dissipating_force_is_unchanged():
     memory = TANK.fresh_memory()
     memory[TANK_ENERGY] = 0.0
     for v in ([-0.3, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.5, 0.0]):
@@ -45,8 +45,8 @@ def test_a_force_that_takes_energy_is_not_touched():
         assert force.tolist() == [2.0, 0.0, 0.0]
 
 
-def test_an_overdrawn_store_lets_go_and_fills_again():
-    """Whatever the force seems to do: at e = −P τ nothing is let through, at −P τ/2 the half."""
+def test_overdrawn_tank_scales_the_force_down_and_refills():
+    """Whatever the sign of the power: at e = −P τ nothing passes, at −P τ/2 half of the force."""
     for energy, share in ((-1.0, 0.0), (-0.02 * 0.05, 0.0), (-0.01 * 0.05, 0.5), (-1e-12, 1.0)):
         memory = TANK.fresh_memory()
         memory[TANK_ENERGY] = energy
@@ -61,7 +61,7 @@ def test_an_overdrawn_store_lets_go_and_fills_again():
     assert memory[TANK_ENERGY] == pytest.approx(-0.0005, rel=1e-9)
 
 
-def test_a_vanishing_speed_is_no_trouble():
+def test_vanishing_speed_leaves_the_force_unchanged():
     memory = TANK.fresh_memory()
     for speed in (1e-300, 1e-12, 1e-3):
         force = np.array([3.0, 0.0, 0.0])
@@ -69,7 +69,7 @@ def test_a_vanishing_speed_is_no_trouble():
         assert force[0] == 3.0
 
 
-def test_the_store_changes_by_flows_only():
+def test_stored_energy_changes_by_flows_only():
     memory, p, v = TANK.fresh_memory(), np.zeros(3), np.array([0.1, 0.0, 0.0])
     force = np.array([0.5, 0.0, 0.0])
     guard_energy(TANK.params(), memory, p, v, force)
@@ -80,7 +80,7 @@ def test_the_store_changes_by_flows_only():
     assert memory[TANK_ENERGY] == 0.05
 
 
-def test_an_empty_tank_still_gives_its_power_and_is_continuous():
+def test_empty_tank_passes_its_power_continuously():
     memory = TANK.fresh_memory()
     memory[TANK_ENERGY] = 0.0
     powers = []
@@ -94,16 +94,16 @@ def test_an_empty_tank_still_gives_its_power_and_is_continuous():
 @pytest.mark.parametrize(
     "numbers", [(0.0, 1.0, 1.0, 1.0), (1e-3, np.inf, 1.0, 1.0), (1e-3, 1.0, 1.0, 1e-3), (1e-3, 1.0, 1.0, 0.05, 2.0)]
 )
-def test_a_tank_that_cannot_be_is_refused(numbers):
+def test_invalid_tanks_raise_parameter_error(numbers):
     with pytest.raises(ParameterError, match="tank"):
         EnergyTank(*numbers)
 
 
-def test_what_springs_and_dampers_can_give_is_what_the_work_along_the_way_sums_to():
-    """∫ min(k s, F) ds by a sum, and the greatest b (φ̇ − v) v by a search."""
-    way = np.linspace(0.0, 0.2, 200_001)
+def test_spring_store_and_river_power_match_numerical_work():
+    """∫ min(k s, F) ds by quadrature, and the maximum of b (φ̇ − v) v by a search."""
+    distance = np.linspace(0.0, 0.2, 200_001)
     for stiffness, force in ((300.0, 8.5), (300.0, np.inf), (20.0, 8.5), (0.0, 8.5), (1e9, 8.5)):
-        expected = np.trapezoid(np.minimum(stiffness * way, force), way)
+        expected = np.trapezoid(np.minimum(stiffness * distance, force), distance)
         assert spring_store(stiffness, 0.2, force) == pytest.approx(expected, abs=1e-5 * expected + 1e-9)
     assert spring_store(np.inf, 0.2, 8.5) == 0.2 * 8.5
     speed = np.linspace(-0.2, 0.2, 4001)

@@ -1,4 +1,4 @@
-"""Whatever is asked for, what leaves the gate is finite, within the limits, and nothing unless armed and quiet."""
+"""The gate: for any command its force is finite, within the limits, and zero unless armed and free of oscillation."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ class Gated:
 
     def __init__(self, **limits) -> None:
         self.gate = Gate(T, **({"permitted": True, "dead_man": False} | limits))
-        self.params, self.shaking = self.gate.params(), self.gate.detector.params()
-        self.memory, self.shaken = self.gate.fresh_memory(), self.gate.detector.fresh_memory()
+        self.params, self.detector_params = self.gate.params(), self.gate.detector.params()
+        self.memory, self.detector_memory = self.gate.fresh_memory(), self.gate.detector.fresh_memory()
         self.faults = Plausibility(T, (100.0,) * 3, (1e-4,) * 3, 5 * T).fresh()
         self.hand = np.zeros(HAND_SIZE)
         self.hand[4] = 1.0
@@ -29,7 +29,9 @@ class Gated:
     def tick(self, force, request: int = NO_REQUEST, p=(0, 0, 0), v=(0, 0, 0), switch: float = 0.0) -> np.ndarray:
         self.hand[1:4], self.hand[8:11], self.hand[14] = p, v, switch
         out = np.array(force, dtype=float)
-        pass_gate(self.params, self.shaking, self.memory, self.shaken, self.faults, self.hand, request, out)
+        pass_gate(
+            self.params, self.detector_params, self.memory, self.detector_memory, self.faults, self.hand, request, out
+        )
         self.hand[0] += T
         return out
 
@@ -67,11 +69,11 @@ commands = st.lists(
 
 @settings(max_examples=150)
 @given(commands, st.booleans(), st.booleans())
-def test_nothing_can_send_a_force_above_the_limits(sequence, permitted: bool, dead_man: bool) -> None:
+def test_no_command_sequence_sends_a_force_above_the_limits(sequence, permitted: bool, dead_man: bool) -> None:
     gated = Gated(permitted=permitted, dead_man=dead_man, ramp=0.05, quiet=0.01)
     gate, last, clean = gated.gate, np.zeros(3), 0
-    for force, request, p, v, switch, times in sequence:
-        for _ in range(times):
+    for force, request, p, v, switch, ticks in sequence:
+        for _ in range(ticks):
             if request == CLEAR:
                 rearm(gated.faults)
             faulted = gated.fault is not Fault.NONE
@@ -92,23 +94,23 @@ def test_nothing_can_send_a_force_above_the_limits(sequence, permitted: bool, de
     assert np.isfinite(gated.memory).all()
 
 
-def test_the_table_has_no_way_from_a_fault_to_a_force_but_by_clearing_and_arming() -> None:
+def test_table_leads_from_fault_to_force_only_by_clearing_and_arming() -> None:
     assert {(a, e): b for (a, e), b in TRANSITIONS.items() if a is State.FAULT} == {
         (State.FAULT, Event.CLEAR): State.DISARMED, (State.FAULT, Event.FAULTED): State.FAULT
     }  # fmt: skip
-    into = {a for (a, _), b in TRANSITIONS.items() if b is State.RAMPING}
-    assert into == {State.ARMING}
+    before_ramping = {a for (a, _), b in TRANSITIONS.items() if b is State.RAMPING}
+    assert before_ramping == {State.ARMING}
     assert {a for (a, _), b in TRANSITIONS.items() if b is State.ACTIVE} == {State.RAMPING}
     assert all(TRANSITIONS[state, Event.FAULTED] is State.FAULT for state in State)
 
 
-def test_the_compiled_table_is_the_table() -> None:
+def test_compiled_table_equals_the_table() -> None:
     for state in State:
         for event in Event:
             assert next_state(int(state), int(event)) == TRANSITIONS.get((state, event), state)
 
 
-def test_no_force_until_the_one_asked_for_has_been_small_and_then_it_is_ramped_in() -> None:
+def test_arming_waits_for_a_small_force_and_ramps_it_in() -> None:
     gated = Gated()
     gated.tick((3.0, 0.0, 0.0), ARM)
     for _ in range(500):
@@ -121,7 +123,7 @@ def test_no_force_until_the_one_asked_for_has_been_small_and_then_it_is_ramped_i
     assert np.diff(sizes).max() <= 0.3 * T / gated.gate.ramp * 1.001
 
 
-def test_without_a_permit_nothing_arms() -> None:
+def test_unpermitted_gate_does_not_arm() -> None:
     gated = Gated(permitted=False)
     gated.tick(SMALL, ARM)
     for _ in range(2000):
@@ -129,7 +131,7 @@ def test_without_a_permit_nothing_arms() -> None:
     assert gated.state is State.DISARMED
 
 
-def test_a_released_dead_man_switch_lets_go_at_once_and_the_force_is_ramped_in_again() -> None:
+def test_released_dead_man_switch_stops_the_force_and_ramps_it_in_again() -> None:
     gated = Gated(dead_man=True)
     gated.tick(SMALL, ARM, switch=1.0)
     for _ in range(1200):
@@ -145,7 +147,7 @@ def test_a_released_dead_man_switch_lets_go_at_once_and_the_force_is_ramped_in_a
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("axis", range(3))
-def test_a_force_that_is_no_number_is_a_fault_in_its_own_tick(bad: float, axis: int) -> None:
+def test_non_finite_force_is_a_fault_in_its_tick(bad: float, axis: int) -> None:
     gated = Gated().armed()
     force = np.array(SMALL)
     force[axis] = bad
@@ -165,7 +167,7 @@ def test_a_force_that_is_no_number_is_a_fault_in_its_own_tick(bad: float, axis: 
         ({"v": (0, np.inf, 0)}, Fault.TOO_FAST),
     ],
 )
-def test_a_hand_beyond_a_limit_s_margin_is_a_fault_but_only_under_force(motion, fault: Fault) -> None:
+def test_hand_beyond_a_limit_margin_is_a_fault_only_under_force(motion, fault: Fault) -> None:
     gated = Gated()
     gated.tick(SMALL, **motion)
     assert gated.fault is Fault.NONE
@@ -177,7 +179,7 @@ def test_a_hand_beyond_a_limit_s_margin_is_a_fault_but_only_under_force(motion, 
     assert gated.state is State.DISARMED
 
 
-def test_the_force_fades_within_the_margins() -> None:
+def test_force_fades_within_the_margins() -> None:
     gated = Gated().armed()
     gate = gated.gate
     full = np.linalg.norm(gated.tick(SMALL))
@@ -187,7 +189,7 @@ def test_the_force_fades_within_the_margins() -> None:
     assert gated.fault is Fault.NONE
 
 
-def test_a_fault_latched_elsewhere_stops_the_force_in_its_tick_and_stays() -> None:
+def test_fault_latched_elsewhere_stops_the_force_and_stays() -> None:
     gated = Gated().armed()
     latch(gated.faults, int(Fault.CONTROL_LOST), gated.hand[0], 0.6)
     assert not gated.tick(SMALL).any()
@@ -196,7 +198,7 @@ def test_a_fault_latched_elsewhere_stops_the_force_in_its_tick_and_stays() -> No
     assert (gated.fault, gated.state) == (Fault.CONTROL_LOST, State.FAULT)
 
 
-def test_the_force_of_a_command_that_jumps_is_slewed_and_limited() -> None:
+def test_jumping_command_is_slewed_and_limited() -> None:
     gated = Gated().armed()
     steps = [gated.tick((0.0, 50.0, 0.0)) for _ in range(10)]
     sizes = np.linalg.norm(steps, axis=1)
@@ -205,8 +207,8 @@ def test_the_force_of_a_command_that_jumps_is_slewed_and_limited() -> None:
     np.testing.assert_array_equal(gated.memory[GATE_FORCE:], steps[-1])
 
 
-def test_a_force_that_shakes_is_lowered_and_is_a_fault_if_that_does_not_help() -> None:
-    """A field that vibrates harder the less of it gets through, as no loop does by itself."""
+def test_oscillation_that_persists_at_low_gain_is_a_fault() -> None:
+    """A field whose oscillation grows as the gain falls."""
     gated, sizes = Gated().armed(), []
     for k in range(3000):
         size = 2.0 / max(0.05, gated.memory[GATE_GAIN])
@@ -217,7 +219,7 @@ def test_a_force_that_shakes_is_lowered_and_is_a_fault_if_that_does_not_help() -
     assert 0.9 < len(sizes) * T < 1.3
 
 
-def test_a_field_that_vibrates_is_lowered_to_what_is_hardly_felt() -> None:
+def test_oscillating_field_is_attenuated_to_a_weak_force() -> None:
     gated, sizes = Gated().armed(), []
     for k in range(5000):
         sizes.append(np.linalg.norm(gated.tick((2.0 * np.sin(2 * np.pi * 60.0 * k * T), 0.0, 0.0))))
@@ -227,22 +229,22 @@ def test_a_field_that_vibrates_is_lowered_to_what_is_hardly_felt() -> None:
 
 
 @pytest.mark.parametrize(("frequency", "size"), [(1.0, 3.5), (5.0, 3.5), (10.0, 1.5), (100.0, 0.25)])
-def test_what_a_hand_means_to_do_and_tremor_are_no_oscillation(frequency: float, size: float) -> None:
+def test_voluntary_motion_and_tremor_are_no_oscillation(frequency: float, size: float) -> None:
     gated = Gated().armed()
     for k in range(3000):
         gated.tick((size * np.sin(2 * np.pi * frequency * k * T), 0.0, 0.0))
     assert gated.memory[GATE_GAIN] == 1.0
 
 
-def test_a_wall_that_is_touched_is_no_oscillation() -> None:
+def test_contact_with_a_wall_is_no_oscillation() -> None:
     gated = Gated().armed()
     for k in range(3000):
         gated.tick((3.0 if (k // 250) % 2 else 0.0, 0.0, 0.0))
     assert gated.memory[GATE_GAIN] == 1.0
 
 
-def test_a_loop_that_a_lower_gain_quiets_goes_on_and_gets_its_force_back() -> None:
-    """An oscillation that grows with the gain in it: above a gain of 0.5 it grows, below it dies."""
+def test_gain_recovers_after_an_oscillation_that_lower_gain_stops() -> None:
+    """An oscillation that grows above a gain of 0.5 and decays below it."""
     gated, size, gains = Gated().armed(), 0.4, []
     for k in range(6000):
         force = gated.tick((size * np.sin(2 * np.pi * 40.0 * k * T), 0.0, 0.0))
@@ -256,7 +258,7 @@ def test_a_loop_that_a_lower_gain_quiets_goes_on_and_gets_its_force_back() -> No
     assert gains[-1] == 1.0
 
 
-@pytest.mark.parametrize("wrong", [{"force": 0.0}, {"slew": np.nan}, {"margin": -1.0}, {"low": (0.2, 0.0, 0.0)}])
-def test_limits_that_limit_nothing_are_refused(wrong) -> None:
+@pytest.mark.parametrize("limits", [{"force": 0.0}, {"slew": np.nan}, {"margin": -1.0}, {"low": (0.2, 0.0, 0.0)}])
+def test_invalid_limits_raise_parameter_error(limits) -> None:
     with pytest.raises(ParameterError, match=r"must be positive|no room"):
-        Gate(T, **wrong)
+        Gate(T, **limits)

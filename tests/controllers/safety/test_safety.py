@@ -1,4 +1,4 @@
-"""The force limiter: magnitude, direction, slew, heat and the fault latch."""
+"""The force limiter: magnitude, direction, slew rate, heat and the fault latch."""
 
 import numpy as np
 import pytest
@@ -18,13 +18,13 @@ def _limit(limiter, memory, force):
     return out
 
 
-def test_a_small_force_passes_unchanged():
+def test_small_force_is_unchanged():
     np.testing.assert_array_equal(_limit(FAST, FAST.fresh_memory(), [0.3, -0.4, 0.5]), [0.3, -0.4, 0.5])
 
 
 @settings(max_examples=100)
 @given(st.tuples(*[st.floats(-1e200, 1e200)] * 3))
-def test_a_cold_device_gives_at_most_its_peak_in_the_same_direction(force):
+def test_force_is_limited_to_the_peak_in_its_direction(force):
     out = _limit(FAST, FAST.fresh_memory(), force)
     assert np.linalg.norm(out) <= 8.5 * (1 + 1e-12)
     scale = max(np.abs(force))
@@ -33,14 +33,14 @@ def test_a_cold_device_gives_at_most_its_peak_in_the_same_direction(force):
         np.testing.assert_allclose(a, b, atol=1e-9)
 
 
-def test_a_moment_that_is_not_finite_is_a_fault_like_such_a_force():
+def test_non_finite_moment_is_a_fault():
     memory, out = FAST.fresh_memory(), np.ones(3)
     limit_force(FAST.limits(), memory, np.array([0.3, 0.0, 0.0, 0.0, np.nan, 0.0]), out)
     assert memory[LIMITER_FAULT] == FORCE_NOT_FINITE
     np.testing.assert_array_equal(out, 0.0)
 
 
-def test_a_device_that_works_for_long_gives_its_continuous_force():
+def test_sustained_force_falls_to_the_continuous_force_and_recovers():
     memory, limiter = FAST.fresh_memory(), ForceLimiter(period=0.1, slew=1e9)
     forces = [np.linalg.norm(_limit(limiter, memory, [0.0, 20.0, 0.0])) for _ in range(2000)]
     assert forces[0] == pytest.approx(8.5)
@@ -51,13 +51,13 @@ def test_a_device_that_works_for_long_gives_its_continuous_force():
     assert np.linalg.norm(_limit(limiter, memory, [0.0, 20.0, 0.0])) == pytest.approx(8.5, rel=1e-3)
 
 
-def test_mean_square_never_exceeds_the_continuous_force_whatever_is_asked():
+def test_mean_square_stays_below_the_continuous_force():
     rng, memory, limiter = np.random.default_rng(0), FAST.fresh_memory(), ForceLimiter(period=0.01, slew=1e9)
     squares = [float(np.sum(_limit(limiter, memory, rng.normal(size=3) * 30.0) ** 2)) for _ in range(20000)]
     assert np.mean(squares[5000:]) <= 1.5**2 * 1.001
 
 
-def test_the_force_changes_by_at_most_the_slew_a_tick():
+def test_force_changes_by_at_most_the_slew_per_tick():
     limiter = ForceLimiter(period=1e-3, slew=1000.0)
     memory, last, rng = limiter.fresh_memory(), np.zeros(3), np.random.default_rng(1)
     for _ in range(200):
@@ -67,7 +67,7 @@ def test_the_force_changes_by_at_most_the_slew_a_tick():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_force_that_is_not_finite_is_latched_as_a_fault(bad):
+def test_non_finite_force_is_latched_as_a_fault(bad):
     memory = FAST.fresh_memory()
     _limit(FAST, memory, [1.0, 0.0, 0.0])
     assert not _limit(FAST, memory, [0.0, bad, 0.0]).any()
@@ -77,6 +77,6 @@ def test_a_force_that_is_not_finite_is_latched_as_a_fault(bad):
 
 
 @pytest.mark.parametrize("values", [{"period": 0.0}, {"peak": np.nan}, {"slew": -1.0}, {"continuous": 9.0}])
-def test_limits_that_make_no_sense_are_refused(values):
+def test_invalid_limits_raise_parameter_error(values):
     with pytest.raises(ParameterError, match=str(next(iter(values.values())))):
         ForceLimiter(**{"period": 1e-3} | values)

@@ -1,4 +1,4 @@
-"""The path that grows at its front: arc length, smoothness, where it turns, what is forgotten, how one leans on it."""
+"""The path that grows at its front: arc length, smoothness, turning, overwriting of old rows, and leaning."""
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ from controllers.walking.walked_path import (
 )
 
 
-def _values(path, places, channel):
-    return np.array([path_value(path, float(s), channel) for s in places]).T
+def _values(path, arguments, channel):
+    return np.array([path_value(path, float(s), channel) for s in arguments]).T
 
 
 def _winding(rows=400):
@@ -32,26 +32,26 @@ def _winding(rows=400):
     return path
 
 
-def test_the_path_is_run_at_its_arc_length_along_its_heading():
+def test_path_is_parametrised_by_arc_length_along_its_heading():
     path = _winding()
-    places = np.linspace(0.0, path_front(path), 3000)
-    (_, d_x), (_, d_y), (heading, _) = (_values(path, places, k) for k in (PATH_X, PATH_Y, PATH_HEADING))
+    arguments = np.linspace(0.0, path_front(path), 3000)
+    (_, d_x), (_, d_y), (heading, _) = (_values(path, arguments, k) for k in (PATH_X, PATH_Y, PATH_HEADING))
     # Of second order in κΔ = 0.024.
     np.testing.assert_allclose(np.hypot(d_x, d_y), 1.0, atol=2e-4)
     np.testing.assert_allclose(np.exp(1j * heading), d_x + 1j * d_y, atol=4e-4)
 
 
 @pytest.mark.parametrize("channel", [PATH_X, PATH_Y, PATH_HEADING])
-def test_the_derivative_is_that_of_the_value_and_continuous(channel):
+def test_derivative_matches_one_sided_differences_at_the_rows(channel):
     path = _winding()
-    places, h = np.arange(0.0, 9.0, STEP), 1e-5
-    before, at, after = (_values(path, places + d, channel) for d in (-h, 0.0, h))
-    # At the rows, where the pieces meet: differences on both sides.
+    arguments, h = np.arange(0.0, 9.0, STEP), 1e-5
+    before, at, after = (_values(path, arguments + d, channel) for d in (-h, 0.0, h))
+    # At the rows, where segments meet: one-sided differences on both sides.
     np.testing.assert_allclose((at[0] - before[0]) / h, at[1], atol=2e-5)
     np.testing.assert_allclose((after[0] - at[0]) / h, at[1], atol=2e-5)
 
 
-def test_a_row_turns_the_path_over_three_steps_and_nowhere_else():
+def test_row_turns_the_path_over_three_steps_only():
     path = straight_path(0.0, 0.0, 0.7, 0.1)
     row = int(path[0])
     lay_row(path, 0.1, 0.0, 0.0)
@@ -63,13 +63,13 @@ def test_a_row_turns_the_path_over_three_steps_and_nowhere_else():
     assert path_value(path, (row + 0.5) * STEP, PATH_HEADING)[1] > 1.0
 
 
-def test_the_oldest_is_forgotten_and_the_rest_is_as_it_was():
+def test_oldest_rows_are_overwritten_and_the_rest_is_unchanged():
     path = _winding(500)
-    place = 14.0
-    before = [path_value(path, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)]
-    while path_back(path) < place - STEP:
+    argument = 14.0
+    before = [path_value(path, argument, k) for k in (PATH_X, PATH_Y, PATH_HEADING)]
+    while path_back(path) < argument - STEP:
         lay_row(path, 0.0, 0.0, 0.0)
-    assert [path_value(path, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)] == before
+    assert [path_value(path, argument, k) for k in (PATH_X, PATH_Y, PATH_HEADING)] == before
     assert len(path) == PACKED_PATH
     assert path_front(path) - path_back(path) == pytest.approx((ROWS - 4) * STEP)
     # Beyond both ends the path stays where it ends.
@@ -77,23 +77,23 @@ def test_the_oldest_is_forgotten_and_the_rest_is_as_it_was():
         assert path_value(path, end + beyond, PATH_X)[0] == path_value(path, end, PATH_X)[0]
 
 
-def test_one_leans_as_the_pendulum_that_moves_its_weight_before_a_bend():
+def test_lean_solves_the_pendulum_equation_and_starts_before_a_bend():
     rate, speed, back = np.sqrt(GRAVITY), 1.2, 80
     decay = np.exp(-STEP * rate / speed)
-    path, past = straight_path(0.0, 0.0, 0.0, 0.1), 0.0
-    pulls = np.where((np.arange(400) > 150) & (np.arange(400) < 250), 0.4, 0.0)
+    path, state = straight_path(0.0, 0.0, 0.0, 0.1), 0.0
+    accelerations = np.where((np.arange(400) > 150) & (np.arange(400) < 250), 0.4, 0.0)
     first = int(path[0]) + 1
-    for pull in pulls:
-        lay_row(path, 0.0, 0.0, pull)
-        past = lean_row(path, back, decay, past)
+    for acceleration in accelerations:
+        lay_row(path, 0.0, 0.0, acceleration)
+        state = lean_row(path, back, decay, state)
     lean = _values(path, (first + np.arange(20, 300)) * STEP, PATH_LEAN)[0]
-    # y'' = ω² (y − h a/g) with y = h tan φ and h = 1 m: the weight on a pendulum whose foot is accelerated by a.
+    # y'' = ω² (y − h a/g) with y = h tan φ and h = 1 m: an inverted pendulum whose base is accelerated by a.
     y, dt = np.tan(lean), STEP / speed
     bend = (y[2:] - 2.0 * y[1:-1] + y[:-2]) / dt**2
-    # Away from where the acceleration leaps: the splines round that off.
+    # Away from the jumps of the acceleration, which the splines smooth.
     rows = np.arange(21, 299)
     even = np.minimum(np.abs(rows - 150.5), np.abs(rows - 249.5)) > 2.0
-    wanted = rate**2 * (y[1:-1] - pulls[21:299] / GRAVITY)
-    np.testing.assert_allclose(bend[even], wanted[even], atol=0.02 * 0.4)
-    # Ten rows before the bend the weight is on its way.
+    expected = rate**2 * (y[1:-1] - accelerations[21:299] / GRAVITY)
+    np.testing.assert_allclose(bend[even], expected[even], atol=0.02 * 0.4)
+    # Ten rows before the bend the lean has begun.
     assert lean[120] > 0.2 * lean.max()

@@ -1,4 +1,4 @@
-"""Verdicts on motions whose flights are known."""
+"""Ballistic verdicts on synthetic motions whose flights are known."""
 
 import numpy as np
 import pytest
@@ -13,15 +13,15 @@ FPS = 120.0
 
 
 def jump(gravity, clearance=0.3, seconds=0.5, angular=None):
-    """Stand, fly for a while, stand."""
-    n, fly = 180, round(seconds * FPS)
-    t = np.clip(np.arange(n) - 60, 0, fly) / FPS
+    """Stance, a flight under the given gravity, stance."""
+    n, flight_frames = 180, round(seconds * FPS)
+    t = np.clip(np.arange(n) - 60, 0, flight_frames) / FPS
     com = np.column_stack([np.zeros((n, 2)), 0.9 + gravity / 2 * t * (seconds - t)])
     supported = np.ones(n, dtype=bool)
-    supported[61 : 60 + fly] = False
+    supported[61 : 60 + flight_frames] = False
     angular = np.tile([0.0, -5.0, 0.0], (n, 1)) if angular is None else angular
-    low = np.where(supported, 0.0, clearance)
-    return BodyMotion(FPS, com, angular, np.tile(10.0 * np.eye(3), (n, 1, 1)), low, supported)
+    clearances = np.where(supported, 0.0, clearance)
+    return BodyMotion(FPS, com, angular, np.tile(10.0 * np.eye(3), (n, 1, 1)), clearances, supported)
 
 
 def verdict(motion, tolerance=None):
@@ -30,14 +30,14 @@ def verdict(motion, tolerance=None):
 
 
 @pytest.mark.parametrize("gravity", [9.2, 9.81, 11.9])
-def test_what_falls_naturally_is_certified(gravity):
+def test_free_fall_at_plausible_gravity_is_certified(gravity):
     found = verdict(jump(gravity))
     assert found.verdict == "certified"
     assert found.margin > 0.0
 
 
 @pytest.mark.parametrize("gravity", [4.0, 8.5, 13.5, 66.0])
-def test_what_does_not_is_refuted_with_a_take_off_that_shows_it(gravity):
+def test_implausible_gravity_is_refuted_with_the_nearest_ballistic_flight(gravity):
     motion = jump(gravity)
     found = verdict(motion)
     assert found.verdict == "refuted"
@@ -50,37 +50,37 @@ def test_what_does_not_is_refuted_with_a_take_off_that_shows_it(gravity):
 
 
 @pytest.mark.parametrize(
-    ("gravity", "said"), [(-0.5, "such as a box"), (0.4, "such as a box"), (2.0, "at 2.21 of its")]
+    ("gravity", "reason"), [(-0.5, "such as a box"), (0.4, "such as a box"), (2.0, "at 2.21 of its")]
 )
-def test_what_hardly_falls_is_said_to_be_borne_and_not_to_be_played_faster(gravity, said):
+def test_negligible_fall_is_reported_as_supported_and_slow_fall_with_its_admissible_rate(gravity, reason):
     (flight,) = judge_flights(jump(gravity), BallisticTolerance())
     assert flight.verdict == "refuted"
-    assert said in flight.reason
+    assert reason in flight.reason
 
 
-def test_the_admissible_rates_are_those_at_which_it_would_be_certified():
+def test_playback_at_admissible_rates_is_certified_and_outside_them_refuted():
     (flight,) = judge_flights(jump(11.0), BallisticTolerance())
     for rate, expected in (
         (1.03 * flight.seen[0], "certified"), (0.97 * flight.seen[1], "certified"),
         (0.94 * flight.seen[0], "refuted"), (1.06 * flight.seen[1], "refuted"),
     ):  # fmt: skip
         motion = jump(11.0)
-        played = BodyMotion(
+        retimed = BodyMotion(
             rate * FPS, motion.com, rate * motion.angular, motion.inertia, motion.clearance, motion.supported
         )
-        assert verdict(played).verdict == expected
+        assert verdict(retimed).verdict == expected
 
 
-def test_a_body_that_hovers_low_is_doubtful():
+def test_slow_fall_near_the_floor_is_unknown():
     assert verdict(jump(2.0, clearance=0.05)).verdict == "unknown"
     assert verdict(jump(2.0, clearance=0.15)).verdict == "refuted"
 
 
-def test_no_floor_pulls_so_falling_too_fast_is_refuted_however_low():
+def test_too_fast_fall_is_refuted_at_any_clearance():
     assert verdict(jump(40.0, clearance=0.05)).verdict == "refuted"
 
 
-def test_angular_momentum_must_stay():
+def test_changing_angular_momentum_is_refuted():
     excess = np.where(np.arange(180) < 90, 60.0, -60.0)
     angular = np.column_stack([excess, np.zeros(180), np.zeros(180)])
     found = verdict(jump(9.81, angular=angular))
@@ -88,19 +88,21 @@ def test_angular_momentum_must_stay():
     assert "angular momentum" in found.reason
 
 
-def test_without_flight_there_is_nothing_to_refute():
+def test_motion_without_flight_is_certified():
     motion = jump(9.81)
-    still = BodyMotion(FPS, motion.com, motion.angular, motion.inertia, motion.clearance, np.ones(180, dtype=bool))
-    assert verdict(still).verdict == "certified"
+    always_supported = BodyMotion(
+        FPS, motion.com, motion.angular, motion.inertia, motion.clearance, np.ones(180, dtype=bool)
+    )
+    assert verdict(always_supported).verdict == "certified"
 
 
 @pytest.mark.parametrize("arguments", [{"gravity": (10.0, 12.0)}, {"distance": 0.0}, {"drift": float("nan")}])
-def test_tolerances_are_checked(arguments):
+def test_invalid_tolerances_raise_parameter_error(arguments):
     with pytest.raises(ParameterError):
         BallisticTolerance(**arguments)
 
 
-def test_motions_are_checked():
+def test_mismatched_array_lengths_raise_parameter_error():
     motion = jump(9.81)
     with pytest.raises(ParameterError, match="com"):
         BodyMotion(FPS, motion.com[:-1], motion.angular, motion.inertia, motion.clearance, motion.supported)
@@ -114,7 +116,7 @@ def circling(speed, radius, n=600):
 
 
 @pytest.mark.parametrize("speed", [1.0, 3.0, 5.0])
-def test_a_turn_may_be_run_as_fast_as_friction_holds(speed):
+def test_turn_is_certified_up_to_the_speed_that_friction_allows(speed):
     motion = circling(speed, radius=2.0)
     fastest = np.sqrt(0.8 * 9.81 * 2.0)
     assert floor_rates(motion, 0.8) == pytest.approx(np.full(600, fastest / speed), rel=0.01)
@@ -122,43 +124,43 @@ def test_a_turn_may_be_run_as_fast_as_friction_holds(speed):
     assert turns_verdict(motion, (), 0.8, 600).verdict == expected
 
 
-def test_no_body_on_the_floor_comes_nearer_to_a_turn_than_the_verdict_says():
+def test_turn_counterexample_distance_matches_linear_program():
     motion, friction = circling(4.6, radius=2.0), 0.8
     example = turns_verdict(motion, (), friction, 600).counterexample
     window = motion.com[example["start"] : example["end"] + 1]
     inwards = np.asarray(example["acceleration"])[:2] / np.linalg.norm(example["acceleration"][:2])
-    across = np.append(inwards, -friction) / np.hypot(1.0, friction)  # normal of the cone where it is nearest
-    # The best of all bodies along that normal, by linear programming: place, velocity, and a push in each interval.
+    normal = np.append(inwards, -friction) / np.hypot(1.0, friction)  # of the friction cone, where it is nearest
+    # Least distance along that normal by linear programming over position, velocity and an acceleration per interval.
     n, steps = len(window), 4 * (len(window) - 1)
     dt = 1.0 / FPS / 4.0
     velocity = np.tril(np.ones((steps + 1, steps)), -1) * dt
     position = np.cumsum(np.vstack([np.zeros(steps), 0.5 * (velocity[:-1] + velocity[1:]) * dt]), axis=0)[::4]
     t = np.arange(n)[:, None] / FPS
-    error = np.hstack([np.ones((n, 1)), t, position])  # of place, speed and acceleration along the normal
-    most = friction * 9.81 / np.hypot(1.0, friction)  # what the cone lets through along it
-    wanted, one = window @ across, np.ones((n, 1))
+    error = np.hstack([np.ones((n, 1)), t, position])  # by position, speed and acceleration along the normal
+    greatest = friction * 9.81 / np.hypot(1.0, friction)  # acceleration along the normal that the cone allows
+    target, ones = window @ normal, np.ones((n, 1))
     best = linprog(
         np.r_[np.zeros(2 + steps), 1.0],
-        np.vstack([np.hstack([error, -one]), np.hstack([-error, -one])]), np.r_[wanted, -wanted],
-        bounds=[(None, None)] * 2 + [(None, most)] * steps + [(0.0, None)],
+        np.vstack([np.hstack([error, -ones]), np.hstack([-error, -ones])]), np.r_[target, -target],
+        bounds=[(None, None)] * 2 + [(None, greatest)] * steps + [(0.0, None)],
     )  # fmt: skip
     assert best.success
     assert example["distance"] <= best.fun <= 1.5 * example["distance"]
     assert example["distance"] > 3e-4
 
 
-def test_flights_bound_the_rate_from_both_sides_and_stance_from_above():
+def test_rate_is_bounded_on_both_sides_in_flight_and_from_above_in_stance():
     motion = jump(9.81)
     flights = judge_flights(motion, BallisticTolerance())
     bounds = rate_bounds(motion, flights, 0.9)
-    air = slice(flights[0].fit.start, flights[0].fit.end + 1)
-    assert np.all(bounds.low[air] == flights[0].admissible[0])
-    assert np.all(bounds.high[air] == flights[0].admissible[1])
-    assert np.all(np.delete(bounds.low, np.r_[air]) == 0.0)
+    flight_frames = slice(flights[0].fit.start, flights[0].fit.end + 1)
+    assert np.all(bounds.low[flight_frames] == flights[0].admissible[0])
+    assert np.all(bounds.high[flight_frames] == flights[0].admissible[1])
+    assert np.all(np.delete(bounds.low, np.r_[flight_frames]) == 0.0)
     assert flights[0].seen == pytest.approx((np.sqrt(9.0 / 9.81), np.sqrt(12.7 / 9.81)), rel=1e-6)
 
 
-def test_the_stylus_gets_the_narrower_bound_of_neighbouring_frames():
+def test_stylus_speed_uses_the_narrower_bound_of_neighbouring_frames():
     motion = jump(9.81)
     bounds = rate_bounds(motion, judge_flights(motion, BallisticTolerance()), 0.9)
     phases = np.array([0.0, 60.0, 59.5, 80.0, 90.0]) / 179
@@ -170,7 +172,7 @@ def test_the_stylus_gets_the_narrower_bound_of_neighbouring_frames():
         bounds.stylus_speed(np.array([1.2]), np.array([0.1]))
 
 
-def test_a_turn_that_is_missed_by_little_is_not_said_to_be_reached():
+def test_narrowly_missed_turn_is_not_rounded_to_a_reached_one():
     """Rounded to two decimals its rate would be 1.00, and the distance 0.0 mm."""
     motion = circling(3.0, radius=2.0)
     within = turns_verdict(motion, (), 3.0**2 / (9.81 * 2.0), 600)

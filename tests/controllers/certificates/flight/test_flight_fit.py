@@ -1,4 +1,4 @@
-"""Flights against free fall: what is measured on parabolas whose gravity is known."""
+"""Fits of free fall to flights, on parabolas whose gravity is known."""
 
 import numpy as np
 import pytest
@@ -22,34 +22,34 @@ def fit(com, angular=None, fps=FPS):
     return fit_flight((0, n - 1), fps, com, angular, np.tile(np.diag([10.0, 8.0, 2.0]), (n, 1, 1)), np.full(n, 0.3))
 
 
-def test_a_stretch_without_support_is_a_flight_from_last_to_first_contact():
+def test_flight_spans_last_to_first_contact_frame():
     supported = np.ones(60, dtype=bool)
     supported[20:35] = False
     supported[45:47] = False  # a foot that rolls over
     assert find_flights(supported, FPS) == [(19, 35)]
 
 
-def test_a_clip_may_begin_and_end_in_the_air():
+def test_flight_may_reach_the_ends_of_a_clip():
     supported = np.zeros(60, dtype=bool)
     supported[25:30] = True
     assert find_flights(supported, FPS) == [(0, 25), (29, 59)]
 
 
 @given(gravity=st.floats(1.0, 80.0), frames=st.integers(8, 90), fps=st.sampled_from([16.0, 30.0, 60.0, 120.0]))
-def test_the_gravity_of_a_parabola_is_measured(gravity, frames, fps):
+def test_fit_recovers_gravity_and_take_off_velocity_of_a_parabola(gravity, frames, fps):
     found = fit(parabola(gravity, frames, fps), fps=fps)
     assert found.gravity == pytest.approx(gravity, abs=1e-6)
     assert found.misfit == pytest.approx(0.0, abs=1e-9)
     assert found.take_off == pytest.approx([1.3, -0.4, 2.5], abs=1e-6)
 
 
-def test_playing_a_flight_faster_scales_its_gravity_by_the_square():
+def test_gravity_scales_with_the_square_of_the_playback_rate():
     slow, fast = fit(parabola(GRAVITY)), fit(parabola(GRAVITY), fps=1.5 * FPS)
     assert fast.gravity == pytest.approx(1.5**2 * slow.gravity, rel=1e-9)
     assert fast.natural_rate == pytest.approx(1 / 1.5, rel=1e-9)
 
 
-def test_noise_is_told_from_gravity():
+def test_uncertainty_covers_gravity_error_under_noise():
     rng = np.random.default_rng(3)
     inside = 0
     for _ in range(200):
@@ -58,7 +58,7 @@ def test_noise_is_told_from_gravity():
     assert 180 <= inside <= 199
 
 
-def test_the_benefit_of_the_doubt_goes_no_further_than_the_doubt():
+def test_likely_gravity_moves_towards_g_by_at_most_the_uncertainty():
     precise, vague = fit(parabola(20.0)), fit(parabola(20.0, 9))
     assert precise.likely_gravity == pytest.approx(precise.gravity - precise.uncertainty)
     assert precise.likely_gravity > 19.0
@@ -66,24 +66,24 @@ def test_the_benefit_of_the_doubt_goes_no_further_than_the_doubt():
     assert vague.likely_gravity == GRAVITY
 
 
-def test_the_take_off_speed_is_that_of_a_fall_from_the_apex():
+def test_take_off_speed_equals_fall_speed_from_the_apex():
     found = fit(parabola(GRAVITY, 61))
     assert found.take_off_speed == pytest.approx(2.5, abs=2e-3)
 
 
-def test_angular_momentum_that_changes_turns_the_body():
+def test_changing_angular_momentum_appears_as_drift():
     n = 62
     excess = np.where(np.arange(n) < n // 2, 4.0, -4.0)
     angular = np.column_stack([np.zeros(n), -20.0 + excess, np.zeros(n)])
     found = fit(parabola(GRAVITY, n), angular)
-    # About y the body strays by 4/8 rad/s for half the flight, half of that on either side of the mean.
+    # About y the body deviates at 4/8 rad/s for half the flight, half of that on either side of the mean.
     assert found.drift == pytest.approx(0.5 * 4.0 / 8.0 * (n / 2) / FPS, rel=0.06)
     assert fit(parabola(GRAVITY, n)).drift == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("gravity", [7.0, 9.81, 12.0])
 @pytest.mark.parametrize("rate", [0.8, 1.0, 1.3])
-def test_the_nearest_fall_is_chebyshevs(gravity, rate):
+def test_best_fall_attains_the_chebyshev_distance(gravity, rate):
     # The best line under a parabola of curvature a over T misses it by |a| T² / 16.
     com = parabola(gravity)
     T = 60 / FPS / rate
@@ -95,20 +95,20 @@ def test_the_nearest_fall_is_chebyshevs(gravity, rate):
 
 
 @pytest.mark.parametrize("gravity", [9.81, 11.0])
-def test_the_rates_that_can_be_flown_are_those_of_the_closed_form(gravity):
+def test_reachable_rates_match_closed_form(gravity):
     T, d = 60 / FPS, 0.05
     low, high = reachable_rates(parabola(gravity), FPS, d)
     assert low == pytest.approx(np.sqrt(GRAVITY / (gravity + 16 * d / T**2)), rel=0.01)
     assert high == pytest.approx(np.sqrt(GRAVITY / (gravity - 16 * d / T**2)), rel=0.01)
 
 
-def test_a_short_flight_can_be_flown_at_any_higher_rate():
+def test_short_flight_is_reachable_at_any_higher_rate():
     low, high = reachable_rates(parabola(GRAVITY, 13), FPS, 0.05)
     assert high == np.inf
     assert 0.2 < low < 0.5
 
 
-def test_a_zigzag_can_be_flown_at_no_rate():
+def test_zigzag_is_reachable_at_no_rate():
     com = parabola(GRAVITY)
     com[::2, 0] += 0.2
     assert reachable_rates(com, FPS, 0.05) is None

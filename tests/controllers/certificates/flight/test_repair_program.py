@@ -1,4 +1,4 @@
-"""The nonlinear program of the repair, on jumps that fall wrongly."""
+"""The nonlinear program that repairs flights, on jumps whose fall is not at g."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def task(gravity, **changes):
 
 
 @pytest.mark.parametrize("gravity", [4.0, 9.81, 20.0, 60.0])
-def test_flights_fall_with_g_and_contacts_are_kept(gravity):
+def test_repaired_flights_fall_at_g_and_contacts_stay_within_leg_length(gravity):
     before = task(gravity)
     plan = repair(before)
     a, b = FLIGHT
@@ -41,42 +41,42 @@ def test_flights_fall_with_g_and_contacts_are_kept(gravity):
     assert rise.min() >= -9.81 - 1e-4
 
 
-def test_what_falls_naturally_stays_nearly_as_it_is():
+def test_natural_fall_is_almost_unchanged():
     plan = repair(task(9.81))
     assert np.linalg.norm(plan.shift, axis=1).max() < 0.02
     assert plan.times[-1] == pytest.approx(89 / FPS, rel=0.05)
 
 
-def test_a_fast_fall_is_mended_by_time_rather_than_by_height():
+def test_fast_fall_is_repaired_by_duration_rather_than_height():
     plan = repair(task(60.0))
     flight = plan.times[FLIGHT[1]] - plan.times[FLIGHT[0]]
     assert flight == pytest.approx(24 / FPS * np.sqrt(60.0 / 9.81), rel=0.15)
     assert np.linalg.norm(plan.shift, axis=1).max() < 0.2
 
 
-def test_what_cannot_be_mended_is_said():
-    # Three frames whose ends are held, and a middle that would have to go through the floor.
+def test_infeasible_repair_raises_repair_error():
+    # Three frames: both ends are held, and the middle one would have to be below the floor.
     com = np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 1.5], [0.0, 0.0, 0.9]])
-    three = {"angular": np.zeros((3, 3)), "clearance": np.zeros(3), "standing": np.zeros((3, 2), dtype=bool)}
+    arrays = {"angular": np.zeros((3, 3)), "clearance": np.zeros(3), "standing": np.zeros((3, 2), dtype=bool)}
     with pytest.raises(RepairError, match="flights"):
-        repair(task(9.81, com=com, flights=[(0, 2)], legs=np.zeros((3, 2, 3)), **three))
+        repair(task(9.81, com=com, flights=[(0, 2)], legs=np.zeros((3, 2, 3)), **arrays))
 
 
-def test_tasks_are_checked():
+def test_invalid_tasks_raise_parameter_error():
     with pytest.raises(ParameterError, match="flight"):
         task(9.81, flights=[(30, 90)])
     with pytest.raises(ParameterError, match="standing"):
         task(9.81, standing=np.zeros((90, 3), dtype=bool))
 
 
-def test_the_indexing_that_other_code_has_chosen_is_kept_and_does_not_matter() -> None:
+def test_casadi_numpy_mode_of_the_caller_is_restored_and_does_not_matter() -> None:
     import casadi
 
-    chosen = casadi.GlobalOptions.getNumpyMode()
+    mode_before = casadi.GlobalOptions.getNumpyMode()
     try:
         for mode in (0, 1):
             casadi.GlobalOptions.setNumpyMode(mode)
-            test_what_falls_naturally_stays_nearly_as_it_is()
+            test_natural_fall_is_almost_unchanged()
             assert casadi.GlobalOptions.getNumpyMode() == mode
     finally:
-        casadi.GlobalOptions.setNumpyMode(chosen)
+        casadi.GlobalOptions.setNumpyMode(mode_before)

@@ -1,4 +1,4 @@
-"""Certificates predict what MuJoCo does under the servo's own kernels: each test could refute them."""
+"""Certificates against MuJoCo simulations with the servo's own kernels."""
 
 import mujoco
 import numpy as np
@@ -37,7 +37,7 @@ def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
     return Trial(STILL, phase * LAP / 4.0, river.b_d, river.sampling, hand, np.array(direction))
 
 
-def test_onset_of_instability_is_where_it_is_predicted():
+def test_onset_of_instability_is_at_the_predicted_stiffness():
     rng = np.random.default_rng(11)
     trials = [draw_trial(rng) for _ in range(6)]
     errors = [abs(observed(trial, predicted(trial), Conditions()) / predicted(trial) - 1.0) for trial in trials]
@@ -45,49 +45,49 @@ def test_onset_of_instability_is_where_it_is_predicted():
     assert np.median(errors) < 0.02
 
 
-def test_coulomb_friction_moves_the_onset_as_its_describing_function_says():
+def test_coulomb_friction_raises_the_onset_as_its_describing_function_predicts():
     sampling = Sampling(1.2e-3, 3.6e-3)
     trial = Trial(STILL, 0.2 * LAP, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
-    rubbing = with_friction(trial, 1e-3)
-    assert rubbing.k_r > 1.03 * predicted(trial)
-    assert observed_with_friction(trial, rubbing, 1e-3, Conditions(coulomb=True)) == pytest.approx(
-        rubbing.k_r, rel=0.03
+    friction_onset = with_friction(trial, 1e-3)
+    assert friction_onset.k_r > 1.03 * predicted(trial)
+    assert observed_with_friction(trial, friction_onset, 1e-3, Conditions(coulomb=True)) == pytest.approx(
+        friction_onset.k_r, rel=0.03
     )
-    assert observed_with_friction(trial, rubbing, 1e-3, Conditions(coulomb=True, rounded=True)) == pytest.approx(
-        rubbing.k_r, rel=0.05
+    assert observed_with_friction(trial, friction_onset, 1e-3, Conditions(coulomb=True, rounded=True)) == pytest.approx(
+        friction_onset.k_r, rel=0.05
     )
 
 
-def test_the_worlds_own_integrator_leads_by_half_a_step():
+def test_integrator_lead_is_half_a_physics_step():
     trial = Trial(STILL, 0.2 * LAP, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
     expected = predicted(trial)
-    own = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    coarse, fine = (observed(trial, expected, Conditions(steps, own)) / expected - 1.0 for steps in (8, 64))
+    integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    coarse, fine = (observed(trial, expected, Conditions(steps, integrator)) / expected - 1.0 for steps in (8, 64))
     assert coarse > 0.05
     assert fine == pytest.approx(coarse / 8.0, rel=0.25)
 
 
-def test_a_refuted_river_does_what_its_counterexample_says():
+def test_refuted_river_diverges_at_the_growth_rate_of_its_counterexample():
     river = RIVER._replace(k_r=3000.0, sampling=Sampling(1e-3, 1e-3))
     verdict = stability(river, [HandImpedance(), HandImpedance(0.1, 2.0, 200.0)])
     assert verdict.verdict == "refuted"
     example = verdict.counterexample
     trial = _trial(river, example["phase"], example["hand"])
     path = simulate(trial, river.k_r, 120, Conditions(), 1e-3 * example["state"])
-    size = np.linalg.norm(path, axis=1)
-    assert size[-20:].max() > 3.0 * size[:20].max()
+    distance = np.linalg.norm(path, axis=1)
+    assert distance[-20:].max() > 3.0 * distance[:20].max()
     assert np.log(growth(path)) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.02)
 
 
-def test_the_spring_that_refutes_passivity_makes_it_unstable():
+def test_spring_that_refutes_passivity_destabilises_the_loop():
     example = passivity(RIVER).counterexample
     trial = _trial(RIVER, example["phase"], example["hand"])
-    # The spring is felt at every physics step, so it takes fine ones.
+    # The spring acts at every physics step, so the steps must be fine.
     path = simulate(trial, RIVER.k_r, 300, Conditions(substeps=1024), 1e-3 * example["state"])
     assert np.log(growth(path)) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.1)
 
 
-def test_nothing_certified_diverges():
+def test_certified_river_does_not_diverge_with_random_hands():
     hands = HandRange()
     assert stability(RIVER, hands.hands()).verdict == "certified"
     rng = np.random.default_rng(7)
@@ -105,7 +105,7 @@ def test_nothing_certified_diverges():
         assert np.linalg.norm(path[300:], axis=1).max() < 6e-4
 
 
-def test_a_bounded_force_moves_the_hand_no_farther_than_its_bound():
+def test_bounded_force_moves_the_hand_no_farther_than_the_distance_bound():
     push = 1.0
     verdict = energy(RIVER, push, 8.5)
     assert verdict.verdict == "certified"
@@ -115,32 +115,32 @@ def test_a_bounded_force_moves_the_hand_no_farther_than_its_bound():
     maps, force = loop.frozen(300.0, 4.0)[6], (projection @ loop.push)[6]
     farthest = 0.0
     for axis in np.eye(3):
-        row, course = axis @ loop.linear.jacobian[6] @ basis[6, :3], []
+        row, forces = axis @ loop.linear.jacobian[6] @ basis[6, :3], []
         for _ in range(400):
-            course.append(row @ force / max(np.linalg.norm(row @ force), 1e-300))
+            forces.append(row @ force / max(np.linalg.norm(row @ force), 1e-300))
             row = row @ maps
-        course = push * np.array(course[::-1])
-        # A spring as soft as this, with its end so far away, is a force of any course.
-        soft = 1e-4
-        user = Arm(soft, 0.0, course / soft + CIRCLE.point(0.5), RIVER.sampling.period)
+        forces = push * np.array(forces[::-1])
+        # A very soft spring with a distant end applies any given force.
+        softness = 1e-4
+        user = Arm(softness, 0.0, forces / softness + CIRCLE.point(0.5), RIVER.sampling.period)
         path = hand_path(trial, RIVER.k_r, 420, Conditions(coulomb=True), user=user)
         distance = closest_phases(CIRCLE.packed(), path)[1]
         farthest = max(farthest, float(distance.max()))
     assert 0.5 * verdict.figures["distance_bound"] < farthest < verdict.figures["distance_bound"]
 
 
-def test_a_relaxed_hand_is_carried_at_the_terminal_speed():
+def test_relaxed_hand_moves_at_terminal_speed():
     trial = Trial(CIRCLE, 0.0, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
     path = hand_path(trial, RIVER.k_r, 750, Conditions(8, coulomb=True))
     phases = np.unwrap(closest_phases(CIRCLE.packed(), path)[0], period=4.0)
     assert len(path) == 750
-    pace = (phases[-1] - phases[249]) / 0.5 * 0.0749269
+    mean_speed = (phases[-1] - phases[249]) / 0.5 * 0.0749269
     moving = RIVER.moving()
     inside = (moving.phases > phases[249]) & (moving.phases < phases[-1])
-    assert pace == pytest.approx(float(1.0 / np.mean(1.0 / terminal_speed(RIVER, moving)[inside])), rel=0.02)
+    assert mean_speed == pytest.approx(float(1.0 / np.mean(1.0 / terminal_speed(RIVER, moving)[inside])), rel=0.02)
 
 
-def test_the_critical_gain_does_not_depend_on_where_the_hand_starts():
+def test_growth_rate_does_not_depend_on_the_start_distance():
     trial = draw_trial(np.random.default_rng(5))
     expected = predicted(trial)
     rates = [np.log(growth(simulate(trial, 1.05 * expected, 150, Conditions(start=start)))) for start in (1e-6, 3e-6)]

@@ -1,4 +1,4 @@
-"""What the executed law injects into a hand that shakes the stylus stays below its bound, and not far below."""
+"""Power that the executed law injects into a hand that shakes the stylus, against its bound."""
 
 import numpy as np
 import pytest
@@ -24,25 +24,25 @@ def injected(sampling, frequency, amplitude, direction, rounded=True, gains=(300
     program, keep, period = Follow(CIRCLE, *gains, 0.25).program(), sampling.keep, sampling.period
     field, memory, wrench = program.compiled(), program.fresh_memory(), np.empty(6)
     ticks = max(round(periods / frequency / period), 200)
-    place = lambda t: CIRCLE.point(1.0) + amplitude * np.sin(2.0 * np.pi * frequency * t) * direction  # noqa: E731
+    position = lambda t: CIRCLE.point(1.0) + amplitude * np.sin(2.0 * np.pi * frequency * t) * direction  # noqa: E731
     step = np.array(DEVICE.encoder_step)
-    last, omega, work, square, waiting = None, np.zeros(3), 0.0, 0.0, []
+    theta_before, omega, work, square_speed, forces = None, np.zeros(3), 0.0, 0.0, []
     for k in range(ticks):
-        theta = np.array(DEVICE.angles(place(k * period)))
+        theta = np.array(DEVICE.angles(position(k * period)))
         theta = step * np.round(theta / step) if rounded else theta
-        omega = omega if last is None else keep * omega + (1.0 - keep) * (theta - last) / period
-        last = theta
+        omega = omega if theta_before is None else keep * omega + (1.0 - keep) * (theta - theta_before) / period
+        theta_before = theta
         p, jacobian = DEVICE.numbers(theta)
         evaluate(*field, memory, HandState.at(p, jacobian @ omega, 0.0).vector(), wrench)
-        waiting.append(wrench[:3].copy())
-        force = waiting[max(0, len(waiting) - 1 - sampling.whole_delay)]
-        moved = place((k + 1) * period) - place(k * period)
+        forces.append(wrench[:3].copy())
+        force = forces[max(0, len(forces) - 1 - sampling.whole_delay)]
+        displacement = position((k + 1) * period) - position(k * period)
         if k > 20:
-            # A force held over a period does work on the way, however the hand goes it.
-            work += float(force @ moved)
-            square += 0.5 * (2.0 * np.pi * frequency * amplitude) ** 2 * period
+            # The work of a force held over a period depends on the displacement alone.
+            work += float(force @ displacement)
+            square_speed += 0.5 * (2.0 * np.pi * frequency * amplitude) ** 2 * period
     seconds = (ticks - 21) * period
-    return work / seconds, np.sqrt(square / seconds)
+    return work / seconds, np.sqrt(square_speed / seconds)
 
 
 def bound(sampling, frequency, speed, gains=(300.0, 8.0)):
@@ -55,7 +55,7 @@ RADIAL = CIRCLE.point(1.0) / np.linalg.norm(CIRCLE.point(1.0))
 TANGENT = CIRCLE.velocity(1.0) / PACE
 
 
-def test_half_a_millimetre_at_300_hz_gets_most_of_what_the_bound_allows_and_many_times_the_ideal_one():
+def test_fast_shaking_injects_at_least_half_of_the_bound_and_fifty_times_the_ideal_power():
     power, speed = injected(Sampling(1e-3), 300.0, 5e-4, RADIAL)
     assert power > 50.0 * river_power(8.0, PACE)
     assert 0.5 * bound(Sampling(1e-3), 300.0, speed) < power < bound(Sampling(1e-3), 300.0, speed)
@@ -63,24 +63,24 @@ def test_half_a_millimetre_at_300_hz_gets_most_of_what_the_bound_allows_and_many
 
 @pytest.mark.parametrize("delay", [0.0, 1e-3])
 @pytest.mark.parametrize("direction", [RADIAL, TANGENT, np.array([0.0, 0.0, 1.0])])
-def test_no_sinusoidal_hand_gets_more_than_the_bound(direction, delay):
+def test_sinusoidal_hand_motion_injects_less_than_the_bound(direction, delay):
     rng, sampling = np.random.default_rng(3), Sampling(1e-3, delay)
     for frequency in (2.0, 7.3, 21.0, 67.0, 140.0, 211.0, 290.0):
         amplitude = float(10.0 ** rng.uniform(-4.5, -3.0)) * min(1.0, 60.0 / frequency)
-        # A slow shake has as many ticks in four periods as a fast one in fifteen, and repeats itself from then on.
+        # Four periods of a slow oscillation have as many ticks as fifteen of a fast one.
         periods = 4 if frequency < 10.0 else 15
         power, speed = injected(sampling, frequency, amplitude, direction, periods=periods)
         assert power < bound(sampling, frequency, speed), (frequency, amplitude)
 
 
-def test_the_activity_is_the_power_of_the_loop_as_it_runs():
+def test_activity_matches_power_of_the_sampled_loop():
     for frequency in (40.0, 130.0, 260.0):
         power, speed = injected(Sampling(1e-3), frequency, 2e-4, RADIAL, rounded=False, periods=100)
         expected = float(activity(300.0, 8.0, Sampling(1e-3), np.array([frequency]))[0]) * speed**2
         assert power == pytest.approx(expected, rel=0.03, abs=0.02 * abs(expected))
 
 
-def test_slow_hands_gain_no_more_than_the_ideal_law_gives():
+def test_slow_motion_has_no_activity_beyond_the_ideal_law():
     river = River(FOLLOW_LAW, 300.0, 8.0, 0.25, CIRCLE, DEVICE, Sampling(1e-3))
     found = injection(river, river.still())
     assert found.activity[0] == 0.0

@@ -1,4 +1,4 @@
-"""Bounds hold what they bound, a form's cells are no weaker than its points, and the region says what it knows."""
+"""Region of attraction: interval bounds, decrease of Lyapunov forms over cells, and the verdicts."""
 
 import casadi as ca
 import numpy as np
@@ -18,6 +18,7 @@ from controllers.certificates.region.tube_bounds import tube_bounds
 from controllers.certificates.report import CertificateError, Verdict
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
+from tests.derivatives import central_differences
 
 SLOW = Trajectory.circle(0.0477, 12.0)
 RIVER = River(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))
@@ -25,7 +26,7 @@ AXIS = Axis(300.0, 8.0, 1e-3, RIVER.sampling.keep, 0, True)
 STABLE = Verdict("certified", "")
 
 
-def test_no_value_leaves_its_interval():
+def test_interval_bounds_contain_sampled_values():
     x = ca.SX.sym("x", 2)
     entries = [ca.sin(x[0]) * x[1], 1 / x[1], x[0] ** 2 - ca.cos(3 * x[0]), ca.sqrt(x[1]) - 2 * x[0]]
     function = ca.Function("f", [x], [ca.reshape(ca.vertcat(*entries), 2, 2)])
@@ -34,8 +35,8 @@ def test_no_value_leaves_its_interval():
     high = low + rng.uniform(0.0, 1.5, (60, 2))
     least, most = bounds(function, low, high)
     for i in range(60):
-        for place in rng.uniform(low[i], high[i], (40, 2)):
-            value = np.array(function(place))
+        for point in rng.uniform(low[i], high[i], (40, 2)):
+            value = np.array(function(point))
             assert np.all(least[i] <= value)
             assert np.all(value <= most[i])
             assert np.linalg.norm(value, 2) <= spectral_bound(least[i : i + 1], most[i : i + 1])[0]
@@ -44,20 +45,20 @@ def test_no_value_leaves_its_interval():
 
 
 @pytest.mark.parametrize("z", [(0.03, 8.0, 500.0, 0.9), (0.3, 0.0, 0.0, 1.0)])
-def test_an_axis_is_the_sampled_mass_on_its_spring(z):
+def test_axis_matrix_matches_sampled_mass_on_a_spring(z):
     mass, drag, spring, share = z
     plant = np.zeros((3, 3))
     plant[0, 1], plant[1] = 1.0, [-spring / mass, -drag / mass, 1.0 / mass]
     step = expm(plant * AXIS.period)
-    felt = np.array([-share * 300.0, 0.0, -share * 8.0])
-    after = np.vstack([np.append(step[i, :2], 0.0) + step[i, 2] * felt for i in range(2)])
+    feedback = np.array([-share * 300.0, 0.0, -share * 8.0])
+    after = np.vstack([np.append(step[i, :2], 0.0) + step[i, 2] * feedback for i in range(2)])
     filtered = (1.0 - AXIS.keep) / AXIS.period * (after[0] - np.eye(3)[0]) + AXIS.keep * np.eye(3)[2]
     found = AXIS.numbers(z) * AXIS.scale[:, None] / AXIS.scale
     np.testing.assert_allclose(found, np.vstack([after, filtered]), rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.slow
-def test_a_form_decreases_between_the_corners_where_its_cells_say_so():
+def test_form_decreases_at_random_points_of_checked_cells():
     cell = Cell(np.array([0.15, 2.0, 0.0, 0.99]), np.array([0.3, 4.0, 100.0, 1.0]), 0.15, 0.03)
     form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5, (0.15, 0.1)), 6.0)
     assert form is not None
@@ -71,12 +72,12 @@ def test_a_form_decreases_between_the_corners_where_its_cells_say_so():
             pushes = AXIS.pushes(a, z[0], cell.lever(z[0]), slower.units, early)
             rows = decrease(AXIS, a, pushes, slower.numbers(z).tolist(), slower)
             assert np.linalg.eigvalsh(np.array(rows, dtype=float))[0] >= checked.least
-    # One that is asked to fall faster than the slowest axis by itself fails the same check.
+    # A form required to decrease faster than the slowest axis fails the same check.
     assert check_form(AXIS, form._replace(rate=60.0), cell, (30, 4, 2, 1)).least < 0.0
 
 
 def motion_in_a_period(mass, drag, ends):
-    """e, ν and y's part of a mass with drag after a period of a force that is one value in each half of it."""
+    """e, ν and y of a mass with drag after one period of a force that is constant in each half of it."""
     plant = np.zeros((3, 3))
     plant[0, 1], plant[1] = 1.0, [0.0, -drag / mass, 1.0 / mass]
     half, e, v = expm(plant * 0.5 * AXIS.period), 0.0, 0.0
@@ -86,9 +87,11 @@ def motion_in_a_period(mass, drag, ends):
 
 
 @pytest.mark.parametrize("drag", [6.0, pytest.param(0.0, marks=pytest.mark.slow)])
-def test_what_the_nearest_point_takes_away_and_forces_that_change_cost_no_more_than_is_allowed_for(drag):
-    heavy = 0.06 if drag else 0.0
-    cell = Cell(np.array([0.03 + heavy, drag, 0.0, 1.0]), np.array([0.15 + heavy, drag, 0.0, 1.0]), 0.15, 0.03)
+def test_projection_and_disturbances_cost_no_more_than_the_allowance(drag):
+    extra_mass = 0.06 if drag else 0.0
+    cell = Cell(
+        np.array([0.03 + extra_mass, drag, 0.0, 1.0]), np.array([0.15 + extra_mass, drag, 0.0, 1.0]), 0.15, 0.03
+    )
     form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5, (0.2, 0.3)), 10.0)
     assert form is not None
     rng = np.random.default_rng(3)
@@ -101,17 +104,18 @@ def test_what_the_nearest_point_takes_away_and_forces_that_change_cost_no_more_t
         along /= np.linalg.norm(along)
         x = rng.normal(size=(3, 3)) * rng.uniform(0.0, 0.3)
         x[0] -= along * (along @ x[0])
-        # A force in newtons and one in the metric, of these sizes, of another direction in each half of the period.
+        # A force in newtons and one in the metric, of these sizes, each with another direction in each half period.
         sizes = rng.uniform(0.0, 1.0, 2)
-        ways = rng.normal(size=(2, 2, 3))
-        ways *= sizes[:, None, None] / np.linalg.norm(ways, axis=2, keepdims=True)
-        own = np.sqrt(masses - heavy)
-        pushed = np.stack(
-            [motion_in_a_period(masses[i], drag, ways[0, :, i] + own[i] * ways[1, :, i]) for i in range(3)], axis=1
+        forces = rng.normal(size=(2, 2, 3))
+        forces *= sizes[:, None, None] / np.linalg.norm(forces, axis=2, keepdims=True)
+        metric = np.sqrt(masses - extra_mass)
+        disturbance = np.stack(
+            [motion_in_a_period(masses[i], drag, forces[0, :, i] + metric[i] * forces[1, :, i]) for i in range(3)],
+            axis=1,
         )
         maps = [AXIS.numbers((mass, drag, 0.0, 1.0)) for mass in masses]
         forms = [form.numbers((mass, drag, 0.0, 1.0)) for mass in masses]
-        after = np.stack([a @ x[:, i] for i, a in enumerate(maps)], axis=1) + pushed
+        after = np.stack([a @ x[:, i] for i, a in enumerate(maps)], axis=1) + disturbance
         after[0] -= along * (along @ after[0])
         before, later = (sum(z[:, i] @ p @ z[:, i] for i, p in enumerate(forms)) for z in (x, after))
         allowed = fall * before + AXIS.period * gains @ sizes**2
@@ -120,7 +124,7 @@ def test_what_the_nearest_point_takes_away_and_forces_that_change_cost_no_more_t
     assert tightest > 0.9
 
 
-def test_the_tubes_bounds_hold_at_its_points():
+def test_tube_bounds_hold_at_sampled_points():
     device, radius = RIVER.device, 0.006
     tube = tube_bounds(device, SLOW, radius)
     kinematics, plant, still = kinematics_function(device), plant_function(device), np.zeros(3)
@@ -132,50 +136,54 @@ def test_the_tubes_bounds_hold_at_its_points():
 
     rng = np.random.default_rng(4)
     for _ in range(60):
-        away, way = rng.normal(size=(2, 3))
+        away, direction = rng.normal(size=(2, 3))
         p = SLOW.point(rng.uniform(0.0, 12.0)) + 0.999 * radius * away / np.linalg.norm(away)
-        way *= 1e-6 / np.linalg.norm(way)
+        direction /= np.linalg.norm(direction)
         here = inertia(p)
         values = np.linalg.eigvalsh(here)
         assert tube.mass_low <= values[0]
         assert values[-1] <= tube.mass_high
         root = np.linalg.inv(np.linalg.cholesky(here))
-        change = root @ (inertia(p + way) - inertia(p - way)) @ root.T / 2e-6
+        change = (
+            root
+            @ central_differences(lambda h, p=p, direction=direction: inertia(p + h * direction), 0.0, 1e-6)
+            @ root.T
+        )
         assert np.linalg.norm(change, 2) <= tube.mass_slope
 
 
-FIRM = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
+FIRM_HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lap", [4.0, 12.0])
-def test_the_demos_river_in_a_firm_hand_has_a_region(lap):
-    good = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap)), FIRM, 8.5, STABLE)
+def test_demo_river_in_a_firm_hand_has_a_certified_region(lap):
+    good = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap)), FIRM_HANDS, 8.5, STABLE)
     assert good.verdict == "certified"
     assert 4e-3 < good.margin < 6e-3
     assert good.figures["ball"] < 2e-3 < good.figures["largest_distance"] <= 6e-3
     assert good.figures["cell_least"] > 0.0
     assert good.figures["remainder_rate"] < good.figures["rate"]
-    beside = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap), law=PARALLEL_LAW), FIRM, 8.5, STABLE)
-    assert beside.verdict == "certified"
-    assert good.figures["remainder_force"] < beside.figures["remainder_force"]
+    parallel = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap), law=PARALLEL_LAW), FIRM_HANDS, 8.5, STABLE)
+    assert parallel.verdict == "certified"
+    assert good.figures["remainder_force"] < parallel.figures["remainder_force"]
 
 
 @pytest.mark.slow
-def test_what_is_too_much_to_be_certain_is_told_with_the_hand_it_is_of():
+def test_unknown_region_names_the_hand_that_exceeds_the_bounds():
     bare = region(RIVER, NO_HANDS, 8.5, STABLE)
     assert bare.verdict == "unknown"
     assert "hands of 0 kg, 0 N s/m, 0 N/m alone" in bare.reason
     assert "too much to be certain" in bare.reason
-    assert region(RIVER._replace(law=BUNNY_LAW), FIRM, 8.5, STABLE).verdict == "unknown"
-    assert region(RIVER._replace(sampling=Sampling(1e-3, 5e-4)), FIRM, 8.5, STABLE).verdict == "unknown"
-    assert "too much for its bends" in region(RIVER._replace(width=0.007), FIRM, 8.5, STABLE).reason
+    assert region(RIVER._replace(law=BUNNY_LAW), FIRM_HANDS, 8.5, STABLE).verdict == "unknown"
+    assert region(RIVER._replace(sampling=Sampling(1e-3, 5e-4)), FIRM_HANDS, 8.5, STABLE).verdict == "unknown"
+    assert "too much for its bends" in region(RIVER._replace(width=0.007), FIRM_HANDS, 8.5, STABLE).reason
     unstable = Verdict("refuted", "", -0.5, (), {"state": [1.0]})
-    assert region(RIVER, FIRM, 8.5, unstable).counterexample == {"state": [1.0]}
+    assert region(RIVER, FIRM_HANDS, 8.5, unstable).counterexample == {"state": [1.0]}
 
 
 @pytest.mark.slow
-def test_of_any_hands_the_firm_part_is_certain():
+def test_region_for_all_hands_reports_the_firm_part():
     found = region(RIVER._replace(curve=Trajectory.circle(0.0477, 4.0)), HandRange(), 8.5, STABLE)
     assert found.verdict == "unknown"
     assert "with hands of 0.3 kg, 0 N s/m" in found.reason

@@ -1,4 +1,4 @@
-"""Switching of rivers: Lyapunov functions judged independently, bounds that hold in MuJoCo, hands lost there."""
+"""Switching between rivers: common Lyapunov functions, and certificates and counterexamples against MuJoCo."""
 
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -34,26 +34,26 @@ def _rivers(field, clock=CLOCK):
     return certified_bundle(field.bundle, phantom_device(), clock)
 
 
-def _keepings(field, clock=CLOCK):
+def _both_keepings(field, clock=CLOCK):
     sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
     first, second = _rivers(field, clock)
     return [Keeping(first, (second,), sharing), Keeping(second, (first,), sharing)]
 
 
-def _lost(field, clock, newtons):
+def _found_counterexample(field, clock, newtons):
     rivers = _rivers(field, clock)
-    place = meetings(rivers)[0]
-    towards = rivers[place.other].curve.velocity(0.8)
+    meeting = meetings(rivers)[0]
+    towards = rivers[meeting.other].curve.velocity(0.8)
     simulate = partial(simulated_course, field, clock)
-    return counterexample(field, place.own, rivers[place.own], place.phase, towards, (newtons,), simulate)
+    return counterexample(field, meeting.own, rivers[meeting.own], meeting.phase, towards, (newtons,), simulate)
 
 
-def _in_mujoco(field, clock, found):
+def _simulated_counterexample(field, clock, found):
     push = Push(found["force"], found["push_start"], found["push_duration"])
     return simulated_course(field, clock, found["p"], found["v"], SECONDS, push)
 
 
-def test_maps_that_share_a_function_get_one_that_eigenvalues_confirm():
+def test_common_lyapunov_function_is_confirmed_by_eigenvalues():
     rng = np.random.default_rng(3)
     maps = [0.8 * np.linalg.qr(rng.normal(size=(4, 4)))[0] for _ in range(3)]
     basis = rng.normal(size=(4, 4))
@@ -66,28 +66,28 @@ def test_maps_that_share_a_function_get_one_that_eigenvalues_confirm():
     assert 0.8 - 1e-9 <= found.rate < 1.0
 
 
-def test_a_function_depends_neither_on_those_sought_before_nor_on_those_sought_beside():
+def test_common_lyapunov_does_not_depend_on_earlier_or_concurrent_searches():
     rng = np.random.default_rng(5)
     pairs = [[a / (1.2 * np.abs(np.linalg.eigvals(a)).max()) for a in rng.normal(size=(2, 4, 4))] for _ in range(24)]
     found = [common_lyapunov(pair) for pair in pairs]
     assert 2 < sum(each is None for each in found) < 22
     with ThreadPoolExecutor(2) as pool:
-        beside = list(pool.map(common_lyapunov, pairs))
-    for again in ([common_lyapunov(pair) for pair in pairs[::-1]][::-1], beside):
+        concurrent = list(pool.map(common_lyapunov, pairs))
+    for again in ([common_lyapunov(pair) for pair in pairs[::-1]][::-1], concurrent):
         for one, other in zip(found, again, strict=True):
             assert (one is None) == (other is None)
             if one is not None and other is not None:
                 np.testing.assert_array_equal(one.p, other.p)
 
 
-def test_maps_whose_product_grows_have_none():
-    # Each is stable; taken in turn they are not.
+def test_unstable_product_of_maps_has_no_common_lyapunov_function():
+    # Each is stable, but their product is not.
     first, second = np.array([[0.6, 2.0], [0.0, 0.6]]), np.array([[0.6, 0.0], [2.0, 0.6]])
     assert np.abs(np.linalg.eigvals(first @ second)).max() > 1.0
     assert common_lyapunov([first, second]) is None
 
 
-def test_what_is_no_function_is_not_taken_for_one():
+def test_contraction_rejects_matrices_that_are_no_lyapunov_function():
     a = 0.5 * np.eye(2)
     assert contraction(np.diag([1.0, -1.0]), [a]) == math.inf
     assert contraction(np.array([[1.0, 0.5], [0.0, 1.0]]), [a]) == math.inf
@@ -95,15 +95,15 @@ def test_what_is_no_function_is_not_taken_for_one():
     assert contraction(np.eye(2), [a, 1.5 * np.eye(2)]) >= 1.5
 
 
-def test_without_a_hand_that_holds_on_no_common_function_is_sought():
+def test_no_common_function_for_a_hand_without_stiffness():
     rivers = _rivers(straight_pair(60.0, "smooth", 0.15))
-    loose = HandRange((0.0, 0.3), (0.0, 8.0), (0.0, 0.0))
-    assert held_common(rivers, meetings(rivers)[0], loose, "smooth") is None
+    loose_hands = HandRange((0.0, 0.3), (0.0, 8.0), (0.0, 0.0))
+    assert held_common(rivers, meetings(rivers)[0], loose_hands, "smooth") is None
 
 
-def test_a_wide_hysteresis_and_a_slow_filter_certify_a_shallow_crossing_and_mujoco_keeps_the_hand():
+def test_wide_hysteresis_at_a_shallow_crossing_is_certified_and_mujoco_keeps_the_hand():
     field = straight_pair(10.0, "discrete", 2.0, 8.0)
-    keepings = _keepings(field, SLOW_FILTER)
+    keepings = _both_keepings(field, SLOW_FILTER)
     verdict = switching(keepings, 0.1, 5.0, {}, None)
     assert verdict.verdict == "certified"
     assert verdict.margin == pytest.approx(verdict.figures["push_allowed"] - 0.1)
@@ -111,99 +111,99 @@ def test_a_wide_hysteresis_and_a_slow_filter_certify_a_shallow_crossing_and_mujo
     bounds = keepings[0].bounds(0.99 * allowed)
     for direction in np.concatenate([np.eye(3), -np.eye(3)]):
         push = Push(tuple(0.99 * allowed * direction), 0.3, 0.5)
-        way = simulated_course(field, SLOW_FILTER, river.curve.point(0.2), river.curve.velocity(0.2), 1.2, push)
-        assert np.all(way.river[1:] == 0.0)
-        assert np.linalg.norm(way.p[:, 1:], axis=1).max() < bounds.distance
+        course = simulated_course(field, SLOW_FILTER, river.curve.point(0.2), river.curve.velocity(0.2), 1.2, push)
+        assert np.all(course.river[1:] == 0.0)
+        assert np.linalg.norm(course.p[:, 1:], axis=1).max() < bounds.distance
 
 
-def test_the_search_confirms_no_certificate_of_narrow_hysteresis():
+def test_narrow_hysteresis_is_unknown_when_rounding_exceeds_it():
     field = straight_pair(10.0, "discrete", 0.15)
-    verdict = switching(_keepings(field), 0.0, 5.0, {}, None)
+    verdict = switching(_both_keepings(field), 0.0, 5.0, {}, None)
     assert verdict.verdict == "unknown"
     assert verdict.figures["velocity_noise"] > field.hysteresis  # rounding alone outweighs it
 
 
-def test_without_hysteresis_a_hand_between_shallow_rivers_chatters_in_mujoco_too():
+def test_hand_between_shallow_rivers_chatters_without_hysteresis():
     field = straight_pair(10.0, "discrete", 0.0)
-    found = _lost(field, CLOCK, 0.0)
+    found = _found_counterexample(field, CLOCK, 0.0)
     assert found["kind"] == "chatters"
-    assert switching(_keepings(field), 0.0, 5.0, found, None).verdict == "refuted"
-    way = _in_mujoco(field, CLOCK, found)
-    assert failure(way.river, CLOCK.period, found["river"], True).kind == "chatters"
-    # The same start with the hysteresis that is certified: it does not.
-    calm = _in_mujoco(straight_pair(10.0, "discrete", 2.0), CLOCK, found)
+    assert switching(_both_keepings(field), 0.0, 5.0, found, None).verdict == "refuted"
+    course = _simulated_counterexample(field, CLOCK, found)
+    assert failure(course.river, CLOCK.period, found["river"], True).kind == "chatters"
+    # From the same start it does not chatter with the certified hysteresis.
+    calm = _simulated_counterexample(straight_pair(10.0, "discrete", 2.0), CLOCK, found)
     assert failure(calm.river, CLOCK.period, found["river"], True) is None
 
 
-def test_what_the_simulation_keeps_is_no_counterexample():
+def test_counterexample_is_empty_if_the_simulation_keeps_the_hand():
     field = straight_pair(20.0, "discrete", 0.15)
-    rivers, tried = _rivers(field), []
+    rivers, pushes = _rivers(field), []
 
-    def keeps(start, velocity, seconds, push):
-        tried.append(push)
+    def undisturbed(start, velocity, seconds, push):
+        pushes.append(push)
         n = round(seconds / CLOCK.period)
         return Course(np.zeros((n, 3)), np.zeros(n))
 
-    place = meetings(rivers)[0]
-    towards = rivers[place.other].curve.velocity(0.8)
-    assert counterexample(field, place.own, rivers[place.own], place.phase, towards, (1.0,), keeps) == {}
-    assert tried
+    meeting = meetings(rivers)[0]
+    towards = rivers[meeting.other].curve.velocity(0.8)
+    assert counterexample(field, meeting.own, rivers[meeting.own], meeting.phase, towards, (1.0,), undisturbed) == {}
+    assert pushes
 
 
-def test_a_hand_that_is_pushed_hard_is_thrown_out_in_mujoco_too():
+def test_hard_push_throws_the_hand_out_in_search_and_mujoco():
     field = straight_pair(20.0, "discrete", 0.15)
-    found = _lost(field, CLOCK, 1.0)
+    found = _found_counterexample(field, CLOCK, 1.0)
     assert found["kind"] == "thrown out"
-    way = _in_mujoco(field, CLOCK, found)
-    ended = failure(way.river, CLOCK.period, found["river"], True)
+    course = _simulated_counterexample(field, CLOCK, found)
+    ended = failure(course.river, CLOCK.period, found["river"], True)
     assert ended.kind == "thrown out"
     assert ended.time == pytest.approx(found["time"], abs=0.05)
 
 
-def test_the_smooth_form_throws_a_hand_out_at_a_shallow_crossing_in_mujoco_too():
+def test_smooth_form_throws_the_hand_out_at_a_shallow_crossing():
     field = straight_pair(30.0, "smooth", 0.15)
-    found = _lost(field, CLOCK, 0.0)
+    found = _found_counterexample(field, CLOCK, 0.0)
     assert found
-    verdict = switching(_keepings(field), 0.0, 5.0, found, None)
+    verdict = switching(_both_keepings(field), 0.0, 5.0, found, None)
     assert verdict.verdict == "refuted"
-    # Forgiveness leaves the rival nearly all of its weight there, and none of it at a right angle.
+    # The mismatch tolerance leaves the rival most of its weight here and none at a right angle.
     assert verdict.figures["rival_weight"] > 0.5
-    steep = switching(_keepings(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
+    steep = switching(_both_keepings(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
     assert steep.figures["rival_weight"] < 1e-6
-    way = _in_mujoco(field, CLOCK, found)
-    assert failure(way.river, CLOCK.period, found["river"], False, smooth=True) is not None
+    course = _simulated_counterexample(field, CLOCK, found)
+    assert failure(course.river, CLOCK.period, found["river"], False, smooth=True) is not None
 
 
-def test_the_dwell_time_falls_with_the_push_and_is_a_period_without_hysteresis():
+def test_dwell_time_falls_with_push_and_is_one_period_without_hysteresis():
     slow = Sampling(2e-5, 0.0, 2.0)
-    without, narrow = (_keepings(straight_pair(45.0, "discrete", h), slow) for h in (0.0, 0.5))
+    without, narrow = (_both_keepings(straight_pair(45.0, "discrete", h), slow) for h in (0.0, 0.5))
     assert hysteresis_dwell(without, 0.2) == slow.period
     assert hysteresis_dwell(narrow, 0.2) > hysteresis_dwell(narrow, 5.0) > slow.period
-    # At the clock of a run a hand can be accelerated through the hysteresis within a tick.
-    assert hysteresis_dwell(_keepings(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
+    # With the sampling of a run the hand can be accelerated through the hysteresis within one tick.
+    assert hysteresis_dwell(_both_keepings(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
 
 
-def test_the_selecting_velocity_lags_by_no_more_than_the_bounds_allow_for():
+def test_lag_of_selection_velocity_stays_within_its_bound():
     lap, look, radius = 4.0, 8e-3, 0.0477
     sharing = Sharing(0.09, 0.01, 0.01, "discrete", look)
     bundle = RiverBundle((River(Trajectory.circle(radius, lap), 0.02, 0.02, 8.0),), ("circle",))
     keeping = Keeping(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
-    turn = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
-    velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(turn), np.cos(turn)), axis=1)
-    seen = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
-    lag = np.linalg.norm(seen - velocity, axis=1)[1000:].max()
+    angle = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
+    velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(angle), np.cos(angle)), axis=1)
+    filtered = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
+    lag = np.linalg.norm(filtered - velocity, axis=1)[1000:].max()
     assert 0.9 * keeping.lag < lag < keeping.lag
     without = replace(keeping, sharing=replace(sharing, look=0.0))
     assert keeping.bounds(0.05).score > without.bounds(0.05).score
     assert keeping.bounds(0.05).speed == without.bounds(0.05).speed
 
 
-def test_failures_are_told_apart():
-    calm = np.zeros(100)
-    assert failure(calm, 1e-3, 0, True) is None
-    once = np.repeat([0.0, 1.0], 50)
-    assert failure(once, 1e-3, 0, True) is None
-    assert failure(once, 1e-3, 0, False).kind == "taken over"
+def test_failure_distinguishes_taken_over_thrown_out_and_chatters():
+    constant = np.zeros(100)
+    assert failure(constant, 1e-3, 0, True) is None
+    one_switch = np.repeat([0.0, 1.0], 50)
+    assert failure(one_switch, 1e-3, 0, True) is None
+    assert failure(one_switch, 1e-3, 0, False).kind == "taken over"
     assert failure(np.repeat([1.0, 0.0], 50), 1e-3, 0, False) is None, "what a river never had is not taken from it"
     assert failure(np.tile([1.0], 100), 1e-3, 0, False) is None
     assert failure(np.repeat([0.0, -1.0], 50), 1e-3, 0, True).kind == "thrown out"
@@ -211,27 +211,27 @@ def test_failures_are_told_apart():
 
 
 @pytest.mark.slow
-def test_the_rivers_of_a_run_keep_every_hand_that_is_found_but_one_pushed_harder_and_mujoco_agrees():
+def test_rivers_of_a_run_are_refuted_only_for_stronger_pushes_and_mujoco_agrees():
     config = run_config(mode="rivers")
     main = certified_rivers(config)[""]
     curve, clock = main.curve, main.sampling
-    # Without the low-pass of the selecting velocity an unpushed hand on the wave was taken over.
+    # The certificate depends on the low-pass filter of the selection velocity.
     assert certify_rivers(config, config.mode, main, HandRange(), 0.5, {"": curve})["switching"].verdict == "unknown"
     verdict = certify_rivers(config, config.mode, main, HandRange(), 1.0, {"": curve})["switching"]
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
-    # The rivers are paced from the curve as the map has it, not from one that already is.
+    # The rivers are paced from the map's curve, which is not paced yet.
     choice = default_choice(config.mode, given_curves(config)[""], config.map.reach)
     found, field = verdict.counterexample, law_of(config.mode, choice)
-    way = _in_mujoco(field, clock, found)
-    ended = failure(way.river, clock.period, found["river"], any(found["force"]))
+    course = _simulated_counterexample(field, clock, found)
+    ended = failure(course.river, clock.period, found["river"], any(found["force"]))
     assert ended.kind == found["kind"]
     assert ended.time == pytest.approx(found["time"], abs=0.1)
 
 
 @pytest.mark.slow
-def test_nothing_certified_is_lost_in_mujoco():
+def test_certified_random_crossings_are_not_lost_in_mujoco():
     counts = trials(40)
     assert counts[True, False] == 0
     assert counts[True, True] >= 8

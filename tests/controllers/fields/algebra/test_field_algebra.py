@@ -1,4 +1,4 @@
-"""The algebra of fields: each operation against its formula, in Python and compiled."""
+"""The field algebra: each operation against its formula."""
 
 from fractions import Fraction
 
@@ -41,30 +41,30 @@ def _step(x):
         (Weight.switch(), 0.0),
     ],
 )
-def test_gate_and_blend_are_their_formulas(weight, s):
+def test_gate_and_blend_match_their_formulas(weight, s):
     np.testing.assert_allclose(force_of(A.gated(weight), HAND), s * F, rtol=1e-12)
     np.testing.assert_allclose(force_of(A.gated(~weight), HAND), (1 - s) * F, rtol=1e-12)
     np.testing.assert_allclose(force_of(A.blended(B, weight), HAND), (1 - s) * F + s * G, rtol=1e-12)
 
 
-def test_a_field_names_the_curves_along_which_it_leads():
+def test_field_lists_the_curves_of_its_laws_without_duplicates():
     circle, other = Trajectory.circle(0.05, 4.0), Trajectory.circle(0.03, 2.0)
     first, second = River(circle, 0.03, 0.02, 4.0), River(other, 0.02, 0.02, 4.0)
     bundle = RiverBundle((first, second), ("a", "b"))
-    still = PythonLaw(lambda hand: np.zeros(3))
-    assert still.curves == ()
-    assert (Follow(other, 100.0, 1.0, 0.028) + still + Follow(circle, 200.0, 4.0, 0.03)).curves == (other, circle)
+    zero_law = PythonLaw(lambda hand: np.zeros(3))
+    assert zero_law.curves == ()
+    assert (Follow(other, 100.0, 1.0, 0.028) + zero_law + Follow(circle, 200.0, 4.0, 0.03)).curves == (other, circle)
     crossing = HigherOrder(bundle, admission=0.02, sigma=0.01)
     assert crossing.curves == crossing.limited(3.0).curves == (circle, other)
 
 
-def test_the_switch_gates():
+def test_switch_gates_and_blends():
     pressed = HandState(HAND.t, HAND.p, HAND.q, HAND.v, HAND.w, switch=True)
     np.testing.assert_array_equal(force_of(A.gated(Weight.switch()), pressed), F)
     np.testing.assert_array_equal(force_of(A.blended(B, Weight.switch()), pressed), G)
 
 
-def test_a_limited_field_keeps_its_direction_and_a_weak_one_its_length():
+def test_limiter_keeps_direction_of_strong_and_length_of_weak_forces():
     size = np.linalg.norm(F)
     np.testing.assert_allclose(force_of(A.limited(0.3 * size), HAND), 0.3 * F, rtol=1e-12)
     np.testing.assert_array_equal(force_of(A.limited(2.0 * size), HAND), F)
@@ -81,7 +81,7 @@ def test_nested_composition_is_evaluated_as_written():
     np.testing.assert_allclose(force_of(field, HAND), expected, rtol=1e-12)
 
 
-def test_sums_differences_and_quotients_are_their_formulas():
+def test_sums_differences_and_quotients_match_their_formulas():
     np.testing.assert_array_equal(force_of(A - B, HAND), F - G)
     np.testing.assert_array_equal(force_of(-A, HAND), -F)
     np.testing.assert_array_equal(force_of(A / 4, HAND), 0.25 * F)
@@ -92,19 +92,19 @@ def test_sums_differences_and_quotients_are_their_formulas():
     np.testing.assert_allclose((-compiled - A / 2).wrench(HAND).force, [-0.04, 0.0, 0.0] - 0.5 * F, rtol=1e-12)
 
 
-def test_a_sum_nested_to_the_right_is_as_deep_as_one_to_the_left():
+def test_deep_sum_nested_to_the_right_is_evaluated():
     field, expected = A, F
     for _ in range(40):
         field, expected = B + field, G + expected
     np.testing.assert_array_equal(force_of(field, HAND), expected)
 
 
-def test_numbers_may_be_fractions():
+def test_fractions_are_accepted_as_numbers():
     assert Weight.constant(Fraction(1, 4)) == Weight.constant(0.25)
     np.testing.assert_array_equal((Fraction(1, 2) * A).limited(Fraction(1, 4)).params[-2:], [0.25, np.inf])
 
 
-def test_composed_fields_have_no_jump():
+def test_composed_field_is_continuous():
     rng = np.random.default_rng(0)
     field = (A.gated(~Weight.ball([0.05, 0.0, 0.0], 0.02)) + B).limited(1.5)
     for _ in range(6):
@@ -112,7 +112,7 @@ def test_composed_fields_have_no_jump():
         assert largest_jump(field, start, start + np.array([0.08, 0.03, 0.01]), [0.05, 0.1, 0.0]) < 1e-9
 
 
-def test_laws_in_python_keep_their_order_through_the_algebra():
+def test_python_laws_keep_their_order_through_the_algebra():
     one, two = (PythonLaw(lambda hand, k=k: [k, 0.0, 0.0]) for k in (1.0, 2.0))
     field = (one.program() + A).blended(two.program().limited(5.0), Weight.constant(0.5))
     assert [law(HAND)[0] for law in field.python_laws] == [1.0, 2.0]
@@ -122,7 +122,7 @@ def test_laws_in_python_keep_their_order_through_the_algebra():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: Weight.ball([0, 0, 0], 0.0), "radius"),
         (lambda: Weight.ball([0, 0, 0], 1e-200), "radius must be at least 1e-09 m, got 1e-200"),
@@ -141,6 +141,6 @@ def test_laws_in_python_keep_their_order_through_the_algebra():
         (lambda: PythonLaw(lambda hand: [0.0, np.inf, 0.0]).wrench(HAND), "expected finite numbers"),
     ],
 )
-def test_bad_weights_and_limits_are_refused(make, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_weights_limits_and_operands_raise_parameter_error(make, message):
+    with pytest.raises(ParameterError, match=message):
         make()

@@ -1,4 +1,4 @@
-"""Laws of one's own: the same to the last bit in Python and compiled, with parameters that have names."""
+"""User-defined laws: identical in Python and compiled, with named parameters and a digest of their code."""
 
 import math
 import threading
@@ -37,7 +37,7 @@ def reading(hand):
 
 
 def twisted(hand, k=0.2, d=0.01):
-    """A moment that turns the stylus upright, and a force that the switch turns on."""
+    """A moment towards the upright stylus, and a force while the switch is closed."""
     w, x, y, z = hand.q
     return (
         0.1 * hand.switch, math.sin(hand.t), -k * hand.v[1],
@@ -61,20 +61,20 @@ def hands(n=300):
 
 
 @pytest.mark.parametrize("function", [floor, twisted, smooth_floor])
-def test_compiled_and_in_python_a_law_is_the_same_to_the_last_bit(function):
+def test_compiled_and_python_law_give_identical_wrenches(function):
     plain, compiled = law(function), law(compiled=True)(function)
     for hand in hands():
         np.testing.assert_array_equal(np.concatenate(compiled.wrench(hand)), np.concatenate(plain.wrench(hand)))
 
 
-def test_it_may_give_a_moment_in_python_and_compiled():
+def test_law_may_return_a_moment():
     hand = HandState.at([0.0, 0.0, 0.0])._replace(w=np.array([1.0, 2.0, 3.0]))
     for own in (law(twisted), law(compiled=True)(twisted)):
         np.testing.assert_allclose(own.wrench(hand).torque, [-0.01, -0.02, -0.03])
         np.testing.assert_allclose((own(k=0.0, d=1.0) + own).wrench(hand).torque, [-1.01, -2.02, -3.03])
 
 
-def test_parameters_have_names_and_others_make_another_law():
+def test_parameters_are_named_and_overridden_in_a_new_law():
     for own in (law(floor), law(compiled=True)(floor)):
         assert repr(own) == "floor(k=500.0, b=3.0)"
         soft = own(k=100)
@@ -84,13 +84,13 @@ def test_parameters_have_names_and_others_make_another_law():
         assert own.wrench(deep).force[2] == pytest.approx(5.0)
 
 
-def test_a_fraction_is_a_number_like_another():
+def test_fraction_is_accepted_as_parameter():
     own = law(floor)(k=Fraction(1, 4))
     assert repr(own) == "floor(k=0.25, b=3.0)"
     assert own.wrench(HandState.at([0.0, 0.0, -0.011])).force[2] == pytest.approx(0.0025)
 
 
-def test_one_kernel_serves_a_law_whatever_its_parameters():
+def test_laws_with_other_parameters_share_one_kernel():
     own = law(compiled=True)(floor)
     program = (own + own(k=100.0)).limited(8.0)
     assert len(program.kernels) == 1
@@ -98,7 +98,7 @@ def test_one_kernel_serves_a_law_whatever_its_parameters():
     assert program.wrench(HandState.at([0.0, 0.0, -0.011])).force[2] == pytest.approx(6.0)
 
 
-def test_a_law_without_parameters_and_one_that_numba_has_compiled_already():
+def test_law_without_parameters_may_be_compiled_by_numba_already():
     from numba import njit
 
     @law(compiled=True)
@@ -110,7 +110,7 @@ def test_a_law_without_parameters_and_one_that_numba_has_compiled_already():
     np.testing.assert_array_equal(push.wrench(HandState.at([0.0, 0.0, 0.0], t=2.0)).force, [1.0, 0.5, 2.0])
 
 
-def test_it_composes_with_built_in_laws_and_with_laws_in_python():
+def test_law_composes_with_builtin_and_python_laws():
     river = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0)
     compiled, plain = law(compiled=True)(floor), law(twisted)
     field = (river + compiled(k=300.0)).blended(2.0 * plain, Weight.constant(0.25)).limited(3.0, 0.02)
@@ -122,7 +122,7 @@ def test_it_composes_with_built_in_laws_and_with_laws_in_python():
         np.testing.assert_allclose(np.concatenate(field.wrench(hand)), total, rtol=1e-12, atol=1e-15)
 
 
-def test_in_a_compiled_loop_it_is_asked_every_tick():
+def test_compiled_loop_evaluates_law_every_tick():
     program = law(compiled=True)(floor).program()
     rows = [hand.vector() for hand in hands(100)]
     wrenches = np.empty((100, 6))
@@ -131,7 +131,7 @@ def test_in_a_compiled_loop_it_is_asked_every_tick():
     np.testing.assert_array_equal(wrenches[:, :3], expected)
 
 
-def test_what_it_divides_by_zero_reaches_the_limiter_as_no_number():
+def test_division_by_zero_reaches_the_limiter_as_infinity():
     pole = law(compiled=True)(lambda hand: (1.0 / hand.p[0], 0.0, 0.0))
     wrenches = np.empty((1, 6))
     program, hand = pole.program(), HandState.at([0.0, 0.0, 0.0])
@@ -141,7 +141,7 @@ def test_what_it_divides_by_zero_reaches_the_limiter_as_no_number():
         pole.wrench(hand)
 
 
-def test_what_a_compiled_law_raises_is_told_with_its_name():
+def test_exception_in_compiled_law_is_reported_with_its_name_and_hand():
     def beyond(hand):
         total = 0.0
         for i in range(int(hand.t)):
@@ -156,19 +156,19 @@ def test_what_a_compiled_law_raises_is_told_with_its_name():
         own.wrench(HandState.at([1.0, 2.0, 3.0], t=4.0))
 
 
-def test_its_description_is_plain_data_and_changes_with_the_code_and_the_numbers():
-    def told(function, **parameters):
+def test_description_contains_name_parameters_and_code_digest():
+    def described(function, **parameters):
         return law(function)(**parameters).description()
 
-    assert told(floor)["law"] == "floor"
-    assert told(floor)["parameters"] == {"k": 500.0, "b": 3.0}
-    assert told(floor, k=300.0)["parameters"] == {"k": 300.0, "b": 3.0}
-    assert told(floor)["code"] == law(compiled=True)(floor).description()["code"]
-    assert told(floor)["code"] != told(smooth_floor)["code"]
+    assert described(floor)["law"] == "floor"
+    assert described(floor)["parameters"] == {"k": 500.0, "b": 3.0}
+    assert described(floor, k=300.0)["parameters"] == {"k": 300.0, "b": 3.0}
+    assert described(floor)["code"] == law(compiled=True)(floor).description()["code"]
+    assert described(floor)["code"] != described(smooth_floor)["code"]
 
 
-def test_the_hash_of_the_code_knows_constants_and_functions_that_it_reads():
-    def made(constant, slope):
+def test_code_digest_depends_on_closure_constants_and_functions():
+    def digest(constant, slope):
         def deep(hand, depth):
             return slope * (depth - hand.p[2])
 
@@ -177,11 +177,11 @@ def test_the_hash_of_the_code_knows_constants_and_functions_that_it_reads():
 
         return law(own).description()["code"]
 
-    assert made(1.0, 2.0) == made(1.0, 2.0)
-    assert len({made(1.0, 2.0), made(1.5, 2.0), made(1.0, 2.5)}) == 3
+    assert digest(1.0, 2.0) == digest(1.0, 2.0)
+    assert len({digest(1.0, 2.0), digest(1.5, 2.0), digest(1.0, 2.5)}) == 3
 
 
-def test_the_hash_knows_what_lists_objects_and_tables_hold_and_trusts_nothing_that_it_cannot_read():
+def test_code_digest_depends_on_container_contents_and_differs_for_unreadable_objects():
     gains, table = [1.0], {"k": np.array([1.0, 2.0])}
 
     def own(hand):
@@ -193,20 +193,20 @@ def test_the_hash_knows_what_lists_objects_and_tables_hold_and_trusts_nothing_th
     between = code_digest(own)
     table["k"][1] = 3.0
     assert len({before, between, code_digest(own)}) == 3
-    out = threading.Lock()
+    lock = threading.Lock()
 
     def locked(hand):
-        with out:
+        with lock:
             return 0.0, 0.0, hand.p[2]
 
     assert code_digest(locked) != code_digest(locked)
 
 
-def test_a_composed_field_is_described_by_its_operations_and_laws():
+def test_description_of_composed_field_lists_operations_and_laws():
     river = Follow(Trajectory.circle(0.05, 4.0), 200.0, 4.0)
-    told = (river + law(floor)).gated(Weight.switch()).limited(8.0).description()
-    assert told["parameters"] == [8.0, np.inf]
-    (gated,) = told["limit"]
+    description = (river + law(floor)).gated(Weight.switch()).limited(8.0).description()
+    assert description["parameters"] == [8.0, np.inf]
+    (gated,) = description["limit"]
     ((summed,),) = (gated["gate"],)
     first, second = summed["add"]
     assert (first["law"], second["law"]) == ("Follow", "floor")
@@ -216,7 +216,7 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: law(lambda: (0, 0, 0)), "first argument of law <lambda> .* must be hand, got no argument"),
         (lambda: law(lambda p, k=1.0: (0, 0, 0)), "must be hand, got p"),
@@ -259,6 +259,6 @@ def test_a_composed_field_is_described_by_its_operations_and_laws():
         (lambda: law(compiled=True)(lambda hand: (unknown, 0, 0)), "cannot be compiled.*unknown"),  # noqa: F821
     ],
 )
-def test_what_is_no_law_is_refused_by_name_and_place(make, says):
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_law_raises_parameter_error_with_name_and_place(make, message):
+    with pytest.raises(ParameterError, match=message):
         make()

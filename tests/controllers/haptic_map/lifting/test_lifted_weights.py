@@ -1,4 +1,4 @@
-"""Weights of the lifted map: exact at the sites, signed beside them, bounded, smooth, and of the near clips only."""
+"""Weights of the lifted map: exact at the sites, signed beside them, bounded, smooth, zero for distant clips."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,14 @@ from controllers.haptic_map.lifting.neighbours import (
     packed_neighbours,
     reaches,
 )
+from tests.derivatives import extrapolated_differences
 
 TURN = 2.0 * np.pi
 R, Z = (0.028, 0.072), (-0.022, 0.022)
 
 
-def wandering(m, rows=48):
-    """Sites of m curves on a lattice that they leave by a third of its step, shape (rows, m, 2)."""
+def moving_sites(m, rows=48):
+    """Sites of m curves that move about lattice points by a third of the lattice step, shape (rows, m, 2)."""
     side = int(np.ceil(np.sqrt(m)))
     step = 0.04 / max(side - 1, 1)
     lap, k = np.arange(rows)[:, None] * TURN / rows, np.arange(m)
@@ -28,7 +29,7 @@ def wandering(m, rows=48):
 
 
 class Weights:
-    """Weights of all clips at a place, their derivatives, and which are near."""
+    """Weights of all clips at a position and their derivatives, shape (4, m), and the near clips."""
 
     def __init__(self, sites):
         self.m, self.numbers = sites.shape[1], packed_neighbours(sites, R, Z)
@@ -47,41 +48,42 @@ class Weights:
         return result
 
 
-def places(n, seed=0):
+def random_positions(n, seed=0):
     rng = np.random.default_rng(seed)
     return rng.uniform([0.0, R[0], Z[0]], [TURN, R[1], Z[1]], (n, 3))
 
 
 @pytest.mark.parametrize("m", [1, 2, 3, 4, 9, 40])
-def test_at_its_site_a_clip_is_alone_and_the_sum_is_always_one(m):
-    sites, weights = wandering(m), Weights(wandering(m))
+def test_weights_are_one_at_own_site_and_sum_to_one(m):
+    sites, weights = moving_sites(m), Weights(moving_sites(m))
     for row in range(0, len(sites), 7):
         for i in range(m):
             w = weights(row * TURN / len(sites), *sites[row, i])
             np.testing.assert_allclose(w[0], np.eye(m)[i], atol=1e-12)
-    for place in places(200):
-        w = weights(*place)
+    for position in random_positions(200):
+        w = weights(*position)
         assert w[0].sum() == pytest.approx(1.0, abs=1e-12)
         np.testing.assert_allclose(w[1:].sum(axis=1), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("m", [4, 9, 40])
-def test_their_derivatives_agree_with_differences(m):
-    weights, step = Weights(wandering(m)), 1e-6
-    for place in places(60, seed=m):
-        w = weights(*place)
-        for way, size in enumerate((1e-4, step, step)):
-            d = size * np.eye(3)[way]
-            near, far = ((weights(*(place + k * d))[0] - weights(*(place - k * d))[0]) / (2 * k * size) for k in (1, 2))
-            scale = 1.0 + np.abs(w[1:]).max()
-            np.testing.assert_allclose((4.0 * near - far) / 3.0, w[1 + way], atol=1e-6 * scale)
+def test_derivatives_match_finite_differences(m):
+    weights = Weights(moving_sites(m))
+    for position in random_positions(60, seed=m):
+        w = weights(*position)
+        scale = 1.0 + np.abs(w[1:]).max()
+        for axis, step, derivative in zip(np.eye(3), (1e-4, 1e-6, 1e-6), w[1:], strict=True):
+            along = extrapolated_differences(
+                lambda h, position=position, axis=axis: weights(*(position + h * axis))[0], 0.0, step
+            )
+            np.testing.assert_allclose(along, derivative, atol=1e-6 * scale)
 
 
-def test_a_hand_that_leaves_a_curve_feels_the_plane_through_its_neighbours():
+def test_gradient_at_a_curve_fits_the_plane_through_its_neighbours():
     sites = np.tile(np.array([[x, y] for y in (-0.02, 0.0, 0.02) for x in (0.03, 0.05, 0.07)]), (16, 1, 1))
     weights = Weights(sites)
     gradient = weights(1.0, *sites[0, 4])[2:]
-    # Weights that are not negative would have none here.
+    # Non-negative weights would have a zero gradient here.
     plane = gradient @ (sites[0] - sites[0, 4])
     np.testing.assert_allclose(plane, np.eye(2), atol=0.1)
     beside = weights(1.0, 0.0505, 0.0)[0]
@@ -89,42 +91,42 @@ def test_a_hand_that_leaves_a_curve_feels_the_plane_through_its_neighbours():
     assert beside[3] < -0.005
 
 
-def test_they_are_bounded_everywhere_and_hardly_negative_between_curves():
+def test_weights_are_bounded_and_hardly_negative_between_curves():
     for m in (2, 3, 4, 9, 36):
-        weights = Weights(wandering(m))
-        w = np.array([weights(*place)[0] for place in places(2000, seed=m)])
+        weights = Weights(moving_sites(m))
+        w = np.array([weights(*position)[0] for position in random_positions(2000, seed=m)])
         assert w.min() > -_MAX_PLANE_TERM
         assert w.max() < 1.0 + _MAX_PLANE_TERM
-        # The lattice of these fills the domain.
+        # Only for these numbers does the lattice fill the domain.
         if m in (4, 9, 36):
             assert np.median(w.min(axis=1)) > -0.06
-    # Curves that nearly cross, with nothing beyond them, want to be extrapolated most.
+    # Extrapolation is greatest beyond two curves that nearly cross.
     pair = Weights(np.tile(np.array([[0.03, 0.0], [0.032, 0.0]]), (16, 1, 1)))
-    w = np.array([pair(*place)[0] for place in places(500)])
+    w = np.array([pair(*position)[0] for position in random_positions(500)])
     assert -_MAX_PLANE_TERM < w.min() < -0.01
 
 
-def test_the_clips_that_are_found_are_those_within_whose_reach_a_place_lies():
-    sites = wandering(40)
+def test_near_clips_are_those_whose_reach_contains_the_position():
+    sites = moving_sites(40)
     weights, reach = Weights(sites), reaches(sites, R, Z)
-    for angle, r, z in places(1000):
+    for angle, r, z in random_positions(1000):
         (places_at, reach_at) = round_lap(sites, angle), round_lap(reach, angle)
         distance = np.hypot(r - places_at[:, 0], z - places_at[:, 1])
         assert set(np.flatnonzero(distance < reach_at)) == set(weights.near(angle, r, z)[0])
 
 
-def test_how_many_are_near_does_not_grow_with_how_many_there_are():
-    few, many = (np.mean([len(weights.near(*place)[0]) for place in places(200)]) for weights in (
-        Weights(wandering(10)), Weights(wandering(100))
+def test_number_of_near_clips_does_not_grow_with_the_number_of_clips():
+    few, many = (np.mean([len(weights.near(*position)[0]) for position in random_positions(200)]) for weights in (
+        Weights(moving_sites(10)), Weights(moving_sites(100))
     ))  # fmt: skip
     assert many < 1.8 * few
 
 
-def test_every_place_of_the_domain_has_a_clip_also_where_curves_crowd():
+def test_every_position_has_a_clip_also_where_curves_crowd():
     rng = np.random.default_rng(2)
-    # All in one corner but one.
+    # All but one are in one corner.
     crowd = np.tile(rng.uniform([0.03, -0.02], [0.036, -0.015], (9, 2)), (16, 1, 1))
     lone = np.tile([[[0.07, 0.02]]], (16, 1, 1))
     weights = Weights(np.concatenate([crowd, lone], axis=1))
-    for place in places(1000):
-        assert weights(*place)[0].sum() == pytest.approx(1.0, abs=1e-12)
+    for position in random_positions(1000):
+        assert weights(*position)[0].sum() == pytest.approx(1.0, abs=1e-12)

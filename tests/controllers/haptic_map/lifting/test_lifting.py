@@ -1,4 +1,4 @@
-"""Lifting: motions as points, the common lap, transitions, the arrangement, and what is refused."""
+"""Lifting: features of motions, the common lap, transitions, the arrangement and validation."""
 
 from functools import cache
 
@@ -17,6 +17,7 @@ from controllers.haptic_map.lifting.motion_features import Features, Motion, fea
 from controllers.haptic_map.lifting.room import Rectangle, Room
 from controllers.haptic_map.lifting.transitions import Transition, compare, find_transitions
 from tests.controllers.clips_for_maps import JOINTS, difference, swinging, wxyz
+from tests.derivatives import central_differences
 
 WEIGHTS = np.array([0.4, 0.2, 0.15, 0.1])
 ROOM = Room()
@@ -38,7 +39,7 @@ def four_lifted():
     return lifted_at(FOUR)
 
 
-def test_the_distance_of_near_poses_is_that_of_their_tangent_in_metres_of_the_body():
+def test_distance_of_close_poses_equals_their_weighted_tangent():
     rng = np.random.default_rng(0)
     poses = swinging(1, frames=8)
     nearby = poses.copy()
@@ -50,11 +51,11 @@ def test_the_distance_of_near_poses_is_that_of_their_tangent_in_metres_of_the_bo
     for k in range(9):
         tangent = difference(nearby[k], poses[k])
         turns = WEIGHTS[1:, None] * tangent[6:].reshape(JOINTS, 3)
-        wanted = np.sqrt(tangent[2] ** 2 + (turns**2).sum())
-        assert np.linalg.norm(there[k] - here[k]) == pytest.approx(wanted, rel=1e-6)
+        expected = np.sqrt(tangent[2] ** 2 + (turns**2).sum())
+        assert np.linalg.norm(there[k] - here[k]) == pytest.approx(expected, rel=1e-6)
 
 
-def test_where_a_motion_is_and_which_way_it_faces_does_not_matter():
+def test_features_do_not_depend_on_position_and_heading():
     poses = swinging(2, travel=1.0)
     moved, turn = poses.copy(), Rotation.from_rotvec([0.0, 0.0, 2.1])
     moved[:, :3] = turn.apply(poses[:, :3]) + np.array([3.0, -1.0, 0.0])
@@ -63,7 +64,7 @@ def test_where_a_motion_is_and_which_way_it_faces_does_not_matter():
         np.testing.assert_allclose(there, here, atol=1e-9)
 
 
-def test_velocities_are_the_derivatives_of_poses():
+def test_feature_velocities_match_differences_of_poses():
     poses = swinging(3, frames=240)
     own = features(motion(poses), WEIGHTS, 241)
     step = np.array([difference(poses[k + 1], poses[k - 1]) * 15.0 for k in range(1, 240)])
@@ -72,7 +73,7 @@ def test_velocities_are_the_derivatives_of_poses():
     assert np.linalg.norm(own.velocity[120, :3]) == pytest.approx(np.linalg.norm(step[119, :3]), rel=1e-2)
 
 
-def test_a_clip_that_begins_elsewhere_is_shifted_back():
+def test_common_lap_removes_a_phase_shift():
     clips = [motion(swinging(5), "a"), motion(swinging(5, phase=0.3), "b")]
     a, b = common_lap(clips, [features(m, WEIGHTS, STEPS) for m in clips])
     # b at share s is a at s + 0.3.
@@ -80,7 +81,7 @@ def test_a_clip_that_begins_elsewhere_is_shifted_back():
     assert lag == pytest.approx(0.3, abs=0.5 / 96)
 
 
-def test_a_clip_with_another_timing_is_warped_to_it():
+def test_common_lap_removes_a_time_warp():
     even = swinging(6, frames=200)
     s = np.linspace(0.0, 1.0, 201)
     late = s - 0.05 * np.sin(2.0 * np.pi * s)
@@ -95,8 +96,8 @@ def test_a_clip_with_another_timing_is_warped_to_it():
     assert np.abs(error).max() < 0.02
 
 
-def test_steps_meet_steps_where_poses_do_not_tell():
-    """Two clips that stand still but for which foot bears: the contacts alone align them."""
+def test_common_lap_aligns_clips_by_contacts_where_poses_are_equal():
+    """Two clips of a still figure that differ in their contacts alone."""
     still = np.tile(swinging(1)[:1], (101, 1))
     s = np.linspace(0.0, 1.0, 101)
     walks = []
@@ -105,11 +106,11 @@ def test_steps_meet_steps_where_poses_do_not_tell():
         walks.append(motion(still, name, supports=np.stack([left, ~left], axis=1)))
     a, b = common_lap(walks, [features(m, WEIGHTS, STEPS) for m in walks])
     lap = np.arange(96) / 96
-    bears = [np.mod(phase.share(lap) + lead, 1.0) < 0.5 for phase, lead in ((a, 0.0), (b, 0.35))]
-    assert np.mean(bears[0] == bears[1]) > 0.97
+    stands = [np.mod(phase.share(lap) + lead, 1.0) < 0.5 for phase, lead in ((a, 0.0), (b, 0.35))]
+    assert np.mean(stands[0] == stands[1]) > 0.97
 
 
-def test_angles_increase_and_leave_a_gap_where_a_clip_is_open():
+def test_angles_increase_and_leave_a_gap_for_open_clips():
     clips = [*FOUR[:2], motion(swinging(3)[:70], "open", closed=False)]
     found = lifted_at(clips)
     for clip, angles in zip(clips, found.angles, strict=True):
@@ -121,13 +122,13 @@ def test_angles_increase_and_leave_a_gap_where_a_clip_is_open():
             assert angles[0] > 0.0
             assert 2.0 * np.pi * 0.7 - 1e-9 <= angles[-1] - angles[0] <= 2.0 * np.pi * 0.9 + 1e-9
             assert angles[-1] < 2.0 * np.pi
-    # Pace and its change are continuous: third differences are small beside the step.
+    # Pace and its change are continuous: third differences are small relative to the step.
     step = np.diff(found.angles[0])
     assert np.abs(np.diff(step, 2)).max() < 0.02 * step.mean()
 
 
-def meeting_clips():
-    """Two motions that differ but for one moment, at which pose and velocity are the same."""
+def clips_that_meet_once():
+    """Two motions that differ except at one moment, at which pose and velocity are the same."""
     s = np.linspace(0.0, 1.0, 121)
     base = swinging(7, amplitude=0.2)
     other = base.copy()
@@ -137,14 +138,14 @@ def meeting_clips():
     return motion(base, "base"), motion(other, "other")
 
 
-def test_a_transition_is_found_where_two_motions_agree_and_the_curves_meet_there_and_only_there():
-    found = lifted_at(meeting_clips())
-    (at,) = found.transitions
-    base = common_lap([meeting_clips()[0]], [features(meeting_clips()[0], WEIGHTS, STEPS)])[0]
+def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_there():
+    found = lifted_at(clips_that_meet_once())
+    (transition,) = found.transitions
+    base = common_lap([clips_that_meet_once()[0]], [features(clips_that_meet_once()[0], WEIGHTS, STEPS)])[0]
     assert base.start == 0.0
-    assert np.hypot(at.pose, at.velocity) < 0.1
-    assert at.support == 0.0
-    share = np.interp(at.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
+    assert np.hypot(transition.pose, transition.velocity) < 0.1
+    assert transition.support == 0.0
+    share = np.interp(transition.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
     assert meeting.distance < 5e-3
@@ -154,47 +155,47 @@ def test_a_transition_is_found_where_two_motions_agree_and_the_curves_meet_there
     assert found.before.meetings[0].distance > 5.0 * meeting.distance
 
 
-def moments(rng, poses, bears):
-    """Features of a motion at 200 steps of a lap: how far it is from another, and when its one foot stands."""
+def features_of(rng, poses, stands):
+    """Features of a motion at 200 steps of a lap, from its distance to another and the contacts of one foot."""
     own = rng.normal(size=(200, 6))
     own[:, 0] += poses
-    return Features(own, np.tile([1.5, 0.0, 0.0, 0.5], (200, 1)), np.asarray(bears, float)[:, None])
+    return Features(own, np.tile([1.5, 0.0, 0.0, 0.5], (200, 1)), np.asarray(stands, float)[:, None])
 
 
-def test_a_transition_is_where_motions_agree_for_a_while_and_stand_on_the_same_feet():
+def test_transition_needs_agreement_for_a_while_on_the_same_feet():
     steps, feet = np.arange(200), np.arange(200) % 100 < 50
 
-    def found(apart, bears):
+    def transitions(distances, stands):
         rng = np.random.default_rng(3)
-        one, other = moments(rng, 0.0 * steps, feet), moments(np.random.default_rng(3), apart, bears)
+        one, other = features_of(rng, 0.0 * steps, feet), features_of(np.random.default_rng(3), distances, stands)
         return find_transitions(compare([one, other], np.ones((200, 2), bool), np.full(2, 2.0)), 0.5)
 
     # The same pose for a moment at step 40, nearly the same for 0.4 s about step 120.
-    apart = np.full(200, 6.0)
-    apart[40], apart[95:146] = 0.0, 0.5
-    (at,) = found(apart, feet)
-    assert np.degrees(at.angle) == pytest.approx(120 * 1.8, abs=10.0)
-    assert at.support == 0.0
-    assert at.speeds == pytest.approx((1.5, 1.5))
-    # On the other foot there, it is none.
+    distances = np.full(200, 6.0)
+    distances[40], distances[95:146] = 0.0, 0.5
+    (transition,) = transitions(distances, feet)
+    assert np.degrees(transition.angle) == pytest.approx(120 * 1.8, abs=10.0)
+    assert transition.support == 0.0
+    assert transition.speeds == pytest.approx((1.5, 1.5))
+    # With another foot on the floor there is no transition.
     other = feet.copy()
     other[80:160] = ~feet[80:160]
-    assert found(apart, other) == []
+    assert transitions(distances, other) == []
 
 
 def test_motions_that_never_agree_have_no_transition():
-    low = motion(swinging(1), "low")
+    upright = motion(swinging(1), "low")
     bent = swinging(1)
     bent[:, 7:11] = wxyz(Rotation.from_quat(np.roll(bent[:, 7:11], -1, axis=1)) * Rotation.from_rotvec([0.0, 2.0, 0.0]))
-    assert lifted_at([low, motion(bent, "bent")]).transitions == ()
+    assert lifted_at([upright, motion(bent, "bent")]).transitions == ()
 
 
-def test_the_gradient_of_the_energy_agrees_with_differences():
+def test_energy_gradient_matches_finite_differences():
     rng = np.random.default_rng(0)
     n = 4
     distance = 0.1 * np.abs(rng.normal(size=(SAMPLES, n, n)))
     distance = distance + distance.transpose(0, 2, 1)
-    # Limits low enough to be broken.
+    # The limits are low enough to be exceeded.
     task = Task(
         Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 0.1, 0.5, distance,
         [Transition(0, 1, 1.0, 0.0, 0.0, 0.0, (0.0, 0.0)), Transition(1, 2, 3.0, 0.0, 0.0, 0.0, (0.0, 0.0))],
@@ -205,12 +206,12 @@ def test_the_gradient_of_the_energy_agrees_with_differences():
     x = (start + 2e-3 * rng.normal(size=start.shape)).ravel()
     gradient = energy(x)[1]
     for _ in range(5):
-        way = rng.normal(size=x.size)
-        slope = (energy(x + 1e-7 * way)[0] - energy(x - 1e-7 * way)[0]) / 2e-7
-        assert gradient @ way == pytest.approx(slope, rel=1e-6)
+        direction = rng.normal(size=x.size)
+        slope = central_differences(lambda h, direction=direction: energy(x + h * direction)[0], 0.0, 1e-7)
+        assert gradient @ direction == pytest.approx(slope, rel=1e-6)
 
 
-def test_sites_stay_in_the_rectangle_apart_and_mirror_the_motions_better_than_before():
+def test_sites_stay_inside_and_apart_and_arrangement_reduces_stress():
     lifted = four_lifted()
     low, high = ROOM.rectangle.low, ROOM.rectangle.high
     assert (lifted.sites >= low - 1e-12).all()
@@ -219,9 +220,9 @@ def test_sites_stay_in_the_rectangle_apart_and_mirror_the_motions_better_than_be
     assert lifted.after.stress < lifted.before.stress
 
 
-def test_what_is_measured_is_what_the_map_s_curves_are():
+def test_reported_curve_figures_match_those_of_the_map():
+    """Independent computation: the trajectories of the map made from the lifted clips."""
     lifted = four_lifted()
-    """Independent means: the trajectories of the map that is made of it."""
     h = Lifted([(m.poses, m.fps) for m in FOUR], [True] * 4, lifted.angles, lifted.sites)
     for i, curve in enumerate(lifted.after.curves):
         path = h.curve(i)
@@ -233,7 +234,7 @@ def test_what_is_measured_is_what_the_map_s_curves_are():
         np.testing.assert_allclose(poses[:, 7:], m.poses[:, 7:], atol=1e-12)
 
 
-def test_the_same_seed_gives_the_same_curves():
+def test_same_seed_gives_the_same_curves():
     lifted = four_lifted()
     again = lifted_at(FOUR)
     np.testing.assert_array_equal(again.sites, lifted.sites)
@@ -241,16 +242,16 @@ def test_the_same_seed_gives_the_same_curves():
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_fast_clip_is_kept_where_the_device_can_follow():
+def test_acceleration_limit_keeps_fast_clips_where_the_device_can_follow():
     fast = [FOUR[1], FOUR[2], motion(FOUR[3].poses, "fast", fps=150.0)]
     wide = (0.02, 0.072)
-    free = lifted_at(fast, Room(wide, acceleration=100.0)).after.curves[2].acceleration
-    # At the innermost radius it is 0.9 of that.
-    bound = lifted_at(fast, Room(wide, acceleration=0.93 * free)).after.curves[2].acceleration
-    assert bound <= 0.93 * free
+    unlimited = lifted_at(fast, Room(wide, acceleration=100.0)).after.curves[2].acceleration
+    # At the innermost radius it is 0.9 of this.
+    limited = lifted_at(fast, Room(wide, acceleration=0.93 * unlimited)).after.curves[2].acceleration
+    assert limited <= 0.93 * unlimited
 
 
-def test_the_faster_a_curve_is_gone_round_the_less_it_bends():
+def test_faster_curves_bend_less():
     # Two motions that are alike twice a lap.
     lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, SAMPLES, endpoint=False))
     distance = lap[:, None, None] * (1.0 - np.eye(2))
@@ -265,13 +266,13 @@ def test_the_faster_a_curve_is_gone_round_the_less_it_bends():
 
 
 @pytest.mark.slow
-def test_many_clips_are_kept_apart():
+def test_twelve_clips_keep_their_separation():
     many = [motion(swinging(k, amplitude=0.2 + 0.05 * k), f"{k}") for k in range(12)]
     found = lifted_at(many)
     assert found.after.separation >= ROOM.separation
 
 
-def test_a_lattice_is_as_dense_as_it_may_be():
+def test_lattice_is_dense_and_respects_the_separation():
     rectangle = Rectangle(0.02, 0.072, -0.05, 0.05)
     for separation in (0.004, 0.01, 0.03):
         points = lattice(rectangle, separation)
@@ -279,11 +280,11 @@ def test_a_lattice_is_as_dense_as_it_may_be():
         assert apart.min() >= separation * (1.0 - 1e-9)
         assert (points >= rectangle.low - 1e-12).all()
         assert (points <= rectangle.high + 1e-12).all()
-        # Squares would hold no more.
+        # Compared with a square lattice.
         assert len(points) >= (int(0.052 / separation) + 1) * (int(0.1 / separation) + 1) * 0.9
 
 
-# What is unusual, and what is refused.
+# Special cases and invalid arguments.
 
 
 def test_clips_of_any_length_and_rate_are_lifted():
@@ -295,21 +296,21 @@ def test_clips_of_any_length_and_rate_are_lifted():
     assert found.after.separation >= ROOM.separation
 
 
-def test_the_same_clip_twice_is_held_apart_and_said():
+def test_duplicate_clips_are_reported_and_kept_apart():
     found = lifted_at([FOUR[0], motion(FOUR[0].poses, "again"), FOUR[1]])
     assert found.same == ((0, 1),)
     assert all({t.first, t.second} != {0, 1} for t in found.transitions)
     assert found.after.separation >= ROOM.separation
 
 
-def test_a_clip_that_stands_still_has_a_curve_and_is_named():
+def test_still_clip_is_reported_and_has_a_curve():
     found = lifted_at([FOUR[0], motion(np.tile(FOUR[1].poses[:1], (31, 1)), "still")])
     assert found.still == (1,)
     assert np.isfinite(found.sites).all()
     assert found.after.separation >= ROOM.separation
 
 
-def test_a_single_clip_has_a_curve():
+def test_single_clip_has_a_curve():
     found = lifted_at(FOUR[:1])
     assert found.after.separation == np.inf
     assert found.transitions == ()
@@ -320,7 +321,7 @@ def cut_short():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: lifted_at([]), "no clips to lift"),
         (lambda: lifted_at([motion(swinging(1)[:1], "one")]), "clip 'one': a clip needs at least 2 frames, got 1"),
@@ -336,13 +337,13 @@ def cut_short():
         (lambda: motion(swinging(1), supports=np.ones((3, 2), bool)), "supports have shape"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_lifted_is_refused_with_what_would_help(make, says):
-    with pytest.raises(ParameterError, match=says):
+def test_impossible_lifts_raise_parameter_error_with_a_remedy(make, message):
+    with pytest.raises(ParameterError, match=message):
         make()
 
 
-def test_curves_that_are_not_apart_are_told():
-    """The check that `arrange` relies on can fail."""
+def test_is_apart_detects_curves_that_come_too_close():
+    """The check on which `arrange` relies."""
     task = Task(
         Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 1.0, 8.0, np.ones((SAMPLES, 2, 2)), [],
         np.ones((SAMPLES, 2)), np.zeros((SAMPLES, 2)),

@@ -1,4 +1,4 @@
-"""Arguments of another kind are refused where they are given, by name: curves, numbers, switches, weights, hands."""
+"""Checks of argument kinds: curves, numbers, flags, weights and hands of another kind raise with their name."""
 
 import re
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from controllers.state import HandState
 CIRCLE = Trajectory.circle(0.05, 4.0)
 FOLLOW = Follow(CIRCLE, 300.0, 8.0)
 BUNDLE = RiverBundle((River(CIRCLE),), ("level",))
-MADE: list[tuple[Any, dict[str, Any]]] = [
+CONSTRUCTORS: list[tuple[Any, dict[str, Any]]] = [
     (Follow, {"curve": CIRCLE, "k_r": 300, "b_d": 8, "epsilon": 0.2, "parallel": False}),
     (Bunny, {"curve": CIRCLE, "k_r": 300, "b_d": 8, "delta": 0.05, "attraction": "point", "pace": "wait"}),
     (River, {"curve": CIRCLE, "epsilon": 0.02, "tau": 0.02, "drag": 4}),
@@ -43,16 +43,16 @@ MADE: list[tuple[Any, dict[str, Any]]] = [
 WRONG = ("x", [1.0], {}, object(), np.zeros(2))
 
 
-@pytest.mark.parametrize(("make", "name"), [(make, name) for make, given in MADE for name in given])
-def test_a_value_of_another_kind_is_refused_by_name(make: Any, name: str) -> None:
-    given = next(given for made, given in MADE if made is make or made == make)
-    make(**given)
-    for wrong in (*WRONG, *(() if isinstance(given[name], bool) else (True,)), *(() if name == "then" else (None,))):
+@pytest.mark.parametrize(("make", "name"), [(make, name) for make, valid in CONSTRUCTORS for name in valid])
+def test_value_of_another_kind_raises_with_its_name(make: Any, name: str) -> None:
+    valid = next(valid for constructor, valid in CONSTRUCTORS if constructor is make or constructor == make)
+    make(**valid)
+    for wrong in (*WRONG, *(() if isinstance(valid[name], bool) else (True,)), *(() if name == "then" else (None,))):
         with pytest.raises(ParameterError, match=rf"^{name} is .*; expected "):
-            make(**given | {name: wrong})
+            make(**valid | {name: wrong})
 
 
-def test_the_message_says_what_would_be_right() -> None:
+def test_message_states_the_expected_kind() -> None:
     for kind, expected in (
         (Trajectory, "Trajectory"), (float, "a number"), (int, "a whole number"), (bool, "True or False"),
         (Trajectory | None, "Trajectory or None"), (tuple[float, float], "2 numbers"),
@@ -66,18 +66,18 @@ def test_the_message_says_what_would_be_right() -> None:
         FOLLOW + 3  # pyright: ignore[reportOperatorIssue, reportUnusedExpression]
 
 
-def test_a_function_is_one_that_takes_what_it_is_called_with() -> None:
+def test_takes_accepts_only_functions_with_the_expected_arguments() -> None:
     for right in (lambda t, p: t, lambda t, p, s=1: t, lambda *those: those, max, print):
         takes("cost", right, "t", "p")
-    for wrong, said in (
+    for wrong, shown in (
         (3, "3"), (None, "None"), (lambda t: t, "<lambda>(t)"), (lambda t, p, s: t, "<lambda>(t, p, s)"),
         (len, "len(obj, /)"),
     ):  # fmt: skip
-        with pytest.raises(ParameterError, match=f"^{re.escape(f'cost is {said}; expected a function of t, p')}$"):
+        with pytest.raises(ParameterError, match=f"^{re.escape(f'cost is {shown}; expected a function of t, p')}$"):
             takes("cost", wrong, "t", "p")
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
+def test_numpy_scalars_are_accepted_as_numbers() -> None:
     for number in (np.float64(3.0), np.float32(3.0), np.int64(3), 3):
         check_kinds(Follow(CIRCLE, number, number, epsilon=number, parallel=np.bool_(True)))  # pyright: ignore
     of_kind("direction", np.zeros(3), tuple[float, float, float])
@@ -86,7 +86,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 
 @pytest.mark.parametrize("wrong", [None, "x", ["1", "2"], [[0.0], [1.0, 2.0]], {}, [True, False], [None, 1.0]])
-def test_samples_are_numbers(wrong: Any) -> None:
+def test_samples_that_are_not_numbers_raise(wrong: Any) -> None:
     with pytest.raises(ParameterError, match=r"^samples is .*; expected numbers, with rows of equal lengths$"):
         numbers_of("samples", wrong)
     for given in ({"times": wrong}, {"positions": wrong}):
@@ -94,7 +94,7 @@ def test_samples_are_numbers(wrong: Any) -> None:
             Trajectory(**({"times": [0.0, 1.0], "positions": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]} | given))
 
 
-def test_a_place_has_three_numbers() -> None:
+def test_position_without_three_numbers_raises() -> None:
     with pytest.raises(ControllerError, match="the centre of a circle is"):
         Trajectory.circle(0.05, 4.0, centre=(0.0, 0.0))
     with pytest.raises(ParameterError, match="the centre of a ball is"):
@@ -105,6 +105,6 @@ def test_a_place_has_three_numbers() -> None:
 
 @pytest.mark.parametrize("make", [lambda x: Trajectory.circle(x, 4.0), lambda x: Trajectory.circle(0.05, x)])
 @pytest.mark.parametrize("wrong", [nan, -1.0, float("inf"), 0.0])
-def test_a_circle_has_a_size_and_a_lap(make: Any, wrong: float) -> None:
+def test_circle_with_invalid_size_or_period_raises(make: Any, wrong: float) -> None:
     with pytest.raises(ControllerError):
         make(wrong)
