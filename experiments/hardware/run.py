@@ -24,17 +24,7 @@ from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, check_limits, check_meaning, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import (
-    CONFIG,
-    DEVICE,
-    RECORDING,
-    REPORT,
-    SUMMARY,
-    check_folder,
-    check_holds,
-    claimed,
-    clear_folder,
-)
+from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, claimed_and_cleared
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
@@ -137,9 +127,7 @@ def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None
 def run_folder(options: RunHardware) -> Generator[None, None, None]:
     """Lock the folder and clear it; if no tick is recorded, all that the run wrote into it is removed."""
     out, is_new = options.out, not options.out.exists()
-    with claimed(out):
-        check_holds(out, options.overwrite)
-        clear_folder(out)
+    with claimed_and_cleared(out, options.overwrite):
         try:
             yield
         finally:

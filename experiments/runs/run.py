@@ -26,9 +26,7 @@ from experiments.results.folder import (
     REPORT,
     SUMMARY,
     check_folder,
-    check_holds,
-    claimed,
-    clear_folder,
+    claimed_and_cleared,
 )
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.run_measures import summarise
@@ -85,9 +83,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     cost_message = foreseen(out, full_config.seconds, groups(session.servo))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
-    with claimed(out):
-        check_holds(out, overwrite)
-        clear_folder(out)
+    with claimed_and_cleared(out, overwrite):
         (out / CONFIG).write_text(to_json(full_config), encoding="utf-8")
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
