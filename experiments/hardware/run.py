@@ -14,7 +14,7 @@ from rich.console import Console
 from controllers.safety.gate import Gate
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
@@ -108,9 +108,9 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
 
 def _compile_session(config: RunConfig, options: RunHardware, console: Console) -> Session:
     """The session of the servo; compiles all units that servo and page need before their processes start."""
-    session = session_of(served(config), ready=lambda units: compile_once(console, units))
+    session = session_of(served(config), ready=compiler(console))
     if options.view:
-        page_session(config, ready=lambda units: compile_once(console, units))
+        page_session(config, ready=compiler(console))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     return session

@@ -13,7 +13,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.estimates import SIMULATING, check_length, foreseen
 from experiments.console.progress import keep_seconds, simulating
 from experiments.files.curve_files import CURVE_FILE, save_curve
@@ -76,7 +76,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     console = Console(stderr=True)
     check_folder(out, overwrite)
     check_length(out, config.seconds, config.clock.servo_period)
-    session = wire(config, ready=lambda units: compile_once(console, units))
+    session = wire(config, ready=compiler(console))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     full_config = cast(RunConfig, session.config)
