@@ -30,17 +30,19 @@ from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
-STYLE: dict[Any, Any] = {
+PLAIN_STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
+    "legend.frameon": False,
+}
+STYLE: dict[Any, Any] = PLAIN_STYLE | {
     "axes.grid": True,
     "grid.color": "#e6e8ec",
     "axes.axisbelow": True,
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
     "lines.linewidth": 1.2,
-    "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
 
