@@ -10,7 +10,7 @@ centimetres and degrees.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +21,7 @@ from matplotlib.patches import Circle
 
 from controllers.state import Array, Mask
 from experiments.results.measures.changes import river_changes
+from experiments.results.measures.phases import performance_start
 from experiments.results.pages.arm_figure import arm_figure
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
@@ -225,9 +226,8 @@ def _tube_name(recording: Recording) -> str:
 def _mark_changes(ax: Axes, recording: Recording) -> None:
     """Draw a line at every change of river, with the new river's name, and at the start of a performance."""
     marks = [(change.t, change.after) for change in river_changes(recording)]
-    performance = (recording.summary or {}).get("performance")
-    if isinstance(performance, dict):
-        marks.append((float(cast(dict[str, float], performance)["start"]), "performed"))
+    if (start := performance_start(recording)) is not None:
+        marks.append((start, "performed"))
     low, high = ax.get_xlim()
     last, row = -np.inf, 0
     for t, name in marks:
