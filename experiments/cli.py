@@ -24,12 +24,23 @@ import tyro
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
 from experiments.config.keywords import in_options
-from experiments.console.welcome import WELCOME, next_step
 from models.errors import ModelError
 from sim.errors import SimError
 
 _DESCRIPTION = f"{__doc__} hvf --version prints the version."
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
+WELCOME = """hvf: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
+
+  hvf demo                            see it work: a run, and a page to open in a browser
+  hvf live                            take the stylus with the mouse, in the browser
+  hvf run --clips A.bvh B.amc         the same over your own motion capture
+  hvf run --mode stretch-then-follow  bend a curve, and perform it
+  hvf render runs/demo                film a run
+  hvf certify runs/demo               what is certain of its field: stability, passivity, energy
+  hvf clips                           the clips that are there
+
+hvf --help lists all commands, hvf COMMAND --help the options of one."""
+"""What ``hvf`` prints when it is called without arguments."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -90,7 +101,11 @@ def _interruption_message(command: Any) -> str:
     from experiments.results.folder import RECORDING
 
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
-        return next_step(str(command.out))
+        return (
+            f"what was recorded until then is in {command.out}: hvf report {command.out} writes its page, summary and "
+            f"animations, hvf render {command.out} films it, "
+            f"hvf run --config {command.out}/config.json --out NEW runs it again"
+        )
     recorder = command.which if isinstance(command, command_class("hardware")) else command
     if isinstance(recorder, command_class("arm") | RunHardware) and (recorder.out / RECORDING).exists():
         return f"what was recorded until then is in {recorder.out}: hvf report {recorder.out} writes its page"

@@ -1,6 +1,7 @@
 """Compilation of the units that a run needs, before the run, in separate processes and with a progress bar."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -9,11 +10,15 @@ from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
 
 
-def compile_once(console: Console, units: Sequence[Unit]) -> None:
-    """Compile those of the units that are not in the cache, and say so.
+def compiler(console: Console) -> Callable[[Sequence[Unit]], None]:
+    """Function that compiles those of given units that are not in the cache, and says so on the console.
 
     A failed compilation is not reported here: the run compiles the unit again and raises the error.
     """
+    return partial(_compile_missing, console)
+
+
+def _compile_missing(console: Console, units: Sequence[Unit]) -> None:
     waiting = list(missing_units(units))
     if not waiting:
         return

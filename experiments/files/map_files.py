@@ -1,16 +1,24 @@
 """Haptic maps in files: a NumPy archive of what a map was made of, from which it is rebuilt to the last bit."""
 
 import hashlib
+import zipfile
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
+from controllers.errors import ControllerError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.files.archives import load_archive, write_archive
+from controllers.state import Array
+from experiments.files.whole_file import whole_file
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
+VERSION = 1
 _KINDS = {
     "Cylindrical": Cylindrical.from_arrays,
     "Composite": Composite.from_arrays,
@@ -28,7 +36,18 @@ def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
     path : Path
         ``.npz`` file.
     """
-    write_archive(path, type(haptic_map).__name__, haptic_map.arrays())
+    write_arrays(path, type(haptic_map).__name__, haptic_map.arrays())
+
+
+def write_arrays(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
+    """Write a map's arrays by key with its class name `kind`; an existing file is replaced, once all are written."""
+    with whole_file(path) as file:
+        # Arrays are stored under numbers, as a key need not be a valid file name.
+        numbered = {str(i): value for i, value in enumerate(arrays.values())}
+        np.savez(
+            file, allow_pickle=False, version=np.array(VERSION), kind=np.array(kind), keys=np.array(list(arrays)),
+            **numbered,
+        )  # fmt: skip
 
 
 def load_map(path: Path) -> Cylindrical | Composite | Lifted:
@@ -37,9 +56,24 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
     Raises
     ------
     SimError
-        If the file cannot be read, is of another kind, or its content does not define a map.
+        If the file cannot be read, is damaged, of another kind or version, or its content does not define a map.
     """
-    return load_archive(path, _KINDS, "map")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            version, kind = int(archive["version"]), str(archive["kind"])
+            arrays: dict[str, Array] = {str(key): archive[str(i)] for i, key in enumerate(archive["keys"])}
+    except OSError as error:
+        raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a map") from None
+    except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+        raise SimError(f"{path}: is no file of a map, or damaged; expected what hvf lift writes") from None
+    if version != VERSION:
+        raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
+    if kind not in _KINDS:
+        raise SimError(f"{path}: holds a {kind}; expected a map: one of {', '.join(_KINDS)}")
+    try:
+        return _KINDS[kind](arrays)
+    except ControllerError as error:
+        raise SimError(f"{path}: {error}") from None
 
 
 def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple[Clip, ...]]:

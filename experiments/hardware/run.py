@@ -14,7 +14,7 @@ from rich.console import Console
 from controllers.safety.gate import Gate
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
@@ -24,17 +24,7 @@ from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, check_limits, check_meaning, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import (
-    CONFIG,
-    DEVICE,
-    RECORDING,
-    REPORT,
-    SUMMARY,
-    check_folder,
-    check_holds,
-    claimed,
-    clear_folder,
-)
+from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, claimed_and_cleared
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
@@ -118,9 +108,9 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
 
 def _compile_session(config: RunConfig, options: RunHardware, console: Console) -> Session:
     """The session of the servo; compiles all units that servo and page need before their processes start."""
-    session = session_of(served(config), ready=lambda units: compile_once(console, units))
+    session = session_of(served(config), ready=compiler(console))
     if options.view:
-        page_session(config, ready=lambda units: compile_once(console, units))
+        page_session(config, ready=compiler(console))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     return session
@@ -137,9 +127,7 @@ def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None
 def run_folder(options: RunHardware) -> Generator[None, None, None]:
     """Lock the folder and clear it; if no tick is recorded, all that the run wrote into it is removed."""
     out, is_new = options.out, not options.out.exists()
-    with claimed(out):
-        check_holds(out, options.overwrite)
-        clear_folder(out)
+    with claimed_and_cleared(out, options.overwrite):
         try:
             yield
         finally:

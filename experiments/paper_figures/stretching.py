@@ -1,7 +1,6 @@
 """Figures 6 and 7: a curve before and after it is stretched, and performed; and the result, rendered."""
 
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,6 +10,7 @@ from experiments.paper_figures.sources import MILLIMETRES, STRETCH, recording_in
 from experiments.paper_figures.space import arrows, path, workspace
 from experiments.render.film import Film, Frames
 from experiments.render.graphics import offscreen_backend
+from experiments.results.measures.phases import performance_start
 from sim.recording.recording import Recording, RecordingError
 from sim.viewer.palette import CURVE, FIELD, USER
 
@@ -24,7 +24,7 @@ def stretching(runs: Path) -> Figure:
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
         before = MILLIMETRES * recording.array("curve")
-        start = performance_start(recording)
+        start = _performance_start(recording)
         end = float(recording.channel("ticks", "t")[-1])
         _, editing, pressed = ticks(recording, 0.0, start, "p", "switch")
         _, performing, force = ticks(recording, start, end, "p", "force")
@@ -54,7 +54,7 @@ def rendered_result(runs: Path) -> Figure:
     """Figure 7: the animation of the stretched curve, rendered: the figure beside the default animation."""
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
-        start = performance_start(recording)
+        start = _performance_start(recording)
         film = Film(show="both", start=start, width=_WIDTH, height=_HEIGHT)
         frames = Frames(recording, folder, film, offscreen_backend())
         rows = np.linspace(0, len(frames) - 1, MOMENTS + 2).astype(int)[1:-1]
@@ -67,15 +67,9 @@ def rendered_result(runs: Path) -> Figure:
     return figure
 
 
-def performance_start(recording: Recording) -> float:
-    """Time at which the performance of the bent curve begins [s].
-
-    Raises
-    ------
-    RecordingError
-        If the run was interrupted or has no performance.
-    """
-    performance = (recording.summary or {}).get("performance")
-    if not isinstance(performance, dict):
+def _performance_start(recording: Recording) -> float:
+    """Time from which the bent curve is performed [s]; raises RecordingError if the run has no performance."""
+    start = performance_start(recording)
+    if start is None:
         raise RecordingError("the summary has no performance; expected that of a run in the mode stretch-then-follow")
-    return float(cast(dict[str, float], performance)["start"])
+    return start

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from rich.console import Console
@@ -19,6 +19,7 @@ from experiments.render.scenes import Camera, Clearance, Stage, Workspace
 from experiments.render.shown_world import GHOST, GHOST_WHITE, ShownWorld, mixed_with_white, shown_world
 from experiments.render.timeline import Ghost, Timeline, timeline
 from experiments.results.folder import RECORDING
+from experiments.results.measures.phases import performance_start
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, TUBE, USER
@@ -136,11 +137,11 @@ class Frames:
 
 def _bent_curve(recording: Recording, folder: Path) -> tuple[float, Array | None]:
     """Time from which a bent curve is performed [s], and its points; infinity and None if there is none."""
-    performance = (recording.summary or {}).get("performance")
-    if not isinstance(performance, dict) or not (folder / CURVE_FILE).exists():
+    start = performance_start(recording)
+    if start is None or not (folder / CURVE_FILE).exists():
         return np.inf, None
     curve = load_curve(folder / CURVE_FILE)
-    return float(cast(dict[str, float], performance)["start"]), curve.point(np.linspace(curve.start, curve.end, 400))
+    return start, curve.point(np.linspace(curve.start, curve.end, 400))
 
 
 def _stage_legend(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:

@@ -28,8 +28,6 @@ _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, D
 
 def check_folder(out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be written, is in use, or holds a run that may not be replaced."""
-    if out.exists() and not out.is_dir():
-        raise SimError(f"{out}: is a file; expected a folder to write the run into")
     if out.exists():
         with claimed(out):
             pass
@@ -53,8 +51,10 @@ def claimed(out: Path) -> Generator[None]:
     Raises
     ------
     SimError
-        If another process holds it.
+        If it is a file, or another process holds it.
     """
+    if out.exists() and not out.is_dir():
+        raise SimError(f"{out}: is a file; expected a folder to write the run into")
     out.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(out, os.O_RDONLY)
     try:
@@ -68,6 +68,15 @@ def claimed(out: Path) -> Generator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def claimed_and_cleared(out: Path, overwrite: bool) -> Generator[None]:
+    """Lock a folder as `claimed` does, and clear it for a run; raises SimError if it is not to be written into."""
+    with claimed(out):
+        check_holds(out, overwrite)
+        clear_folder(out)
+        yield
 
 
 def clear_folder(out: Path) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.results.pages.report_of import lines_of, write_report_of
@@ -42,7 +42,7 @@ def _complete(folder: Path) -> None:
     with Recording(folder / RECORDING) as recording:
         config = config_of(recording)
         check_files(config, recording)
-        session = wire(config, clips_of(recording), lambda units: compile_once(Console(stderr=True), units))
+        session = wire(config, clips_of(recording), compiler(Console(stderr=True)))
         seconds = len(recording.channel("ticks", "t")) * session.servo.plant.period
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         times = loop.run(seconds)

@@ -13,7 +13,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.estimates import SIMULATING, check_length, foreseen
 from experiments.console.progress import keep_seconds, simulating
 from experiments.files.curve_files import CURVE_FILE, save_curve
@@ -26,9 +26,7 @@ from experiments.results.folder import (
     REPORT,
     SUMMARY,
     check_folder,
-    check_holds,
-    claimed,
-    clear_folder,
+    claimed_and_cleared,
 )
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.run_measures import summarise
@@ -78,16 +76,14 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     console = Console(stderr=True)
     check_folder(out, overwrite)
     check_length(out, config.seconds, config.clock.servo_period)
-    session = wire(config, ready=lambda units: compile_once(console, units))
+    session = wire(config, ready=compiler(console))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     full_config = cast(RunConfig, session.config)
     cost_message = foreseen(out, full_config.seconds, groups(session.servo))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
-    with claimed(out):
-        check_holds(out, overwrite)
-        clear_folder(out)
+    with claimed_and_cleared(out, overwrite):
         (out / CONFIG).write_text(to_json(full_config), encoding="utf-8")
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)

@@ -5,7 +5,7 @@ import tempfile
 import time
 import weakref
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,21 +18,10 @@ from experiments.config.keywords import in_keywords, keywords
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.given_path import given_path
-from experiments.files.json_text import json_text
-from experiments.results.folder import (
-    CONFIG,
-    EDITED,
-    RECORDING,
-    REPORT,
-    SUMMARY,
-    check_folder,
-    check_holds,
-    claimed,
-    clear_folder,
-)
+from experiments.results.folder import CONFIG, EDITED, RECORDING, REPORT, claimed_and_cleared
 from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record as record_session
-from experiments.runs.run import write_animations
+from experiments.runs.run import write_animations, write_summary
 from experiments.setups.session import Session
 from models.mocap.library import check_target
 from sim.errors import SimError
@@ -113,16 +102,12 @@ class Run:
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
             return run
         folder = Path(record)
-        check_folder(folder, overwrite)
-        with claimed(folder):
-            check_holds(folder, overwrite)
-            clear_folder(folder)
+        with claimed_and_cleared(folder, overwrite):
             summary = record_session(session, folder, config, seconds, started, console)
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
                 (folder / CONFIG).write_text(to_json(session.config), encoding="utf-8")
-            content = asdict(summary) | {"lines": summary.lines()}
-            (folder / SUMMARY).write_text(json_text(content) + "\n", encoding="utf-8")
+            write_summary(folder, summary)
             run = Run(folder, summary, session)
             run.report()
         return run

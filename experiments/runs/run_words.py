@@ -11,7 +11,7 @@ from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, load_config
 from experiments.config.words import changed, run_config
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
 from experiments.files.given_path import given_path
 from experiments.runs.run_result import Run, check_record
@@ -57,6 +57,6 @@ def run(
     run_settings = run_config(**given) if file is None else changed(load_config(file), given)
     check_length(Path(record or tempfile.gettempdir()), run_settings.seconds, run_settings.clock.servo_period)
     console = Console(stderr=True)
-    session = wire(run_settings, ready=lambda units: compile_once(console, units))
+    session = wire(run_settings, ready=compiler(console))
     resolved = cast(RunConfig, session.config)
     return Run.of(session, to_dict(resolved), resolved.seconds, record, overwrite)

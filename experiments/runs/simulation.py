@@ -23,7 +23,7 @@ from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
 from experiments.runs.map_objects import BodyMap, RobotArm
 from experiments.runs.run_result import Run, check_record
@@ -224,9 +224,7 @@ class Simulation:
         device, span = device_of(self, world, seconds), seconds or _DEFAULT_DURATION
         given = self.haptic_map
         maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
-        return assemble(
-            world, maps, lambda m: self._parts(m, span), lambda units: compile_once(console, units), device
-        )  # fmt: skip
+        return assemble(world, maps, lambda m: self._parts(m, span), compiler(console), device)
 
     def _curve(self) -> Trajectory:
         """Curve of the first law of the field that has one: a user-defined map lies along it."""

@@ -4,12 +4,11 @@ import time
 
 from rich.console import Console
 
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.setups.parts.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, TrackingReport, track
-from sim.compilation.units import Unit
 
 
 def track_clips(
@@ -39,14 +38,11 @@ def track_clips(
     for remark in remarks:
         console.print(remark, highlight=False)
 
-    def ready(units: tuple[Unit, ...]) -> None:
-        compile_once(console, units)
-
     config = TrackingConfig(gains=FigureGains(force_bound=bounds[0], moment_bound=bounds[1]))
     reports: dict[str, TrackingReport] = {}
     began = time.perf_counter()
     for k, (name, clip) in enumerate(zip(names, clips, strict=True)):
-        reports[name] = track(clip, seconds, config, ready)
+        reports[name] = track(clip, seconds, config, compiler(console))
         rest = (len(names) - k - 1) * (time.perf_counter() - began) / (k + 1)
         if rest > 0.0:
             console.print(f"{k + 1} of {len(names)} clips tracked, about {rest:.0f} s left", highlight=False)

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -21,18 +21,13 @@ from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River, integrate
 from controllers.state import Array, HandState
+from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]
 DRAG = 4.0  # [N s/m]
 STEP = 15  # between the angles of the table [degrees]
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
 
 
 class Crossing(NamedTuple):
@@ -205,7 +200,7 @@ def main(folder: Path) -> None:
         "edited": edited_figure,
     }
     for name, draw in pictures.items():
-        with mpl.rc_context(_STYLE):
+        with mpl.rc_context(PLAIN_STYLE):
             draw().savefig(folder / f"field-{name}.png", dpi=130)
     print(crossing_table())
 

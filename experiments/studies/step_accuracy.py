@@ -20,13 +20,12 @@ from scipy.signal import butter, sosfiltfilt
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import PHANTOM
 from sim.body.figure_state import REPORT_DOWN
-from sim.compilation.units import Unit
 from sim.loop.channels import pose_errors, tick_channels
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
@@ -81,10 +80,7 @@ def course(config: RunConfig, step: float) -> Course:
     """Run a configuration at a step of the physics [s]."""
     clock = replace(config.clock, physics_step=step)
 
-    def ready(units: tuple[Unit, ...]) -> None:
-        compile_once(Console(stderr=True), units)
-
-    session = wire(replace(config, clock=clock), ready=ready)
+    session = wire(replace(config, clock=clock), ready=compiler(Console(stderr=True)))
     servo, world = session.servo, session.world
     own = slice(world.pose_at, world.pose_at + world.body.nq)
     elbow, two, three = (int(world.model.joint(PHANTOM + n).qposadr[0]) for n in ("elbow", "theta2", "theta3"))

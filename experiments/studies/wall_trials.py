@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from controllers.rotations import exponential, multiply
 from controllers.state import Array
 from experiments.config.words import run_config
+from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import JOINTS, N_POSE
 from models.mocap.library import embedded
@@ -23,12 +24,6 @@ from sim.viewer.palette import CURVE, FIELD, USER
 
 _RUN_DURATION = 6.0  # of a run
 BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
 
 
 def impossible(clip: Clip) -> Clip:
@@ -81,5 +76,5 @@ def wall_figure(without: Meeting, with_walls: Meeting) -> Figure:
 
 
 if __name__ == "__main__":
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(PLAIN_STYLE):
         wall_figure(meet(walls=False), meet(walls=True)).savefig(Path(sys.argv[1]) / "soft-walls.png", dpi=150)

@@ -17,9 +17,8 @@ from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.tidy import TABLE_CSV, TABLE_PARQUET, table, write_table
-from experiments.trials.design.code_hash import code_hash
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.plan import Trial, planned
+from experiments.trials.design.plan import Trial, code_hash, planned
 from experiments.trials.design.study_config import StudyConfig, read_toml, study_from
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import run_missing, warm

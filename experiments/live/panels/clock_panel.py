@@ -6,7 +6,7 @@ from typing import Any
 import viser
 
 from experiments.config.modes import StretchThenFollow
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.session.desk import REMEMBERED, Desk
 
 PACES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}

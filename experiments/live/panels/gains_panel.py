@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from controllers.errors import ParameterError
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
 from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import Gain, gains_of

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from controllers.state import Array
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
 
 STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s

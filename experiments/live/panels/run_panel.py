@@ -10,7 +10,7 @@ from experiments.config.modes import MODES
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import Built
 from models.mocap.library import embedded_names

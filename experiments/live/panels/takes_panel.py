@@ -11,7 +11,7 @@ import viser
 
 from controllers.errors import ParameterError
 from controllers.state import Array
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.panels.run_panel import configuration_text
 from experiments.live.session.desk import Desk
 from experiments.live.session.take_mix import FPS, Region, TakeData, mixed

@@ -5,7 +5,7 @@ from typing import Any
 
 import viser
 
-from experiments.live.panels.acts import Acts
+from experiments.live.panels import Acts
 from experiments.live.session.desk import MOST_BYTES, Desk
 
 

@@ -14,21 +14,21 @@ from sim.recording.recording import Recording
 
 
 class MeanSquare:
-    """Root mean square and largest magnitude of numbers that are given in blocks."""
+    """Root mean square and largest magnitude of numbers (n,), or norm of vectors (n, d), that are given in blocks."""
 
     def __init__(self) -> None:
         self._sum, self.count, self.largest = 0.0, 0, 0.0
 
     def add(self, values: Array) -> None:
-        """Add numbers of any shape."""
-        self._sum += float(np.sum(values**2))
-        self.count += values.size
-        self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
+        """Add numbers or vectors."""
+        square = values**2 if values.ndim == 1 else np.sum(values**2, axis=1)
+        self._sum, self.count = self._sum + float(np.sum(square)), self.count + len(square)
+        self.largest = max(self.largest, math.sqrt(float(square.max(initial=0.0))))
 
     @property
     def root(self) -> float:
-        """Root mean square; 0 if there are no numbers."""
-        return math.sqrt(self._sum / self.count) if self.count else 0.0
+        """Root mean square; 0 if there are none."""
+        return math.sqrt(self._sum / max(self.count, 1))
 
 
 class FigureMeasure:

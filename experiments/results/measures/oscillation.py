@@ -19,6 +19,7 @@ import numpy as np
 from controllers.safety.oscillation import OscillationDetector, shaken
 from controllers.state import Array, Mask
 from experiments.results.measures.blocks import BLOCK_ROWS
+from experiments.results.measures.figure_measure import MeanSquare
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
@@ -120,22 +121,6 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
     )  # fmt: skip
 
 
-class _VectorSize:
-    """Root mean square and largest norm of vectors that are given in blocks."""
-
-    def __init__(self) -> None:
-        self._sum, self._count, self.largest = 0.0, 0, 0.0
-
-    def add(self, vectors: Array) -> None:
-        square = np.sum(vectors**2, axis=1)
-        self._sum, self._count = self._sum + float(square.sum()), self._count + len(square)
-        self.largest = max(self.largest, math.sqrt(float(square.max(initial=0.0))))
-
-    @property
-    def root(self) -> float:
-        return math.sqrt(self._sum / max(self._count, 1))
-
-
 class _FastMotion:
     """Force above the detector's corner frequency, and motion above that of the hand, filtered block by block."""
 
@@ -148,7 +133,7 @@ class _FastMotion:
             np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos")) for corner in corners
         ]
         self._states: list[Array] = []
-        self.force, self.motion = _VectorSize(), _VectorSize()
+        self.force, self.motion = MeanSquare(), MeanSquare()
         self._crossing_count, self._shaking_ticks, self._last_force = 0, 0, np.zeros(3)
         self._motion_windows: list[Array] = []
 

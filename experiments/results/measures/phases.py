@@ -1,9 +1,10 @@
 """Summaries of the two parts of a run on a curve that is bent: editing and performance."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 from experiments.results.measures.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
+from sim.recording.recording import Recording
 
 Doing = Literal["held", "pushed", "undo", "redo", "nothing"]
 
@@ -139,3 +140,9 @@ def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
 def _residual(figure: FigureSummary | None) -> str:
     """The residual in words; falls are reported once, for the whole run."""
     return "" if figure is None else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"
+
+
+def performance_start(recording: Recording) -> float | None:
+    """Time from which a bent curve is performed [s]; None if it is not, or the run was interrupted."""
+    performance = (recording.summary or {}).get("performance")
+    return float(cast(dict[str, float], performance)["start"]) if isinstance(performance, dict) else None

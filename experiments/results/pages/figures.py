@@ -10,7 +10,7 @@ centimetres and degrees.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +21,7 @@ from matplotlib.patches import Circle
 
 from controllers.state import Array, Mask
 from experiments.results.measures.changes import river_changes
+from experiments.results.measures.phases import performance_start
 from experiments.results.pages.arm_figure import arm_figure
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
@@ -30,17 +31,19 @@ from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
-STYLE: dict[Any, Any] = {
+PLAIN_STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
+    "legend.frameon": False,
+}
+STYLE: dict[Any, Any] = PLAIN_STYLE | {
     "axes.grid": True,
     "grid.color": "#e6e8ec",
     "axes.axisbelow": True,
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
     "lines.linewidth": 1.2,
-    "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
 
@@ -80,9 +83,9 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
-    drawn, path = courses(recording.static), 1e3 * _thinned_rows(recording, "ticks", "p")
+    drawn, path = courses(recording.static), 1e3 * thinned_rows(recording, "p")
     radius = 1e3 * float(recording.array("tube_radius"))
-    pushed = np.linalg.norm(_thinned_rows(recording, "ticks", "user"), axis=1) > PUSH
+    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
         for course in drawn:
@@ -108,12 +111,12 @@ def path_figure(recording: Recording) -> Figure:
 
 def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
-    t = _thinned_rows(recording, "ticks", "t")
-    distance, radius = 1e3 * _thinned_rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
-    pushed = np.linalg.norm(_thinned_rows(recording, "ticks", "user"), axis=1) > PUSH
+    t = thinned_rows(recording, "t")
+    distance, radius = 1e3 * thinned_rows(recording, "distance"), 1e3 * float(recording.array("tube_radius"))
+    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
-        _shade(ax, t, pushed, PALE_USER, f"hand {_hand_action(recording)}")
+        shade(ax, t, pushed, PALE_USER, f"hand {_hand_action(recording)}")
         if 0.0 < radius < 1.05 * np.max(distance):
             ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube_name(recording)}")
         ax.plot(t, distance, color=CURVE)
@@ -130,12 +133,12 @@ def deviation_figure(recording: Recording) -> Figure:
 
 def forces_figure(recording: Recording) -> Figure:
     """Force of the field on the hand and force of the hand on the stylus, by component [N]."""
-    t = _thinned_rows(recording, "ticks", "t")
+    t = thinned_rows(recording, "t")
     figure, axes = _panels(2, 1, height=4.2)
     for ax, name, title in zip(
         axes, ("force", "user"), ("force of the field, limited", "force of the hand"), strict=True
     ):
-        force = _thinned_rows(recording, "ticks", name)
+        force = thinned_rows(recording, name)
         ax.plot(t, np.linalg.norm(force, axis=1), color="#b9bec8", lw=2.4, label="norm")
         for axis, color in enumerate(AXES):
             ax.plot(t, force[:, axis], color=color, lw=1.0, label="xyz"[axis])
@@ -147,7 +150,7 @@ def forces_figure(recording: Recording) -> Figure:
 
 def torques_figure(recording: Recording) -> Figure:
     """Torques of the three motors with their continuous and peak limits [mN m]."""
-    t, torque = _thinned_rows(recording, "ticks", "t"), 1e3 * _thinned_rows(recording, "ticks", "torque")
+    t, torque = thinned_rows(recording, "t"), 1e3 * thinned_rows(recording, "torque")
     continuous = 1e3 * recording.array("motor_continuous")
     peak = 1e3 * recording.array("motor_peak")
     figure, axes = _panels(3, 1, height=4.8)
@@ -170,21 +173,21 @@ def tracking_figure(recording: Recording) -> Figure:
 
     Frames in which the figure lies, or is being set back onto the animation, are left out.
     """
-    t, flight = _thinned_rows(recording, "frames", "t"), _thinned_rows(recording, "frames", "flight") > 0.5
-    down = _thinned_rows(recording, "frames", "down") > 0.5
+    t, flight = thinned_rows(recording, "t", "frames"), thinned_rows(recording, "flight", "frames") > 0.5
+    down = thinned_rows(recording, "down", "frames") > 0.5
     weight = float(recording.array("body_weight"))
-    residual = 100 * np.linalg.norm(_thinned_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
-    ground = 100 * _thinned_rows(recording, "frames", "ground")[:, 2] / weight
+    residual = 100 * np.linalg.norm(thinned_rows(recording, "residual", "frames")[:, :3], axis=1) / weight
+    ground = 100 * thinned_rows(recording, "ground", "frames")[:, 2] / weight
     curves = (
-        ("joints: RMS angle to the animation", "[°]", np.rad2deg(_thinned_rows(recording, "frames", "joint_error"))),
-        ("root: distance to the animation", "[cm]", 1e2 * _thinned_rows(recording, "frames", "root_error")),
+        ("joints: RMS angle to the animation", "[°]", np.rad2deg(thinned_rows(recording, "joint_error", "frames"))),
+        ("root: distance to the animation", "[cm]", 1e2 * thinned_rows(recording, "root_error", "frames")),
         ("residual force at the root", "[% body weight]", residual),
         ("ground force, vertical", "[% body weight]", ground),
     )
     figure, axes = _panels(4, 1, height=6.4)
     for ax, (title, unit, values) in zip(axes, curves, strict=True):
-        _shade(ax, t, flight & ~down, PALE_TUBE, "flight")
-        _shade(ax, t, down, PALE_FALL, "fallen")
+        shade(ax, t, flight & ~down, PALE_TUBE, "flight")
+        shade(ax, t, down, PALE_FALL, "fallen")
         ax.plot(t, np.where(down, np.nan, values), color=CURVE)
         ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
         ax.set_ylim(bottom=0)
@@ -195,7 +198,8 @@ def tracking_figure(recording: Recording) -> Figure:
     return figure
 
 
-def _thinned_rows(recording: Recording, group: str, name: str) -> Array:
+def thinned_rows(recording: Recording, name: str, group: str = "ticks") -> Array:
+    """Every k-th row of a channel (n, ...), with the smallest k by which at most `POINTS` rows are left."""
     channel = recording.channel(group, name)
     return channel[:: max(1, -(-len(channel) // POINTS))]
 
@@ -222,9 +226,8 @@ def _tube_name(recording: Recording) -> str:
 def _mark_changes(ax: Axes, recording: Recording) -> None:
     """Draw a line at every change of river, with the new river's name, and at the start of a performance."""
     marks = [(change.t, change.after) for change in river_changes(recording)]
-    performance = (recording.summary or {}).get("performance")
-    if isinstance(performance, dict):
-        marks.append((float(cast(dict[str, float], performance)["start"]), "performed"))
+    if (start := performance_start(recording)) is not None:
+        marks.append((start, "performed"))
     low, high = ax.get_xlim()
     last, row = -np.inf, 0
     for t, name in marks:
@@ -238,6 +241,7 @@ def _mark_changes(ax: Axes, recording: Recording) -> None:
         )  # fmt: skip
 
 
-def _shade(ax: Axes, t: Array, where: Mask, color: str, label: str) -> None:
+def shade(ax: Axes, t: Array, where: Mask, color: str, label: str | None = None) -> None:
+    """Shade the spans of time [s] in which a mask (n,) is True; the label is that of all of them in a legend."""
     for i, (start, stop) in enumerate(spans(where)):
         ax.axvspan(float(t[start]), float(t[stop - 1]), color=color, lw=0, label=label if i == 0 else None)

@@ -1,8 +1,6 @@
 """The page of a hardware run, from its recording: forces and the safety gate's states, twin, servo timing, link."""
 
-import base64
 import html
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,22 +11,15 @@ from matplotlib.figure import Figure
 
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from experiments.files.html_page import html_page, image
 from experiments.results.folder import FIGURES, REPORT
-from experiments.results.pages.figures import AXES, POINTS, STYLE
+from experiments.results.pages.figures import AXES, STYLE, shade, thinned_rows
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 
 SHADES = {State.ARMING: "#f1f1f4", State.RAMPING: "#e3ecf6", State.FAULT: "#f8dedb"}
 _SHOWN_TIME = 2.0  # [s] of motion shown, short enough to tell the prediction from the measurement
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,"><title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 60rem; padding: 1.5rem }}
-img {{ width: 100%; margin: .5rem 0 1rem; }}</style></head>
-<body><h1>{title}</h1><ul>{lines}</ul>{figures}</body></html>
-"""
+_PAGE_STYLE = "body { max-width: 60rem; } img { width: 100%; margin: .5rem 0 1rem; }"
 
 
 def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[str]) -> None:
@@ -50,23 +41,24 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
         file = folder / FIGURES / f"{name}.png"
         with mpl.rc_context(STYLE):
             draw(recording).savefig(file, dpi=150)
-        images.append(f'<img alt="{name}" src="data:image/png;base64,{base64.b64encode(file.read_bytes()).decode()}">')
-    title = html.escape(f"{recording.text('title')}, on a device")
+        images.append(image(file, name))
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
-    (folder / REPORT).write_text(_PAGE.format(title=title, lines=items, figures="".join(images)), encoding="utf-8")
+    body = f"<ul>{items}</ul>{''.join(images)}"
+    page = html_page(f"{recording.text('title')}, on a device", body, _PAGE_STYLE)
+    (folder / REPORT).write_text(page, encoding="utf-8")
 
 
 def forces_figure(recording: Recording) -> Figure:
     """Force commanded by the field, force after the gate, and distance from the curve; states of the gate shaded."""
-    t, asked, force = (_thinned_rows(recording, name) for name in ("t", "asked", "force"))
+    t, asked, force = (thinned_rows(recording, name) for name in ("t", "asked", "force"))
     figure, (above, below) = _panels(2)
     above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="asked for by the field")
     above.plot(t, np.linalg.norm(force, axis=1), color=FIELD, label="let through to the motors")
     above.set(title="force on the hand", ylabel="[N]")
-    below.plot(t, 1e3 * _thinned_rows(recording, "distance"), color=AXES[0])
+    below.plot(t, 1e3 * thinned_rows(recording, "distance"), color=AXES[0])
     below.set(title="distance from the curve", xlabel="t [s]", ylabel="[mm]")
     for axes in (above, below):
-        _shade(axes, recording)
+        _mark_states(axes, recording)
     above.legend(loc="upper right", ncols=5)
     return figure
 
@@ -83,10 +75,10 @@ def twin_figure(recording: Recording) -> Figure:
         motion.plot(t[some], predicted[some, i], color="#222a38", lw=0.8, ls=(0, (2, 3)), label="predicted" * (i == 0))
     motion.set(title=f"tip of the device and of its twin, the last {_SHOWN_TIME:g} s", ylabel="[mm]")
     motion.legend(loc="upper right", ncols=4)
-    apart.plot(_thinned_rows(recording, "t"), 1e6 * _thinned_rows(recording, "apart"), color=AXES[0])
+    apart.plot(thinned_rows(recording, "t"), 1e6 * thinned_rows(recording, "apart"), color=AXES[0])
     apart.set(title="from the prediction of a tick to its measurement", ylabel="[µm]")
-    sizes = np.linalg.norm(_thinned_rows(recording, "hand_force"), axis=1)
-    force.plot(_thinned_rows(recording, "t"), sizes, color=USER)
+    sizes = np.linalg.norm(thinned_rows(recording, "hand_force"), axis=1)
+    force.plot(thinned_rows(recording, "t"), sizes, color=USER)
     force.set(title="force of the hand, as the twin tells it", xlabel="t [s]", ylabel="[N]")
     return figure
 
@@ -109,16 +101,16 @@ def servo_figure(recording: Recording) -> Figure:
 def link_figure(recording: Recording) -> Figure:
     """Quality of the link: round trip, staleness and jitter; readings lost and refused, deadlines missed."""
     figure, (times, counts) = _panels(2)
-    t = _thinned_rows(recording, "t")
+    t = thinned_rows(recording, "t")
     for name, color, label in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
                               ("jitter", AXES[0], "jitter")):  # fmt: skip
-        values = 1e6 * _thinned_rows(recording, name)
+        values = 1e6 * thinned_rows(recording, name)
         if np.isfinite(values).any():
             times.plot(t, values, color=color, lw=0.8, label=label)
     times.set(title="how the device answers", ylabel="[µs]", yscale="log")
     for name, color in (("lost", FIELD), ("refused", AXES[1]), ("missed", "#9aa3b2")):
         counts.plot(
-            t, _thinned_rows(recording, name), color=color, label="deadlines missed" if name == "missed" else name
+            t, thinned_rows(recording, name), color=color, label="deadlines missed" if name == "missed" else name
         )
     counts.set(title="readings lost and refused, and deadlines that the servo missed, so far", xlabel="t [s]")
     for axes in (times, counts):
@@ -132,19 +124,11 @@ def _panels(rows: int) -> tuple[Figure, Sequence[Axes]]:
     return figure, [figure.add_subplot(rows, 1, k + 1) for k in range(rows)]
 
 
-def _thinned_rows(recording: Recording, name: str) -> Array:
-    channel = recording.channel("ticks", name)
-    return channel[:: max(1, len(recording.channel("ticks", "t")[:]) // POINTS)]
-
-
-def _shade(axes: Axes, recording: Recording) -> None:
+def _mark_states(axes: Axes, recording: Recording) -> None:
     """Shade the states of the gate without full force, and mark the faults."""
     t, state, fault = (recording.channel("ticks", name)[:] for name in ("t", "state", "fault"))
-    edges = np.flatnonzero(np.concatenate(([True], np.diff(state) != 0.0, [True])))
-    for first, after in itertools.pairwise(edges.tolist()):
-        shade = SHADES.get(State(int(state[first])))
-        if shade:
-            axes.axvspan(t[first], t[min(after, len(t) - 1)], color=shade, lw=0.0, zorder=0)
+    for kind, color in SHADES.items():
+        shade(axes, t, state == kind, color)
     for k in np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))[:20]:
         axes.axvline(float(t[k]), color=AXES[1], lw=0.8)
         name = Fault(int(fault[k])).name.lower().replace("_", " ")

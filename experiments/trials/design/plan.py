@@ -1,9 +1,11 @@
 """The plan of a study: a configuration and a key for every trial."""
 
 import hashlib
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,13 +18,16 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.config.words import run_config
 from experiments.setups.parts.defaults import resolved
-from experiments.trials.design.code_hash import code_hash
 from experiments.trials.design.design import Condition, Meeting, conditions, meetings
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.study_config import StudyConfig, Words
 from models.mocap.library import embedded_names
+from sim.compilation.sources import reached_code
 from sim.users.person.person import Person
 from sim.users.person.population import population
+
+_TRIAL_MODULE = "experiments.trials.trial.run_trial"
+_LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "llvmlite")
 
 
 class Trial(NamedTuple):
@@ -80,6 +85,16 @@ def key_of(config: RunConfig) -> str:
     text = to_json(resolved(config))
     files = [f"{name} {file_digest(name)}" for name in files_of(config)]
     return hashlib.sha256("\n".join([code_hash(), text, *files]).encode()).hexdigest()[:32]
+
+
+@cache
+def code_hash() -> str:
+    """Hash of the code that a trial reaches, and of the versions of Python and the libraries, 16 hex digits.
+
+    Analysis and plots of a study are not included; nor is the processor, which a row names separately.
+    """
+    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(_TRIAL_MODULE).items())]
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 def files_of(config: RunConfig) -> tuple[str, ...]:

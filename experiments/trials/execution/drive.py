@@ -10,7 +10,7 @@ from rich.text import Text
 
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.trials.design.plan import Trial
 from experiments.trials.execution.database import Database
 from experiments.trials.trial.run_trial import Row, Shelf, Task
@@ -34,7 +34,7 @@ class _RateColumn(ProgressColumn):
 def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
     """Compile the units that trials need, once for each kind of run, and make their maps."""
     for config in {_compilation_key(config): config for config in configs}.values():
-        shelf.session(config, lambda units: compile_once(console, units))
+        shelf.session(config, compiler(console))
 
 
 def _compilation_key(config: RunConfig) -> object:

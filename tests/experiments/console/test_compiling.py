@@ -10,7 +10,7 @@ from rich.console import Console
 
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
-from experiments.console.compiling import compile_once
+from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
 from sim.compilation import side_by_side
 from sim.compilation.unit_workers import compile_units, missing_units
@@ -51,12 +51,12 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
 
 def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
     assert missing_units((*toys, *toys)) == (toys[1], toys[0])
-    compile_once(Console(), toys)
+    compiler(Console())(toys)
     told = capsys.readouterr().out
     assert "Compiling" in told
     assert "2 of 2" in told
     assert missing_units(toys) == ()
-    compile_once(Console(), toys)
+    compiler(Console())(toys)
     assert not capsys.readouterr().out
 
 

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main, parsed
+from experiments.cli import WELCOME, main, parsed
 from experiments.console.progress import left, working
-from experiments.console.welcome import WELCOME
 from experiments.trials.study import DATABASE
 from sim.recording.recording import Recording
 

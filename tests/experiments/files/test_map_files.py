@@ -6,18 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from controllers.curves.trajectory import Trajectory
-from controllers.fields.bundle import RiverBundle
-from controllers.fields.river import River
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.cli import main
 from experiments.config.part import to_dict
 from experiments.config.words import run_config
-from experiments.files.archives import load_archive, write_archive
-from experiments.files.field_files import save_field
-from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
+from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map, write_arrays
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import RECORDING
 from experiments.setups.wiring import wire
@@ -100,7 +95,7 @@ def test_a_damaged_file_is_refused_by_name(tmp_path):
 
 def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
     path = tmp_path / "other.npz"
-    save_field(RiverBundle((River(Trajectory.circle(0.05, 4.0)),), ("one",)), path)
+    write_arrays(path, "RiverBundle", {"one": np.zeros(3)})
     with pytest.raises(SimError, match=r"other\.npz: holds a RiverBundle; expected a map: one of Cylindrical, Comp"):
         load_map(path)
     np.savez(path, a=np.zeros(3))
@@ -119,26 +114,26 @@ def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
 def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
     path, arrays = tmp_path / "map.npz", lifted().arrays()
     del arrays[key]
-    write_archive(path, "Lifted", arrays)
+    write_arrays(path, "Lifted", arrays)
     with pytest.raises(SimError, match=f"the map lacks '{key}'"):
         load_map(path)
     arrays[key] = np.zeros((1, 2, 3, 4))
-    write_archive(path, "Lifted", arrays)
+    write_arrays(path, "Lifted", arrays)
     with pytest.raises(SimError, match=r"of the map has shape \(1, 2, 3, 4\)"):
         load_map(path)
     arrays[key] = np.array(["words"])
-    write_archive(path, "Lifted", arrays)
+    write_arrays(path, "Lifted", arrays)
     with pytest.raises(SimError, match="does not hold numbers"):
         load_map(path)
 
 
 def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "map.npz"
-    monkeypatch.setattr("experiments.files.archives.VERSION", 2)
-    write_archive(path, "Lifted", {})
+    monkeypatch.setattr("experiments.files.map_files.VERSION", 2)
+    write_arrays(path, "Lifted", {})
     monkeypatch.undo()
     with pytest.raises(SimError, match="of version 2 of the format, this program reads 1"):
-        load_archive(path, {"Lifted": Lifted.from_arrays}, "map")
+        load_map(path)
 
 
 def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):

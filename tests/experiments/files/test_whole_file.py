@@ -9,8 +9,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.files import whole_file as whole
-from experiments.files.archives import write_archive
 from experiments.files.device_files import save_device
+from experiments.files.map_files import write_arrays
 from experiments.files.whole_file import whole_file
 from experiments.lifting import lift_file
 
@@ -62,7 +62,7 @@ def test_an_archive_that_is_interrupted_is_not_there(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr(whole.os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        write_archive(tmp_path / "map.npz", "Lifted", {"a": np.zeros(3)})
+        write_arrays(tmp_path / "map.npz", "Lifted", {"a": np.zeros(3)})
     assert not list(tmp_path.iterdir())
 
 

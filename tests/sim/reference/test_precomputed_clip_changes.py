@@ -107,7 +107,7 @@ def test_map_is_unchanged_where_no_change_is_found(
     monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
     # Other processes would not see the patched `_make_passage`.
     monkeypatch.setattr(river_changes, "side_by_side", lambda calls: [call(*given) for call, given in calls])
-    monkeypatch.setattr(river_changes, , lambda *rest: None)
+    monkeypatch.setattr(river_changes, "_make_passage", lambda *rest: None)
     for _ in range(2):  # computed, and loaded from the cache
         haptic_map = river_changes.with_changes(map_with_offsets, 0.4, FIGURE)
         assert haptic_map.changes == ()
