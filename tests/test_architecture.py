@@ -39,7 +39,7 @@ def by_folder(graph: dict[str, set[str]]) -> dict[str, set[str]]:
 
 
 @pytest.mark.parametrize("view", [lambda graph: graph, by_folder], ids=["files", "folders"])
-def test_no_circle_of_imports(view) -> None:
+def test_no_import_cycles(view) -> None:
     graph = view(imports())
     assert len(graph) > 20
     try:
@@ -56,14 +56,14 @@ def test_no_circle_of_imports(view) -> None:
         (by_folder, "models/mocap/motion/ranges.py", "models/mocap/library.py"),
     ],
 )
-def test_a_circle_would_be_found(view, file: str, imported: str) -> None:
+def test_added_import_that_closes_a_cycle_is_detected(view, file: str, imported: str) -> None:
     graph = imports()
     assert {file, imported} <= graph.keys()
     with pytest.raises(graphlib.CycleError):
         tuple(graphlib.TopologicalSorter(view(graph | {file: graph[file] | {imported}})).static_order())
 
 
-def test_folders_of_tests_are_those_of_the_packages() -> None:
+def test_test_folders_mirror_package_folders() -> None:
     held = {
         path.parent.relative_to(ROOT / "tests")
         for package in PACKAGES

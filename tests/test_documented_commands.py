@@ -72,7 +72,7 @@ def in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.C
     return done, False
 
 
-def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None:
+def test_every_readme_row_with_standing_figure_states_its_residual() -> None:
     stands = [line for line, measured in ROW.findall(README.read_text(encoding="utf-8")) if "stands" in measured]
     assert len(stands) >= 8
     assert [shlex.join(shlex.split(line)) for line in stands] == list(
@@ -82,7 +82,7 @@ def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None
 
 @pytest.mark.commands
 @pytest.mark.parametrize("page", [page for page in TYPED + SHOWN if lines(page)], ids=name)
-def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> None:
+def test_commands_of_page_give_the_stated_results(page: Path, tmp_path: Path) -> None:
     for file, source in GIVEN.items():
         shutil.copy(ROOT / source, tmp_path / file)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")

@@ -9,7 +9,7 @@ from experiments.cli import main
 
 
 @pytest.mark.slow
-def test_the_rivers_of_a_lifted_map_are_certified_with_their_switching(tmp_path, capsys):
+def test_rivers_of_lifted_map_are_certified_with_their_switching(tmp_path, capsys):
     assert main(["lift", "walk", "run", "--out", str(tmp_path / "map.npz")]) == 0
     flags = ["--map", str(tmp_path / "map.npz"), "--mode", "rivers", "--no-hand", "--out", str(tmp_path)]
     assert main(["certify", *flags]) == 0

@@ -24,13 +24,13 @@ PRINTS = {
 }
 
 
-def test_every_example_is_told_what_it_prints() -> None:
+def test_every_example_has_an_expected_output() -> None:
     assert {path.stem for path in EXAMPLES} == PRINTS.keys()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs(path: Path, tmp_path: Path) -> None:
+def test_example_runs_and_prints_its_result(path: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, str(path)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False

@@ -41,7 +41,7 @@ def changing():
     return shown
 
 
-def test_feet_stand_though_the_mixture_changes():
+def test_feet_do_not_slide_while_the_mixture_changes():
     stands, dragged = (measure_motion(Clip(poses, 120.0, "changing")) for poses in changing())
     assert dragged.slide > 0.05
     assert stands.slide < 0.03
@@ -50,7 +50,7 @@ def test_feet_stand_though_the_mixture_changes():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("names", [("walk", "run", "jump", "backflip"), tuple(embedded_names())], ids=["four", "all"])
-def test_in_betweens_of_lifted_neighbours_do_not_slide_nor_sink(names):
+def test_in_betweens_of_lifted_neighbours_neither_slide_nor_sink(names):
     layout = lift_clips(names, Room()).layout()
     for i, j in layout.neighbours():
         found = measure_motion(in_between(layout, i, j))

@@ -24,7 +24,7 @@ def map_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
+def test_map_file_contains_the_found_transitions(map_file: Path) -> None:
     haptic_map, clips = load_figure_map(map_file)
     assert tuple(clip.name for clip in clips) == CLIPS
     pairs = {(at.first, at.second) for at in haptic_map.transitions}  # pyright: ignore
@@ -34,7 +34,7 @@ def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
 
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("curve", "seconds"), [("walk", 2.2), ("run", 2.2), ("jump", 2.4)])
-def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
+def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
 ) -> None:
     out = tmp_path / "follow"
@@ -51,7 +51,7 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
 
 
 @pytest.mark.usefixtures("without_page")
-def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
+def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: Path) -> None:
     residuals, furthest = [], []
     for seed in (1, 2, 3):
         config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
@@ -69,7 +69,7 @@ def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map
     assert np.median(furthest) < 5.0
 
 
-def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
+def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
     run(run_config(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
         assert (recording.channel("ticks", "river")[:] == 0.0).all()
@@ -78,7 +78,7 @@ def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file
 
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("first", "second"), [("walk", "run"), ("run", "walk")])
-def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_run_or_falls_into_a_walk(
+def test_push_at_the_transition_switches_between_walk_and_run(
     map_file: Path, tmp_path: Path, first: str, second: str
 ) -> None:
     config = run_config(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
@@ -111,7 +111,7 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 
-def test_a_lap_of_a_circle_has_no_meaning_on_a_lifted_map(
+def test_lap_option_with_lifted_map_is_refused(
     map_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "--map", str(map_file), "--lap", "3", "--out", str(tmp_path / "run")]) == 2
@@ -119,7 +119,7 @@ def test_a_lap_of_a_circle_has_no_meaning_on_a_lifted_map(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "one.npz")
     assert main(["lift", "walk", "--out", out]) == 0
     capsys.readouterr()
@@ -140,7 +140,7 @@ def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys
         (["run", "--curve", "walk"], "--curve has no meaning with --mode follow; it belongs to --map FILE.npz"),
     ],
 )
-def test_what_cannot_be_lifted_is_one_line_and_exit_code_2(
+def test_invalid_lift_command_is_refused_in_one_line(
     arguments: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import re

@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_the_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
+def test_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
     with Recording(folder / "run.h5") as recording:
         t, tool = recording.channel("frames", "t")[:], recording.channel("frames", "tool")[:]
         curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.array("curve")
@@ -44,7 +44,7 @@ def test_the_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) 
 
 
 @pytest.mark.slow
-def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> None:
+def test_arm_tracks_the_map_with_torque_margin(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text())["arm"]
     assert summary["tool_rms_mm"] < 0.2
     assert summary["tool_max_mm"] < 0.5
@@ -56,7 +56,7 @@ def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> N
 
 
 @pytest.mark.slow
-def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_arm_run_is_reproduced_exactly(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = load_config(folder / "config.json")
     assert replace(config, user=run_config().user) == resolved(run_config(map="robot-arm", seconds=8.0))
     assert config.user.does == "push"
@@ -85,7 +85,7 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.slow
-def test_a_weak_motor_gives_way_at_its_limit_and_says_so() -> None:
+def test_weak_motor_saturates_and_is_reported() -> None:
     """The tracking above is the motors' doing: with a tenth of the shoulder's torque the arm hangs behind."""
     session = wire(run_config(map="robot-arm", seconds=1.5))
     servo = session.servo
@@ -97,7 +97,7 @@ def test_a_weak_motor_gives_way_at_its_limit_and_says_so() -> None:
     assert np.abs(servo.figure.qpos - servo.reference.pose).max() > 0.1
 
 
-def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for flags in (["--seconds", "0"], ["--figure-ticks", "0"], ["--radius", "0.5"], ["--lap", "nan"]):
         assert main(["arm", *flags, "--out", str(tmp_path / "run")]) == 2
         assert "Traceback" not in capsys.readouterr().err
@@ -121,7 +121,7 @@ def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pyte
         ("--scale 4", "expected --scale 2.2 or less, or a smaller curve"),
     ],
 )
-def test_what_has_no_meaning_for_an_arm_is_refused(
+def test_options_inapplicable_to_an_arm_are_refused(
     words: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
@@ -138,7 +138,7 @@ def test_what_has_no_meaning_for_an_arm_is_refused(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["bunny", "rivers", "stretch"])
-def test_every_field_leads_the_arm(mode: str) -> None:
+def test_tool_follows_the_stylus_in_every_mode(mode: str) -> None:
     """By MuJoCo's own kinematics, the tool is where the stylus is, scaled; it lags by the filter between the two."""
     session = wire(run_config(mode, "robot-arm", seconds=4.0, figure_ticks=4))
     apart: list[np.ndarray] = []
@@ -155,7 +155,7 @@ def test_every_field_leads_the_arm(mode: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
+def test_robot_arm_map_in_a_python_simulation(tmp_path: Path) -> None:
     """One's own law beside FOLLOW, with the tool at a smaller scale: recorded, stepped and drawn as any run."""
     curve = hvf.circle(radius=0.04, lap=4.0)
 
@@ -182,7 +182,7 @@ def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
     assert "robot arm" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
 
 
-def test_an_arm_beside_a_figure_s_numbers_is_refused_in_python() -> None:
+def test_figure_numbers_with_a_robot_arm_map_are_refused_in_python() -> None:
     curve = hvf.circle(radius=0.04, lap=4.0)
     river = hvf.Follow(curve, k_r=300, b_d=8)
     for figure, said in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):

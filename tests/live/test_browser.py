@@ -56,7 +56,7 @@ def arrow_of(stage: LiveStage) -> float:
     return float(np.linalg.norm(shaft)) if stage._arrows["user"].visible else 0.0
 
 
-def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, served: Served) -> None:
+def test_dragged_hand_moves_the_figure_and_lengthens_the_force_arrow(tab: Any, served: Served) -> None:
     desk, stage = served.desk, served.page.stage
     assert stage is not None
     desk.pause(True)
@@ -75,7 +75,7 @@ def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, se
     served.assert_until(lambda: not desk.holds, "it is let go")
 
 
-def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
+def test_curve_is_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
     desk = served.desk
     served.assert_until(lambda: desk.now["distance"][0] < 0.001, "the stylus is on the curve")
     desk.pause(True)
@@ -98,7 +98,7 @@ def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -
     served.assert_until(lambda: desk.now["bends"][0] == 0.0, "and undone")
 
 
-def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
+def test_keys_move_and_release_the_hand(tab: Any, served: Served) -> None:
     desk = served.desk
     desk.pause(True)
     place = served.settled()["p"].copy()
@@ -112,7 +112,7 @@ def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
     served.assert_until(lambda: not desk.holds, "it is let go")
 
 
-def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served) -> None:
+def test_spacemouse_moves_the_hand_while_pushed(tab: Any, served: Served) -> None:
     desk, cap = served.desk, Cap()
     served.page._cap = CapHand(SpaceMouse(cap, "SpaceNavigator", "test"))
     cap.push(0, 0, -200)  # the cap is lifted
@@ -125,7 +125,7 @@ def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served
     tab.get_by_text("The SpaceMouse is gone.").wait_for()
 
 
-def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served) -> None:
+def test_gain_moved_beyond_stability_turns_its_verdict_red(tab: Any, served: Served) -> None:
     tab.get_by_role("tab", name="Gains").click()
     tab.locator(".verdict-certified").first.wait_for()
     kept(tab, "green")
@@ -156,7 +156,7 @@ def downloaded(tab: Any, button: str, path: Path) -> Path:
     return path
 
 
-def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, served: Served, tmp_path: Path) -> None:
+def test_takes_are_recorded_downloaded_compared_and_mixed(tab: Any, served: Served, tmp_path: Path) -> None:
     tab.get_by_role("tab", name="Takes").click()
     record(tab, served, "take 1")
     served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.03]), False)
@@ -188,7 +188,7 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     served.assert_until(lambda: not served.page._takes.compares, "the default animation is back")
 
 
-def test_a_mode_is_switched(tab: Any, served: Served) -> None:
+def test_mode_is_switched(tab: Any, served: Served) -> None:
     tab.get_by_role("tab", name="Play").click()
     choose(tab, "Mode", "follow")
     tab.get_by_role("button", name="Run this").click()
@@ -204,14 +204,14 @@ def upload(tab: Any, file: Any) -> None:
     chooser.value.set_files(file)
 
 
-def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
+def test_upload_of_invalid_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
     upload(tab, {"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"})
     tab.get_by_text("broken.bvh:3: found 'oh'", exact=False).last.wait_for()
     served.assert_until(lambda: served.desk.preparing is None, "the next one can come")
     kept(tab, "refused")
 
 
-def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: Served, tmp_path: Path) -> None:
+def test_upload_beyond_the_size_limit_is_answered_in_the_page(tab: Any, served: Served, tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
     large.write_bytes(b"HIERARCHY\n" + b" " * (MOST_BYTES + 500_000))
     upload(tab, large)
@@ -220,7 +220,7 @@ def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: S
 
 
 @pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
-def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
+def test_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
     served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
@@ -236,7 +236,7 @@ def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> 
     kept(tab, "own-motion")
 
 
-def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab: Any, served: Served) -> None:
+def test_closed_tab_leaves_the_run_and_a_phone_takes_over(chromium: Any, tab: Any, served: Served) -> None:
     served.desk.hold(served.desk.now["p"], False)
     tab.close()
     served.assert_until(lambda: served.page.driver.client is None, "the driver has left")
@@ -251,7 +251,7 @@ def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab
     phone.close()
 
 
-def test_a_wrong_token_is_refused_and_the_right_one_opens_the_page(chromium: Any, served: Served) -> None:
+def test_only_the_right_token_opens_the_page(chromium: Any, served: Served) -> None:
     gate = Gate("127.0.0.1", 0, served.page.port, TOKEN)
     context = chromium.new_context()
     try:

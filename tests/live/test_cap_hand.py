@@ -19,12 +19,12 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> tuple[CapHand, Cap, Clock]:
     return CapHand(SpaceMouse(cap, "SpaceNavigator", "test", lambda: clock.now)), cap, clock
 
 
-def test_a_cap_at_rest_holds_nothing(hand: tuple[CapHand, Cap, Clock]) -> None:
+def test_cap_at_rest_holds_nothing(hand: tuple[CapHand, Cap, Clock]) -> None:
     held, _, _ = hand
     assert held.wish(STYLUS) is None
 
 
-def test_a_push_takes_the_hand_along_and_a_rest_lets_go(hand: tuple[CapHand, Cap, Clock]) -> None:
+def test_pushed_cap_moves_the_hand_and_rest_releases_it(hand: tuple[CapHand, Cap, Clock]) -> None:
     held, cap, clock = hand
     held.wish(STYLUS)
     cap.push(0, 0, -350)  # lifted all the way
@@ -43,7 +43,7 @@ def test_a_push_takes_the_hand_along_and_a_rest_lets_go(hand: tuple[CapHand, Cap
     assert held.wish(STYLUS) is None
 
 
-def test_the_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
+def test_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
     held, cap, clock = hand
     cap.queue.append(b"\x03\x01")
     clock.now += 0.02
@@ -52,6 +52,6 @@ def test_the_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> Non
     assert wish[1]
 
 
-def test_without_a_spacemouse_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_spacemouse_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cap_hand, "found_devices", lambda: [])
     assert cap_hand.cap_there() == (None, "")

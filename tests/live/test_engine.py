@@ -30,7 +30,7 @@ def run(it: Engine, seconds: float) -> None:
         it.advance()
 
 
-def test_a_hand_that_drags_is_followed_with_a_lag_that_shows_the_force():
+def test_drag_force_is_stiffness_times_lag():
     it = engine()
     run(it, 0.8)
     relaxed = it.session.servo.reference.pose.copy()
@@ -47,7 +47,7 @@ def test_a_hand_that_drags_is_followed_with_a_lag_that_shows_the_force():
     assert np.all(it.logs[0].user[-1] == 0.0)
 
 
-def test_a_hand_that_holds_on_long_is_not_taken_for_a_broken_encoder():
+def test_long_hold_is_not_an_encoder_fault():
     it = engine()
     run(it, 0.4)
     it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]))
@@ -56,7 +56,7 @@ def test_a_hand_that_holds_on_long_is_not_taken_for_a_broken_encoder():
     assert np.linalg.norm(it.logs[0].force[-1]) > 0.5
 
 
-def test_a_hand_is_no_stronger_than_a_person():
+def test_drag_force_is_bounded():
     it = engine()
     it.drag = Drag(np.array([0.0, 0.0, 0.12]))  # 36 N of the arm's spring away
     strongest = 0.0
@@ -67,7 +67,7 @@ def test_a_hand_is_no_stronger_than_a_person():
     assert STRONGEST / 2.0 < strongest < 1.5 * STRONGEST
 
 
-def test_grab_and_bend_undo_and_redo():
+def test_bend_undo_and_redo_restore_the_curve():
     it = engine("stretch")
     run(it, 0.4)
     before = it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41))
@@ -85,7 +85,7 @@ def test_grab_and_bend_undo_and_redo():
     np.testing.assert_array_equal(it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41)), bent)
 
 
-def test_a_bent_curve_is_performed_when_it_is_asked_for_and_not_before():
+def test_bent_curve_is_performed_only_on_request():
     it = engine("stretch-then-follow")
     run(it, 0.8)
     start = it.stylus.copy()
@@ -103,7 +103,7 @@ def test_a_bent_curve_is_performed_when_it_is_asked_for_and_not_before():
 
 
 @pytest.mark.parametrize("mode", ["follow", "bunny", "stretch", "stretch-then-follow", "lead"])
-def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
+def test_changed_gains_equal_those_of_a_fresh_run(mode):
     it = engine(mode)
     for gain, value in gains_of(it.config).items():
         # What paces a curve that can be bent: of the test below.
@@ -118,7 +118,7 @@ def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
 
 
 @pytest.mark.parametrize(("gain", "value"), [("damping", 20.0), ("stiffness", 600.0)])
-def test_a_curve_that_can_be_bent_keeps_its_pace_while_a_gain_that_paced_it_moves(gain, value):
+def test_bendable_curve_keeps_its_timing_if_a_gain_changes(gain, value):
     it, same = engine("stretch-then-follow"), engine("stretch-then-follow")
     other = engine("stretch-then-follow", **{gain: value})
     record = it.tubes.record_at(TRACE_SIZE)
@@ -134,13 +134,13 @@ def test_a_curve_that_can_be_bent_keeps_its_pace_while_a_gain_that_paced_it_move
     assert np.any(it.stylus != same.stylus)
 
 
-def test_other_parts_are_no_gains():
+def test_gains_of_another_mode_are_refused():
     it = engine()
     with pytest.raises(ParameterError, match="same mode and map"):
         it.set_gains(run_config(mode="bunny", figure="kinematic"))
 
 
-def test_what_happens_from_a_kept_state_on_happens_again_bit_for_bit():
+def test_run_from_a_stored_state_is_repeated_exactly():
     it = Engine(wire(run_config(mode="stretch", seconds=3600.0)))
     run(it, 2.4)
     assert it.back_to(1.9) <= 1.9
@@ -157,7 +157,7 @@ def test_what_happens_from_a_kept_state_on_happens_again_bit_for_bit():
     assert it.time == 0.0
 
 
-def test_looking_at_the_field_changes_nothing():
+def test_field_slice_does_not_change_the_state():
     it, same = engine("stretch"), engine("stretch")
     for _ in range(40):
         it.advance()
@@ -175,7 +175,7 @@ def test_looking_at_the_field_changes_nothing():
     assert np.all(np.sum((nearest - points) * forces, axis=1)[off] > 0.0)
 
 
-def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
+def test_take_is_a_recording_whose_animation_loads(tmp_path):
     it = engine("stretch")
     run(it, 0.4)
     take = Take(tmp_path / "take", it)
@@ -209,7 +209,7 @@ def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
         ("lead", False, False, 0),
     ],
 )
-def test_a_drag_that_neither_bends_nor_leads_is_told_as_one_push(tmp_path, mode, pressed, performs, pushes):
+def test_drag_without_bend_or_lead_is_reported_as_one_push(tmp_path, mode, pressed, performs, pushes):
     it = engine(mode)
     run(it, 0.8)
     it.perform(performs)
@@ -232,7 +232,7 @@ def test_a_drag_that_neither_bends_nor_leads_is_told_as_one_push(tmp_path, mode,
         assert "The hand did not push." not in lines
 
 
-def test_a_slip_of_the_mouse_is_no_take(tmp_path):
+def test_too_short_take_is_refused(tmp_path):
     it = engine()
     take = Take(tmp_path / "take", it)
     take.add(it.advance(), it)
@@ -240,7 +240,7 @@ def test_a_slip_of_the_mouse_is_no_take(tmp_path):
         take.end(it)
 
 
-def test_a_take_while_time_stood_still_leaves_no_folder(tmp_path):
+def test_take_during_pause_leaves_no_folder(tmp_path):
     it = engine()
     take = Take(tmp_path / "take", it)
     with pytest.raises(SimError, match="time stood still"):
@@ -248,7 +248,7 @@ def test_a_take_while_time_stood_still_leaves_no_folder(tmp_path):
     assert not (tmp_path / "take").exists()
 
 
-def test_sliders_hold_what_gains_are():
+def test_slider_ranges_contain_the_gains():
     for mode in ("follow", "bunny", "stretch", "stretch-then-follow", "lead"):
         config = run_config(mode=mode)
         for gain, value in gains_of(config).items():

@@ -19,7 +19,7 @@ from experiments.setups.certified_law import governor_drag
         {"governor": True}, {"governor": True, "governor_drag": 30.0},
     ],
 )  # fmt: skip
-def test_it_is_what_the_certificate_says(words):
+def test_gain_verdict_equals_the_certificate(words):
     config = run_config(**words)
     (river,) = certified_rivers(config).values()
     whole = governed_stability(river, governor_drag(config), HandRange().hands())
@@ -29,7 +29,7 @@ def test_it_is_what_the_certificate_says(words):
         assert found.margin == pytest.approx(whole.margin, rel=1e-6)
 
 
-def test_what_is_unstable_is_red_at_once_and_says_why():
+def test_unstable_gain_is_red_with_a_reason():
     (found,) = next(GainVerdicts().of(run_config(stiffness=11000.0)))
     assert found.verdict == "refuted"
     assert "k = 11000 N/m" in found.reason
@@ -39,7 +39,7 @@ def test_what_is_unstable_is_red_at_once_and_says_why():
 
 
 @pytest.mark.slow
-def test_what_there_is_no_certificate_for_is_unknown_and_says_why():
+def test_uncertified_configuration_is_unknown_with_a_reason():
     for words, said in (
         ({"mode": "lead"}, "led"),
         ({"mode": "rivers", "map": "rivers", "governor": True}, "--governor"),

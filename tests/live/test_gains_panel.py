@@ -58,7 +58,7 @@ def typed(slider: Any, value: float) -> None:
     slider.moved(None)
 
 
-def test_a_number_beyond_a_slider_is_refused_with_its_bounds_and_the_gain_shown_again(
+def test_number_beyond_slider_is_refused_and_the_gain_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     panel, desk, slider = made()
@@ -73,7 +73,7 @@ def test_a_number_beyond_a_slider_is_refused_with_its_bounds_and_the_gain_shown_
     assert slider.value == 400.0
 
 
-def test_a_slider_that_moved_before_its_handler_ran_stays_and_one_whose_gain_was_undone_moves() -> None:
+def test_slider_keeps_pending_value_and_follows_undo() -> None:
     panel, desk, slider = made()
     slider.value = 500.0
     panel.write()
@@ -85,6 +85,6 @@ def test_a_slider_that_moved_before_its_handler_ran_stays_and_one_whose_gain_was
     assert slider.value == 300.0
 
 
-def test_a_slider_reaches_a_gain_of_the_command_line() -> None:
+def test_slider_range_includes_a_gain_from_the_command_line() -> None:
     _, desk, slider = made(stiffness=20000.0)
     assert slider.value == slider.max == desk.config.mode.stiffness == 20000.0

@@ -100,13 +100,13 @@ def flip(hand, k=900.0):
 
 
 @pytest.mark.parametrize("function", [rail, cut, swallowing, of_floats, numpy_rail, beside, hidden, relay, dry, damped])
-def test_a_law_that_shakes_in_a_run_is_not_certified(function):
+def test_law_that_oscillates_in_simulation_is_not_certified(function):
     assert "It oscillates" in str(simulation(hvf.law(function)).run(1.0))
     assert stability(function).verdict != "certified"
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_law_that_makes_plain_numbers_of_the_hand_is_not_followed_but_seen_to_shake(compiled):
+def test_law_that_converts_to_float_is_refuted_by_linearisation_or_unknown(compiled):
     found = stability(rail, compiled)
     assert found.verdict == "refuted"
     assert "mm off the curve at phase" in found.reason
@@ -118,7 +118,7 @@ def test_a_law_that_makes_plain_numbers_of_the_hand_is_not_followed_but_seen_to_
     assert "makes a plain number" in soft.reason
 
 
-def test_an_expression_that_differs_from_the_law_that_runs_is_no_certificate():
+def test_symbolic_law_that_differs_from_executed_law_is_rejected():
     with pytest.raises(ControllerError, match="another force in a run than on symbols, as for a hand at p = "):
         certified_cases(hvf.law(of_floats), CURVE)
     with pytest.raises(ControllerError, match="numbers that are not finite"):
@@ -136,7 +136,7 @@ def test_an_expression_that_differs_from_the_law_that_runs_is_no_certificate():
 # A jump is no slope.
 
 
-def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
+def test_small_force_step_is_unknown_not_refuted():
     found = stability(step)
     assert found.verdict == "unknown"
     assert "where it jumps" in found.reason
@@ -147,7 +147,7 @@ def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
 
 
 @pytest.mark.slow
-def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
+def test_states_with_saturated_force_are_excluded_from_linearisation():
     """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
     sim = simulation(plane)
@@ -164,7 +164,7 @@ def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
 
 
 @pytest.mark.slow
-def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
+def test_readme_floor_is_certified_in_both_cases_for_all_hands():
     found = hvf.certify(simulation(hvf.law(floor))).stability
     assert found.verdict == "certified"
     assert "the least of 2 cases" in found.reason
@@ -176,7 +176,7 @@ def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
 
 
 @pytest.mark.slow
-def test_a_floor_is_as_stable_as_its_hardest_case():
+def test_floor_verdict_is_that_of_its_stiffest_case():
     assert stability(floor).verdict == "certified"
     hard = hvf.certify(simulation(hvf.law(floor)(k=2e4)), NO_HANDS).stability
     assert hard.verdict == "refuted"
@@ -184,13 +184,13 @@ def test_a_floor_is_as_stable_as_its_hardest_case():
 
 
 @pytest.mark.slow
-def test_cases_that_are_stable_one_by_one_are_not_certified_if_switching_between_them_is_not():
+def test_stable_cases_with_uncertified_switching_are_unknown():
     found = hvf.certify(simulation(hvf.law(flip))).stability
     assert found.verdict == "unknown"
     assert "switching between them is not certified" in found.reason
 
 
-def test_the_slopes_of_a_law_bound_its_force_as_seen_from_the_curve():
+def test_case_slopes_bound_the_force_around_the_curve():
     kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, beside: 2, numpy_rail: 2}
     for function, count in kinds.items():
         cases = cases_of(hvf.law(function))
@@ -209,7 +209,7 @@ def test_the_slopes_of_a_law_bound_its_force_as_seen_from_the_curve():
 
 
 @pytest.mark.slow
-def test_vectors_are_arrays_as_in_a_run():
+def test_law_with_vector_arithmetic_is_certified():
     def spring(hand, k=50.0, b=1.0):
         return -k * hand.p - b * hand.v
 
@@ -223,13 +223,13 @@ def test_vectors_are_arrays_as_in_a_run():
         assert stability(function).verdict == "certified", function
 
 
-def test_a_distance_that_has_no_derivative_on_the_curve_is_unknown():
+def test_force_without_derivative_on_the_curve_is_unknown():
     found = stability(lambda hand: (0, 0, -300.0 * np.sqrt(hand.p[2] ** 2)))
     assert found.verdict == "unknown"
     assert "bends where nothing is compared" in found.reason
 
 
-def test_all_ways_through_a_function_are_followed_and_none_that_no_number_takes():
+def test_all_feasible_branches_become_cases_up_to_a_limit():
     assert len(cases_of(hvf.law(dry)).cases) == 3
     assert len(cases_of(hvf.law(floor)).cases) == 3
     with pytest.raises(ControllerError, match="more than 16 cases"):
@@ -254,7 +254,7 @@ def _boom(hand):
     raise ValueError("boom")
 
 
-def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
+def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
     """CasADi prints six digits of a number: by its text this law would be one smooth expression."""
 
     def notched(hand, k=1e6):
@@ -277,18 +277,18 @@ def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
         (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
     ],
 )
-def test_a_law_that_raises_or_gives_another_shape_is_an_error_that_names_it(function, says):
+def test_law_that_raises_or_returns_wrong_shape_is_named_in_the_error(function, says):
     with pytest.raises(ParameterError, match=says):
         stability(function)
 
 
-def test_the_reasons_hold_no_path_of_a_library():
+def test_reasons_contain_no_library_paths():
     for function in (rail, step):
         assert ".cpp" not in stability(function).reason
 
 
 @pytest.mark.parametrize("delay", [1, 1000])  # less and more than the hands at which a law is looked at
-def test_a_law_that_keeps_numbers_of_the_hand_is_unknown_each_time(delay: int) -> None:
+def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
     kept = [0.0] * delay
 
     @hvf.law
@@ -303,7 +303,7 @@ def test_a_law_that_keeps_numbers_of_the_hand_is_unknown_each_time(delay: int) -
         assert re.search(said, found.reason), found.reason
 
 
-def test_a_symbol_that_a_law_kept_is_told_as_its_state() -> None:
+def test_law_that_stores_a_symbol_is_reported_as_stateful() -> None:
     kept = [0.0]
 
     @hvf.law
@@ -337,14 +337,14 @@ floor_law = hvf.law(floor)
         (2 * FOLLOW.limited(4.0), hvf.Follow(CURVE, k_r=600.0, b_d=16.0).limited(8.0)),
     ],
 )
-def test_a_field_times_a_number_is_certified_as_the_field_of_these_gains(scaled, plain):
+def test_scaled_field_is_certified_as_field_with_scaled_gains(scaled, plain):
     for of_scaled, of_plain in zip(verdicts(scaled), verdicts(plain), strict=True):
         assert of_scaled.verdict == of_plain.verdict != "unknown"
         assert of_scaled.margin == pytest.approx(of_plain.margin, rel=1e-9)
         assert of_scaled.assumptions == of_plain.assumptions
 
 
-def test_a_field_that_leads_the_hand_away_is_refuted_in_the_executed_program():
+def test_negated_field_is_refuted_by_linearisation_of_executed_program():
     certificate = hvf.certify(dataclasses.replace(simulation(damped_law), field=-FOLLOW))
     assert certificate.stability.verdict == "refuted"
     assert certificate.passivity.verdict == "unknown"

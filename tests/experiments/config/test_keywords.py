@@ -38,11 +38,11 @@ SIM = hvf.Simulation(
         ("0.4 m --> 0.5 m", "0.4 m --> 0.5 m"),
     ],
 )
-def test_an_option_is_named_as_the_keyword_that_it_is(text: str, said: str) -> None:
+def test_option_in_message_becomes_keyword(text: str, said: str) -> None:
     assert keywords(text, out="record") == said
 
 
-def test_the_kind_of_an_error_and_where_it_was_raised_stay() -> None:
+def test_error_type_and_traceback_are_preserved() -> None:
     @in_keywords()
     def fails() -> None:
         raise ParameterError("--lap is 0; expected more")
@@ -52,7 +52,7 @@ def test_the_kind_of_an_error_and_where_it_was_raised_stay() -> None:
     assert raised.traceback[-1].name == "fails"
 
 
-def test_the_command_line_says_what_was_written_also_through_several_functions() -> None:
+def test_nested_conversion_to_options_restores_the_message() -> None:
     @in_keywords()
     def fails() -> None:
         raise ParameterError("--lap is 0 with --figure none")
@@ -130,7 +130,7 @@ def meant(**does: Any) -> Any:
         (lambda: hvf.tune(SIM, SPACE, len, seconds=None), "seconds is None; expected a number"),  # pyright: ignore
     ],
 )  # fmt: skip
-def test_each_name_of_the_public_face_is_told_what_is_wrong_in_keywords(
+def test_messages_of_public_interface_name_keywords(
     make: Callable[[], Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -143,14 +143,14 @@ def test_each_name_of_the_public_face_is_told_what_is_wrong_in_keywords(
 
 
 @pytest.mark.parametrize("wrong", ["x", True, None])
-def test_a_search_says_at_which_values_a_cost_is_no_number(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_non_numeric_cost_is_refused_with_its_values(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
     said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
     with pytest.raises(hvf.ParameterError, match=said):
         hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 
 
-def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(
+def test_messages_use_keywords_in_python_and_options_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
@@ -177,13 +177,13 @@ def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(
         hvf.Cylindrical([], around=CURVE)
 
 
-def test_remarks_of_a_run_are_in_keywords() -> None:
+def test_run_remarks_name_keywords() -> None:
     turns = hvf.run(user="turn", figure="none", seconds=0.1)
     assert any(remark.endswith("this map does not look at that; expressive does") for remark in turns.remarks)
     assert "--" not in str(turns)
 
 
-def test_what_a_prepared_capture_is_not_is_warned_of_in_keywords(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_warning_of_infeasible_capture_names_keywords(monkeypatch: pytest.MonkeyPatch) -> None:
     class Found:
         feasible, remarks, clip = False, ("not feasible; --raw takes the capture as it is",), SIM
 

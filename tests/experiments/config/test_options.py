@@ -3,12 +3,13 @@
 import json
 from dataclasses import fields, is_dataclass, replace
 from math import inf, nan
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.cli import main
+from experiments.cli import main, parsed
 from experiments.config.keywords import in_options
 from experiments.config.maps import MAPS, Circle, Composite, Cylindrical, Led, MapFile, RiverClips, RobotArm
 from experiments.config.modes import (
@@ -86,7 +87,7 @@ class Outer:
     inner: Inner = Inner()
 
 
-def test_no_number_of_a_configuration_is_without_an_interval() -> None:
+def test_every_number_of_a_configuration_has_bounds() -> None:
     assert len(NUMBERS) > 50
     for cls, name in NUMBERS:
         limits = _limits(cls, name)
@@ -94,7 +95,7 @@ def test_no_number_of_a_configuration_is_without_an_interval() -> None:
         assert "lt" in limits or "allow_inf_nan" in limits, (cls, name)
 
 
-def test_all_that_a_run_is_made_of_is_looked_at() -> None:
+def test_parts_list_covers_the_whole_run_configuration() -> None:
     """What is in a configuration, however deep, is one of the parts above."""
     found, waiting = set[type](), [RunConfig]
     while waiting:
@@ -111,7 +112,7 @@ def test_all_that_a_run_is_made_of_is_looked_at() -> None:
 
 
 @pytest.mark.parametrize(("cls", "name"), NUMBERS, ids=lambda value: getattr(value, "__name__", value))
-def test_a_number_outside_its_interval_is_refused_by_its_name(cls: type, name: str) -> None:
+def test_number_outside_its_interval_is_refused_by_name(cls: type, name: str) -> None:
     limits, flag = _limits(cls, name), "--" + name.replace("_", "-")
     is_whole = float not in _kinds(_numbers(cls)[name])
     wrong: list[float] = [-1] if is_whole else [-1.0, -inf, nan]
@@ -126,7 +127,7 @@ def test_a_number_outside_its_interval_is_refused_by_its_name(cls: type, name: s
         assert getattr(of(cls, **{name: limits["ge"]}), name) == limits["ge"]
 
 
-def test_the_message_says_what_would_be_right() -> None:
+def test_message_says_what_is_expected() -> None:
     for options, said in (
         (lambda: Outer(wide_gap=0.4), "wide_gap is 0.4; expected 0.5 s or more, and finite"),
         (lambda: Outer(wide_gap=nan), "wide_gap is nan; expected 0.5 s or more, and finite"),
@@ -145,7 +146,7 @@ def test_the_message_says_what_would_be_right() -> None:
     assert Outer(wide_gap=0.5, reach=inf).wide_gap == 0.5
 
 
-def test_parts_do_not_change() -> None:
+def test_parts_are_immutable() -> None:
     with pytest.raises(AttributeError):
         Follow().stiffness = 3.0  # pyright: ignore[reportAttributeAccessIssue]
     with pytest.raises(ParameterError, match=r"^stiffness is -1"):
@@ -153,7 +154,7 @@ def test_parts_do_not_change() -> None:
 
 
 @pytest.mark.parametrize("seed", [2**63, 2**64, 10**30])
-def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
+def test_seed_beyond_int64_is_refused(seed: int) -> None:
     assert run_config(seed=2**63 - 1).seed == 2**63 - 1
     text = to_json(run_config()).replace('"seed": 1', f'"seed": {seed}')
     for make in (lambda: run_config(seed=seed), lambda: from_json(RunConfig, text, "c")):
@@ -188,13 +189,13 @@ def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_a_word_that_means_nothing_is_refused_and_told_where_it_belongs(words: dict[str, Any], said: str) -> None:
+def test_unknown_or_inapplicable_word_is_refused_with_its_place(words: dict[str, Any], said: str) -> None:
     with pytest.raises(ParameterError) as error:
         run_config(**words)
     assert said in str(error.value)
 
 
-def test_a_led_figure_and_its_map_belong_together() -> None:
+def test_lead_mode_and_led_map_require_each_other() -> None:
     for make in (lambda: RunConfig(mode=Lead()), lambda: RunConfig(map=Led())):
         with pytest.raises(ParameterError, match="expected both, or neither"):
             make()
@@ -234,7 +235,7 @@ def _every_config() -> list[RunConfig]:
 
 
 @pytest.mark.parametrize("config", _every_config(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
-def test_words_and_json_say_all_that_a_configuration_does(config: RunConfig) -> None:
+def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> None:
     assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_json(RunConfig, to_json(config), "config.json") == config
     assert from_dict(RunConfig, to_dict(config), "a recording") == config
@@ -242,7 +243,7 @@ def test_words_and_json_say_all_that_a_configuration_does(config: RunConfig) -> 
     assert changed(config, {}) == config
 
 
-def test_every_mode_and_map_is_among_those() -> None:
+def test_round_trip_cases_cover_every_mode_and_map() -> None:
     made = _every_config()
     assert {type(config.mode) for config in made} == set(MODES)
     assert {type(config.map) for config in made} == {*MAPS, Led}
@@ -265,7 +266,7 @@ def test_every_mode_and_map_is_among_those() -> None:
         ("{", "", "is not JSON"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_named_with_the_file(old: str, new: str, said: str, tmp_path) -> None:
+def test_error_in_configuration_file_names_file_and_key(old: str, new: str, said: str, tmp_path) -> None:
     path, text = tmp_path / "my.json", to_json(run_config())
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -275,7 +276,7 @@ def test_what_is_wrong_in_a_file_is_named_with_the_file(old: str, new: str, said
     assert said in str(error.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path) -> None:
+def test_missing_configuration_file_is_named(tmp_path) -> None:
     with pytest.raises(SimError, match=r"none\.json: cannot be read \(No such file or directory\)"):
         load_config(tmp_path / "none.json")
 
@@ -284,7 +285,7 @@ def _options(**given: object) -> RunConfig:
     return config_of_options(RunOptions(**given))
 
 
-def test_options_of_the_command_line_are_the_words_and_nothing_that_is_given_is_dropped() -> None:
+def test_run_options_equal_words_and_keep_given_zeros() -> None:
     assert set(VOCABULARY) <= {option.name for option in fields(RunOptions)}
     assert _options() == run_config() == RunConfig()
     given: dict[str, Any] = {
@@ -300,7 +301,7 @@ def test_options_of_the_command_line_are_the_words_and_nothing_that_is_given_is_
     assert (config.seed, config.figure.blend) == (0, 0.0)
 
 
-def test_options_change_a_file_s_configuration(tmp_path) -> None:
+def test_options_override_a_configuration_file(tmp_path) -> None:
     path = tmp_path / "config.json"
     config = run_config(
         "follow", "composite", "push", stiffness=200.0, lap=2.0, walls=True, wall_margin=0.05, seed=5, cutoff=90.0,
@@ -323,7 +324,7 @@ def test_options_change_a_file_s_configuration(tmp_path) -> None:
         _options(config=path, tube=0.1)
 
 
-def test_the_command_refuses_a_file_with_a_typo_in_a_line(tmp_path, capsys) -> None:
+def test_run_refuses_a_file_with_a_misspelt_key_in_one_line(tmp_path, capsys) -> None:
     path = tmp_path / "typo.json"
     path.write_text(to_json(run_config()).replace("stiffness", "stifness"), encoding="utf-8")
     assert main(["run", "--config", str(path), "--out", str(tmp_path / "run")]) == 2
@@ -333,7 +334,7 @@ def test_the_command_refuses_a_file_with_a_typo_in_a_line(tmp_path, capsys) -> N
 
 
 @pytest.mark.parametrize(("mode", "map", "does"), [("follow", "cylindrical", "lead"), ("lead", "led", "relaxed")])
-def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> None:
+def test_leading_hand_outside_lead_mode_is_refused(mode: str, map: str, does: str) -> None:
     text = f'{{"mode": {{"kind": "{mode}"}}, "map": {{"kind": "{map}"}}, "user": {{"does": "{does}"}}}}'
     with pytest.raises(ParameterError, match="a hand leads in the mode lead only"):
         from_json(RunConfig, text, "f.json")
@@ -348,15 +349,25 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
         ("trace", {"grabs": GRABS}, 'a hand that traces cannot grab; choose user="relaxed", push or turn'),
     ],
 )
-def test_actions_that_a_hand_would_not_do_are_refused(does: str, actions: dict[str, Any], says: str) -> None:
+def test_contradictory_hand_actions_are_refused(does: str, actions: dict[str, Any], says: str) -> None:
     with pytest.raises(ParameterError, match=says):
         User(does=does, **actions)  # pyright: ignore[reportArgumentType]
 
 
-def test_a_figure_that_is_not_there_is_not_led_in_a_run_and_its_walker_is_on_a_device() -> None:
+def test_lead_without_figure_is_refused_in_a_run_and_allowed_on_a_device() -> None:
     with pytest.raises(ParameterError, match=r"^the mode lead with the figure none: nobody to lead"):
         run_config(mode="lead", figure="none")
     led = run_config(mode="lead")
     with pytest.raises(ParameterError, match="nobody to lead"):
         wire(replace(led, figure=replace(led.figure, kind="none")))
     assert session_of(served(led)).servo.argument.shape == (7,)
+
+
+@pytest.mark.parametrize("mode", [cls().kind for cls in MODES])
+def test_configuration_of_every_mode_round_trips_through_its_file(mode: str, tmp_path: Path) -> None:
+    from experiments.config.part import to_json
+
+    config = config_of_options(parsed(["run", "--mode", mode, "--seconds", "3"]).options)
+    file = tmp_path / "config.json"
+    file.write_text(to_json(config))
+    assert config_of_options(parsed(["run", "--config", str(file)]).options) == config == load_config(file)

@@ -49,7 +49,7 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     )
 
 
-def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
+def test_missing_units_are_compiled_in_parallel_and_reported_once(toys, capsys):
     assert missing_units((*toys, *toys)) == (toys[1], toys[0])
     compile_once(Console(), toys)
     told = capsys.readouterr().out
@@ -60,7 +60,7 @@ def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
     assert not capsys.readouterr().out
 
 
-def test_only_what_is_missing_is_compiled(toys):
+def test_only_missing_units_are_compiled(toys):
     done: list[Unit] = []
     toys[0].load()
     compile_units(toys, done.append)
@@ -68,7 +68,7 @@ def test_only_what_is_missing_is_compiled(toys):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_compiled_is_left_to_the_run(toys):
+def test_unit_that_fails_to_compile_stays_missing(toys):
     done: list[Unit] = []
     wrong = Unit(toys[0].module, "other", (types.float64, types.float64))
     compile_units((wrong, toys[1]), done.append)
@@ -76,7 +76,7 @@ def test_what_cannot_be_compiled_is_left_to_the_run(toys):
     assert missing_units((wrong, toys[1])) == (wrong,)
 
 
-def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
+def test_no_process_starts_if_no_unit_is_missing(toys, monkeypatch):
     for unit in toys:
         unit.load()
     monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
@@ -84,13 +84,13 @@ def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
     assert missing_units(toys) == ()
 
 
-def test_a_unit_is_a_function_of_a_module():
+def test_unknown_unit_function_is_refused():
     with pytest.raises(SimError, match="no_such"):
         unit_function("sim.world.plant", "no_such")
     assert "toy_kernels" not in sys.modules or hasattr(sys.modules["toy_kernels"], "force")
 
 
-def test_a_robot_arm_says_what_it_needs_before_it_is_made():
+def test_robot_arm_run_announces_its_units_before_wiring():
     with pytest.raises(_Told) as told:
         wire(run_config(map="robot-arm"), ready=_stop)
     assert _names(told.value.args[0]) == [
@@ -112,7 +112,7 @@ def test_a_robot_arm_says_what_it_needs_before_it_is_made():
     ],
     ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
 )
-def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: list[str]):
+def test_run_announces_its_units_before_wiring(config: RunConfig, more: list[str]):
     with pytest.raises(_Told) as told:
         wire(config, ready=_stop)
     names = _names(told.value.args[0])
@@ -121,7 +121,7 @@ def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: lis
     assert set(more) <= set(names)
 
 
-def test_runs_of_the_figure_share_the_loop_and_all_that_drives_it():
+def test_modes_share_the_units_of_loop_and_figure():
     parts: list[tuple[Unit, ...]] = []
     for config in (run_config(), run_config(mode="bunny"), run_config(mode="lead")):
         with pytest.raises(_Told) as told:

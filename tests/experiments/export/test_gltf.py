@@ -54,7 +54,7 @@ def rows(document: dict, binary: bytes, accessor: int) -> Array:
     return values.reshape(item["count"], width).astype(float) / largest
 
 
-def test_its_nodes_turned_by_its_animation_put_every_joint_where_the_figure_has_it(tmp_path: Path) -> None:
+def test_animated_nodes_reproduce_joint_positions(tmp_path: Path) -> None:
     clip, file = embedded("backflip"), tmp_path / "flip.glb"
     write_bvh(clip, tmp_path / "flip.bvh")
     assert main(["convert", str(tmp_path / "flip.bvh"), str(file)]) == 0
@@ -88,7 +88,7 @@ def test_its_nodes_turned_by_its_animation_put_every_joint_where_the_figure_has_
             np.testing.assert_allclose(place[[2, 0, 1]], places[frame, node], atol=2e-6)
 
 
-def test_its_skin_is_the_figure_at_rest_and_every_vertex_goes_with_one_joint(tmp_path: Path) -> None:
+def test_skin_is_the_figure_at_rest_with_one_joint_per_vertex(tmp_path: Path) -> None:
     from experiments.export.gltf import write_gltf
 
     write_gltf(embedded("walk"), tmp_path / "walk.glb")
@@ -111,7 +111,7 @@ def test_its_skin_is_the_figure_at_rest_and_every_vertex_goes_with_one_joint(tmp
     assert high[0] == pytest.approx(-low[0], abs=1e-3)  # left and right
 
 
-def test_a_file_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_file_is_not_replaced_without_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_bvh(embedded("walk"), tmp_path / "walk.bvh")
     (tmp_path / "walk.glb").write_bytes(b"mine")
     assert main(["convert", str(tmp_path / "walk.bvh"), str(tmp_path / "walk.glb")]) == 2
@@ -120,7 +120,7 @@ def test_a_file_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.slow
-def test_blender_has_the_joints_where_they_are_here_and_its_own_bvh_comes_back_the_same(tmp_path: Path) -> None:
+def test_blender_reproduces_joint_positions_and_its_bvh_round_trips(tmp_path: Path) -> None:
     if subprocess.run([BLENDER, "-c", "import bpy"], capture_output=True, check=False).returncode:
         pytest.skip("no Blender: BLENDER_PYTHON names no Python that can import bpy (pip install 'bpy==4.5.*')")
     from experiments.export.gltf import write_gltf

@@ -18,7 +18,7 @@ FIELDS = [
 
 
 @pytest.mark.parametrize("field", FIELDS, ids=lambda field: type(field).__name__)
-def test_a_field_comes_back_from_its_file_to_the_last_bit(field, tmp_path):
+def test_field_round_trips_exactly_through_its_file(field, tmp_path):
     path = tmp_path / "field.npz"
     save_field(field, path)
     again = load_field(path)
@@ -28,7 +28,7 @@ def test_a_field_comes_back_from_its_file_to_the_last_bit(field, tmp_path):
     np.testing.assert_array_equal(again.program().params, field.program().params)
 
 
-def test_a_file_that_is_no_field_is_refused_by_name(tmp_path):
+def test_non_field_file_is_refused_by_name(tmp_path):
     text = tmp_path / "text.npz"
     text.write_text("no archive")
     other, cut, odd = (tmp_path / name for name in ("other.npz", "cut.npz", "odd.npz"))

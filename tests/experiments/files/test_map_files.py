@@ -1,7 +1,9 @@
 """Maps in files: they come back to the last bit, a file that is none is refused, and a run takes its map from one."""
 
 import json
+import random
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from models.world.scene import SceneConfig
 from sim.errors import SimError
 from sim.recording.recorder import Group, Recorder
 from sim.world.world import World
+from tests.experiments.refused_command import refused
 
 R, Z = (0.03, 0.06), (-0.02, 0.02)
 
@@ -64,7 +67,7 @@ def upper_body():
 
 
 @pytest.mark.parametrize("made", [swaying, apart, lifted, upper_body])
-def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
+def test_map_round_trips_exactly_through_its_file(made, tmp_path):
     haptic_map, path = made(), tmp_path / "map.npz"
     save_map(haptic_map, path)
     again = load_map(path)
@@ -76,7 +79,7 @@ def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
         np.testing.assert_array_equal(again.pose(stylus), haptic_map.pose(stylus))
 
 
-def test_a_damaged_file_is_refused_by_name(tmp_path):
+def test_damaged_map_file_is_refused_by_name(tmp_path):
     whole, damaged = tmp_path / "whole.npz", tmp_path / "damaged.npz"
     save_map(lifted(), whole)
     data, rng = whole.read_bytes(), np.random.default_rng(1)
@@ -98,7 +101,7 @@ def test_a_damaged_file_is_refused_by_name(tmp_path):
         np.testing.assert_array_equal(again.compiled().params, lifted().compiled().params)
 
 
-def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
+def test_file_of_another_content_is_refused(tmp_path):
     path = tmp_path / "other.npz"
     save_field(RiverBundle((River(Trajectory.circle(0.05, 4.0)),), ("one",)), path)
     with pytest.raises(SimError, match=r"other\.npz: holds a RiverBundle; expected a map: one of Cylindrical, Comp"):
@@ -116,7 +119,7 @@ def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("key", ["clip/walk/fps", "closed/a/b", "sites", "limb/1/axis", "margin", "angles/../jump"])
-def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
+def test_map_file_with_missing_or_wrong_array_is_refused(key, tmp_path):
     path, arrays = tmp_path / "map.npz", lifted().arrays()
     del arrays[key]
     write_archive(path, "Lifted", arrays)
@@ -132,7 +135,7 @@ def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
         load_map(path)
 
 
-def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
+def test_map_file_of_another_format_version_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "map.npz"
     monkeypatch.setattr("experiments.files.archives.VERSION", 2)
     write_archive(path, "Lifted", {})
@@ -141,7 +144,7 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
         load_archive(path, {"Lifted": Lifted.from_arrays}, "map")
 
 
-def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
+def test_run_takes_map_and_clips_from_a_file(tmp_path):
     path = tmp_path / "map.npz"
     save_map(lifted(), path)
     session = wire(run_config(map=str(path), seconds=1.0))
@@ -150,7 +153,7 @@ def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
     assert any("clips are those of the map: walk, a/b" in remark for remark in session.remarks)
 
 
-def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
+def test_map_with_another_pose_size_is_refused(tmp_path):
     path = tmp_path / "map.npz"
     small = [(np.ascontiguousarray(poses[:, :19]), fps) for poses, fps in clips()]
     save_map(Cylindrical([*small, small[0]], R, Z), path)
@@ -159,7 +162,7 @@ def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_path, capsys):
+def test_map_file_is_certified_along_all_curves_with_its_clips(tmp_path, capsys):
     path = tmp_path / "map.npz"
     save_map(lifted(), path)
     command = ["certify", "--map", str(path), "--no-hand", "--json", "--out", str(tmp_path)]
@@ -175,7 +178,7 @@ def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_pa
     assert main([*command, "--curve", "hop"]) == 2
 
 
-def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_path, capsys):
+def test_run_with_changed_map_file_is_not_reproduced(tmp_path, capsys):
     path, folder = tmp_path / "map.npz", tmp_path / "run"
     folder.mkdir()
     save_map(lifted(), path)
@@ -193,3 +196,17 @@ def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_
     path.unlink()
     assert main(["reproduce", str(folder)]) == 2
     assert "No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", ["noise", "pickled", "text"])
+def test_non_map_file_is_refused_without_mentioning_pickle(
+    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "map.npz"
+    if content == "pickled":
+        np.savez(path, version=np.array([1, None], dtype=object), kind="Lifted", keys=[])
+    else:
+        path.write_bytes(random.Random(1).randbytes(3000) if content == "noise" else b"hello")
+    said = refused(["run", "--map", str(path), "--out", str(tmp_path / "run")], capsys)
+    assert said.endswith("is no file of a map, or damaged; expected what hvf lift writes\n")
+    assert "pickle" not in said

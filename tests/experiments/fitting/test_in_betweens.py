@@ -72,12 +72,12 @@ def slide(places):
 
 
 @pytest.mark.parametrize("clips", ALIKE)
-def test_clips_that_move_alike_are_blended_legs_and_all(clips):
+def test_similar_clips_are_blended_including_legs(clips):
     assert map_of(clips).upper == ()
 
 
 @pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *ALIKE, *SLOWER))])
-def test_feet_of_in_betweens_do_not_slide_nor_sink(clips):
+def test_in_between_feet_neither_slide_nor_sink(clips):
     for r, z in MANY:
         places = soles(laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.02, (r, z)
@@ -87,7 +87,7 @@ def test_feet_of_in_betweens_do_not_slide_nor_sink(clips):
 @pytest.mark.parametrize(
     "clips", [("walk", "angry", "cheer"), *slower([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
 )
-def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
+def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
     h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
     places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
     for feet in places:
@@ -97,7 +97,7 @@ def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
 
 # The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
 @pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
-def test_the_floor_gives_in_betweens_what_they_ask_for(clips, most, usual):
+def test_floor_can_provide_the_forces_of_in_betweens(clips, most, usual):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
         poses = laps(map_of(clips), r, z, count=1.0 + 4 / ROWS)

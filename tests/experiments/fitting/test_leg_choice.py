@@ -37,9 +37,7 @@ def judged(monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Ve
     return asked
 
 
-def test_legs_are_the_first_that_carry_the_others_well(
-    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
     asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
     best, told = carried(maps.__getitem__, NAMES, LAP, False)
@@ -47,7 +45,7 @@ def test_legs_are_the_first_that_carry_the_others_well(
     assert asked == [(0, 1.0), (1, 1.0)]
 
 
-def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
+def test_legs_with_least_residual_are_chosen_if_none_bear_well(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
@@ -57,7 +55,7 @@ def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
     assert asked == [(owner, 1.0) for owner in range(4)]
 
 
-def test_arms_that_no_legs_bear_are_blended_in_by_less(
+def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
@@ -65,7 +63,7 @@ def test_arms_that_no_legs_bear_are_blended_in_by_less(
     assert (best.legs_of, best.share, told) == (2, 0.25, ())
 
 
-def test_legs_that_slide_are_taken_only_where_no_others_stand(
+def test_sliding_legs_are_chosen_only_as_a_last_resort(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
@@ -75,7 +73,9 @@ def test_legs_that_slide_are_taken_only_where_no_others_stand(
     assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
-def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unbearable_map_is_reported_with_the_best_legs(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
     judged(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
     best, told = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
@@ -87,7 +87,7 @@ def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], m
 
 
 @pytest.mark.parametrize(("parallel", "paces"), [(False, (1.0 / 1.178, 1.0 / 0.822)), (True, (1.0, 1.0))])
-def test_the_hand_that_tries_a_map_sees_all_of_it(
+def test_trial_hand_covers_the_whole_map(
     parallel: bool, paces: tuple[float, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places: list[np.ndarray] = []
@@ -109,7 +109,7 @@ def test_the_hand_that_tries_a_map_sees_all_of_it(
 
 
 @pytest.mark.slow
-def test_a_walk_carries_arms_that_throw_a_run_down(maps: list[Cylindrical]) -> None:
+def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
     assert sound(maps[1], LAP, False)
     walk, run = verdict_on(maps[1], LAP, False), verdict_on(maps[0], LAP, False)
     assert walk.bearable

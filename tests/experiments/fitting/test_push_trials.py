@@ -25,7 +25,7 @@ def lifted() -> Lifted:
     return lift_clips(("squat_dance", "cheer"), Room((0.04, 0.06), (-0.01, 0.01))).haptic_map
 
 
-def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
     shown = push_trials.toured(lifted, curve, True).poses
     monkeypatch.setattr(push_trials, "_PUSHED", 0.0)
@@ -37,7 +37,7 @@ def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, mo
     assert apart.max() > 0.05
 
 
-def test_a_hand_whose_field_does_not_keep_its_pace_is_late_outside_and_early_inside(lifted: Lifted) -> None:
+def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
     late = np.arange(360) / 120.0 - push_trials._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
@@ -71,7 +71,7 @@ WHOLE = "pushed off its curve to those beside it, the physical figure {} with th
         ),
     ],
 )  # fmt: skip
-def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it_bears(
+def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
     verdicts: dict[str | float, Verdict], legs: int | None, share: float, said: tuple[str, ...], lifted: Lifted,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -86,9 +86,7 @@ def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it
     assert (part.legs_of, part.share, told) == (legs, share, said)
 
 
-def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_though_it_would_bear_it(
-    lifted: Lifted, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(push_trials, "tried", lambda *_: Verdict(0.01, np.inf))
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
@@ -97,7 +95,7 @@ def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_thoug
     assert "feet skate" in told[0]
 
 
-def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lifted) -> None:
+def test_legs_of_pushed_figure_equal_its_own_clip(lifted: Lifted) -> None:
     curve = lifted.curve(1)
     kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
     alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
@@ -108,7 +106,7 @@ def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lift
     assert np.delete(apart, upper, axis=1).max() < 1e-6
 
 
-def test_a_curve_plays_its_clip_at_that_clips_pace_and_nobody_is_told_of_a_lap(lifted: Lifted, tmp_path: Path) -> None:
+def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_path: Path) -> None:
     save_map(lifted, tmp_path / "map.npz")
     parts = map_parts(run_config(map=str(tmp_path / "map.npz"), curve="cheer"), figure_model())
     assert parts.lap_seconds == parts.curve.duration == pytest.approx(lifted.curve(1).duration)

@@ -38,7 +38,7 @@ def _with(made: Lifted, angle: float) -> Lifted:
     return made
 
 
-def test_places_are_as_far_apart_as_one_motion_goes_and_a_change_where_they_are_is_said(wandering: Path) -> None:
+def test_distance_between_places_is_measured_and_large_ones_are_reported(wandering: Path) -> None:
     made, _ = load_figure_map(wandering)
     assert isinstance(made, Lifted)
     angles = np.arange(0.0, 2.0 * np.pi, 0.2)
@@ -53,7 +53,7 @@ def test_places_are_as_far_apart_as_one_motion_goes_and_a_change_where_they_are_
 
 
 @pytest.mark.parametrize(("user", "figure", "said"), [("push", "physical", 1), ("relaxed", "physical", 0)])
-def test_a_hand_that_pushes_over_where_places_are_apart_is_warned(
+def test_pushing_hand_is_warned_of_distant_transition_places(
     wandering: Path, tmp_path: Path, user: str, figure: str, said: int
 ) -> None:
     made, _ = load_figure_map(wandering)

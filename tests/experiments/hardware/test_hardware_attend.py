@@ -53,7 +53,7 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]
     os.close(ours)
 
 
-def test_a_recording_that_has_ended_is_said_once_and_with_its_reason(keys, capsys) -> None:
+def test_end_of_recording_is_reported_once_with_its_reason(keys, capsys) -> None:
     stand, console = Stand({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
     said = capsys.readouterr().out
@@ -76,18 +76,18 @@ def _interrupt(stand: Stand) -> None:
 
 
 @pytest.mark.slow
-def test_enter_arms_and_another_lets_go(keys) -> None:
+def test_enter_toggles_arming(keys) -> None:
     assert asked({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
     assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
     assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
 
 
-def test_what_was_typed_before_the_question_arms_nothing(keys) -> None:
+def test_keys_typed_before_the_prompt_are_ignored(keys) -> None:
     keys(b"\n\n")
     assert asked({}) == [DISARM]
 
 
-def test_an_enter_that_was_meant_for_a_force_clears_no_fault(keys) -> None:
+def test_enter_typed_before_a_fault_does_not_clear_it(keys) -> None:
     def typed_and_fails(stand: Stand) -> None:
         keys(b"\n")
         stand.fails()
@@ -95,17 +95,17 @@ def test_an_enter_that_was_meant_for_a_force_clears_no_fault(keys) -> None:
     assert asked({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
 
 
-def test_a_fault_is_cleared_by_an_enter_after_it(keys) -> None:
+def test_enter_after_a_fault_clears_it(keys) -> None:
     assert asked({3: lambda _: keys(b"\n"), 6: Stand.fails, 9: lambda _: keys(b"\n")}) == [ARM, CLEAR, ARM, DISARM]
 
 
-def test_the_end_of_the_input_ends_the_run_and_is_no_enter(keys) -> None:
+def test_end_of_input_ends_the_run_without_arming(keys) -> None:
     stand = Stand({3: lambda _: keys(b"\x04")})
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
     assert stand.asked == [DISARM]
     assert stand.looks < 10
 
 
-def test_with_nobody_at_the_keys_a_fault_ends_the_run(keys) -> None:
+def test_unattended_run_ends_at_a_fault(keys) -> None:
     keys(b"\n")
     assert asked({4: Stand.fails}, arm=True) == [ARM]

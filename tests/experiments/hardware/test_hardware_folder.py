@@ -45,7 +45,7 @@ def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool
         raise KeyboardInterrupt
 
 
-def test_no_other_run_is_written_into_it_meanwhile(tmp_path: Path) -> None:
+def test_concurrent_run_into_the_folder_is_refused(tmp_path: Path) -> None:
     with run_folder(options(tmp_path)):
         record(tmp_path, 3)
         with pytest.raises(SimError, match="another run is being written into it"):
@@ -60,14 +60,14 @@ def test_no_other_run_is_written_into_it_meanwhile(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ticks", [None, 0])
-def test_a_run_that_recorded_nothing_leaves_nothing(tmp_path: Path, ticks: int | None) -> None:
+def test_run_without_ticks_leaves_no_folder(tmp_path: Path, ticks: int | None) -> None:
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         stopped(out, ticks)
     assert not out.exists()
 
 
-def test_what_is_of_somebody_else_stays(tmp_path: Path) -> None:
+def test_foreign_files_are_kept(tmp_path: Path) -> None:
     (tmp_path / "figures").mkdir()
     for mine in (tmp_path / "notes.txt", tmp_path / "figures" / "mine.tex"):
         mine.write_text("mine")
@@ -77,14 +77,14 @@ def test_what_is_of_somebody_else_stays(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damaged", [False, True])
-def test_what_was_recorded_until_an_interrupt_or_cannot_be_read_is_kept(tmp_path: Path, damaged: bool) -> None:
+def test_interrupted_or_damaged_recording_is_kept(tmp_path: Path, damaged: bool) -> None:
     with pytest.raises(KeyboardInterrupt):
         stopped(tmp_path, 3, damaged=damaged)
     assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json"}
 
 
 @pytest.mark.parametrize("ticks", [None, 0])
-def test_of_a_servo_that_was_killed_nothing_is_told_that_is_not_known(tmp_path: Path, ticks: int | None) -> None:
+def test_outcome_of_killed_servo_marks_unknown_values(tmp_path: Path, ticks: int | None) -> None:
     if ticks is not None:
         record(tmp_path, ticks)
     ready = Ready(DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True), 1e-3, [])

@@ -62,12 +62,12 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return said.err
 
 
-def test_nobody_at_the_terminal_and_no_arm_is_refused(tmp_path: Path, capsys) -> None:
+def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -> None:
     assert "expected --arm" in refused(capsys, "run", "--out", str(tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 
-def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
+def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
     said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
     assert "expected --certificate" in said
@@ -76,7 +76,7 @@ def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkey
 @pytest.mark.parametrize(
     "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
 )
-def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
+def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
     said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
     assert limit[0] in said
     assert "on a real device" in said
@@ -92,23 +92,23 @@ def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: P
      (("--mass", "60.0"), "on a device: its figure is the animation"),
      (("--delay", "5"), "without --certificate"), (("--emulate", "x.json", "--device", "hid"), "with --device hid")],
 )  # fmt: skip
-def test_what_changes_nothing_on_a_device_is_refused_by_name(tmp_path: Path, capsys, given, says) -> None:
+def test_options_without_effect_on_a_device_are_refused_by_name(tmp_path: Path, capsys, given, says) -> None:
     said = refused(capsys, "run", "--arm", *given, "--out", str(tmp_path / "run"))
     assert f"{given[0]} {given[1]} has no meaning {says}" in said
     assert not (tmp_path / "run").exists()
 
 
-def test_an_emulated_device_is_silent_for_some_seconds_at_most(tmp_path: Path, capsys) -> None:
+def test_excessive_silence_limit_is_refused(tmp_path: Path, capsys) -> None:
     said = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
     assert "--silence is 2e+06; expected at most 5000 periods" in said
 
 
-def test_a_folder_that_holds_a_run_is_kept(tmp_path: Path, capsys) -> None:
+def test_folder_with_a_run_is_kept_without_overwrite(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
     assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
 
 
-def test_a_certificate_of_something_else_arms_nothing(tmp_path: Path) -> None:
+def test_certificate_of_other_inputs_does_not_arm(tmp_path: Path) -> None:
     with pytest.raises(CertificateError, match="expected a certificate"):
         verified(tmp_path / "certificate.json", RunConfig(), 0.0)
     (tmp_path / "certificate.json").write_text(json.dumps({"inputs": "0" * 16, "parts": {}}))
@@ -116,7 +116,7 @@ def test_a_certificate_of_something_else_arms_nothing(tmp_path: Path) -> None:
         verified(tmp_path, RunConfig(), 0.0)
 
 
-def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: Path, monkeypatch) -> None:
+def test_unknown_or_smaller_delay_certificate_does_not_arm(tmp_path: Path, monkeypatch) -> None:
     for outcome, says in (("unknown", "stability is unknown"), ("certified", "")):
         certificate = Certificate({"stability": Verdict(outcome, "because")}, "0" * 16)
         monkeypatch.setattr("experiments.hardware.permit.verify_certificate", lambda file, inputs, c=certificate: c)
@@ -132,7 +132,7 @@ def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: 
     assert verified(tmp_path, config, 1e-3)
 
 
-def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog_is_announced() -> None:
+def test_device_without_motors_or_calibration_is_refused() -> None:
     assert check_device(KNOWN, None) == []
     assert "no watchdog" in check_device(KNOWN._replace(watchdog=False), None)[0]
     assert "no Phantom by build" in check_device(KNOWN._replace(own_weight=True), None)[0]
@@ -143,7 +143,7 @@ def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog
         check_device(KNOWN._replace(forces=False), None)
 
 
-def test_a_calibration_is_of_one_device_and_outlives_no_power_up_of_encoders_that_forget() -> None:
+def test_calibration_is_valid_for_one_device_and_one_power_up() -> None:
     forgets = KNOWN._replace(calibrated=False, serial="7", power_up=3)
     assert check_device(forgets, Calibration("arm", "7", 3)) == []
     assert check_device(forgets._replace(calibrated=True, power_up=4), Calibration("arm", "7", 3)) == []
@@ -153,7 +153,7 @@ def test_a_calibration_is_of_one_device_and_outlives_no_power_up_of_encoders_tha
         check_device(forgets, Calibration("arm", "8", 3))
 
 
-def test_a_device_file_comes_back_as_it_was_and_changes_simulation_and_certificate(tmp_path: Path) -> None:
+def test_device_file_round_trips_and_changes_linkage_and_certificate(tmp_path: Path) -> None:
     file = tmp_path / "device.json"
     save_device(identified_json(found(coulomb2=0.02, offset3=-0.01, viscous1=-1e-6), ["a"], {}), file)
     linkage = linkage_from(read_device_file(file))
@@ -164,7 +164,7 @@ def test_a_device_file_comes_back_as_it_was_and_changes_simulation_and_certifica
     assert certificate_inputs(config, 0.0, HandRange(), 1.0)["device"] != plain["device"]
 
 
-def test_identify_and_calibrate_leave_in_a_device_file_what_the_other_found(tmp_path: Path) -> None:
+def test_identify_and_calibrate_keep_each_others_results(tmp_path: Path) -> None:
     calibrated = calibrated_json([0.01, -0.02, 0.03], [1e-4] * 3, KNOWN, {})
     both = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
     assert linkage_from(both).offset == pytest.approx((0.01, -0.019, 0.028))
@@ -187,7 +187,7 @@ def test_identify_and_calibrate_leave_in_a_device_file_what_the_other_found(tmp_
      ({"clock": Clock(servo_period=0.002)}, r"servo_period 0.001 \(here 0.002\)"),
      ({"device": Phantom(cutoff=90.0)}, r"cutoff 150.0 \(here 90.0\)")],
 )  # fmt: skip
-def test_a_certificate_of_another_field_says_which_option_differs(tmp_path: Path, changed, says) -> None:
+def test_certificate_of_another_field_names_the_differing_option(tmp_path: Path, changed, says) -> None:
     config = resolved(RunConfig())
     inputs = certificate_inputs(config, 0.0, HandRange(), HAND_PUSH)
     certificate = Certificate({"stability": Verdict("certified", "it is")}, hash_of(inputs), hashes_of(inputs))
@@ -199,7 +199,7 @@ def test_a_certificate_of_another_field_says_which_option_differs(tmp_path: Path
     assert "\n" not in str(refused.value)
 
 
-def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_said(tmp_path: Path, capsys) -> None:
+def test_calibration_finds_hidden_offset_and_keeps_file_content(tmp_path: Path, capsys) -> None:
     hidden = {"format": "hvf-device-1", "offset": {"value": [0.02, -0.03, 0.015]}}
     file, other = tmp_path / "device.json", tmp_path / "hidden.json"
     save_device(hidden, other)
@@ -218,14 +218,14 @@ def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_s
     assert json.loads(capsys.readouterr().out) == read_device_file(file)
 
 
-def test_a_fixture_holds_the_stylus_at_its_pose_without_sagging() -> None:
+def test_fixture_holds_the_stylus_without_sagging() -> None:
     device = Fixture((0.5, 0.9, 0.2), Linkage())
     for _ in range(200):
         device.write(np.zeros(3), False)
     np.testing.assert_allclose(device.port.qpos[list(device.port.arm_q)], [0.5, 0.9, 0.2], atol=1e-8)
 
 
-def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
+def test_moving_stylus_is_refused_for_calibration() -> None:
     device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)
     for _ in range(50):  # it falls
         device.write(np.zeros(3), False)
@@ -241,7 +241,7 @@ def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
      '{"format": "hvf-device-1", "viscous": {"value": [Infinity, 0, 0]}}',
      '{"format": "hvf-device-1", "delay": {"value": [NaN]}}'],
 )  # fmt: skip
-def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -> None:
+def test_invalid_device_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "device.json").write_text(text)
     with pytest.raises(SimError, match="expected what hvf hardware identify or calibrate writes"):
         read_device_file(tmp_path / "device.json")
@@ -253,9 +253,7 @@ def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -
      ('{"format": "hvf-device-1", "offset": {"value": [0.1, 0, 0]}}', "is not calibrated"),
      ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
 )  # fmt: skip
-def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_was(
-    tmp_path: Path, capsys, content, says
-) -> None:
+def test_invalid_emulated_device_is_refused_and_the_folder_unchanged(tmp_path: Path, capsys, content, says) -> None:
     file, kept = tmp_path / "device.json", tmp_path / "run" / "kept"
     kept.parent.mkdir()
     kept.write_text("")
@@ -265,9 +263,7 @@ def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_wa
     assert list(kept.parent.iterdir()) == [kept]
 
 
-def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_again_or_drawn(
-    tmp_path: Path, capsys
-) -> None:
+def test_device_recording_is_certified_but_not_reproduced_or_drawn(tmp_path: Path, capsys) -> None:
     config = run_config(figure="none", seconds=1.0)
     static = {"curve": [[0.0, 0.0, 0.0]], "clip_names": "", "clip_fps": np.zeros(0)}
     channels = {"ticks": Group(1e3, {"t": (), "clock": ()})}
@@ -279,13 +275,13 @@ def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_a
         assert "is of a device" in capsys.readouterr().err
 
 
-def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> None:
+def test_identify_refuses_folders_without_a_hardware_run(tmp_path: Path, capsys) -> None:
     assert "expected folders" in refused(capsys, "identify", "--out", str(tmp_path / "device.json"))
     (tmp_path / "device.json").write_text("{}")
     assert "--overwrite" in refused(capsys, "identify", str(tmp_path), "--out", str(tmp_path / "device.json"))
 
 
-def test_the_diagram_of_the_documents_is_the_table() -> None:
+def test_state_diagram_in_docs_matches_transition_table() -> None:
     picture = (Path(__file__).parents[3] / "docs" / "pictures" / "gate-states.svg").read_text(encoding="utf-8")
     shown = {edge.replace("&gt;", ">") for edge in re.findall(r'data-edge="([^"]*)"', picture)}
     edges = {f"{a.name} --> {b.name}: {event.name}".lower() for (a, event), b in TRANSITIONS.items()}
@@ -293,7 +289,7 @@ def test_the_diagram_of_the_documents_is_the_table() -> None:
 
 
 @pytest.mark.processes
-def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tmp_path: Path, capsys) -> None:
+def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",
                  "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
@@ -314,9 +310,7 @@ def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tm
 
 
 @pytest.mark.processes
-def test_hidden_numbers_are_calibrated_recorded_and_identified_from_the_command_line(
-    tmp_path: Path, monkeypatch
-) -> None:
+def test_hidden_device_parameters_are_identified_from_the_command_line(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     hidden = {
         "coulomb": [0.012, 0.009, 0.011], "viscous": [0.001, 0.0012, 0.0009], "inertia": [3e-4, 1e-4, 8e-5],

@@ -97,7 +97,7 @@ def write_run(folder: Path, told: Told) -> Path:
 @pytest.mark.parametrize(
     "kind", [*(pytest.param(kind, marks=pytest.mark.slow) for kind in ("physical", "kinematic")), "none"]
 )
-def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, backend: str) -> None:
+def test_every_figure_kind_is_rendered_to_playable_films(kind: str, tmp_path: Path, backend: str) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"
     render(run, target, SMALL, gif=True)
@@ -108,9 +108,7 @@ def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, ba
 
 
 @pytest.mark.parametrize("kind", ["physical", "kinematic"])
-def test_nobody_is_drawn_below_the_floor_and_it_is_said_how_deep_they_were(
-    kind: str, tmp_path: Path, backend: str
-) -> None:
+def test_figures_are_drawn_above_the_floor_and_their_depth_is_reported(kind: str, tmp_path: Path, backend: str) -> None:
     run = write_run(tmp_path / "run", Told(kind, depth=0.03))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, SMALL, backend)
@@ -122,7 +120,7 @@ def test_nobody_is_drawn_below_the_floor_and_it_is_said_how_deep_they_were(
         frames.close()
 
 
-def test_a_figure_that_travels_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
+def test_travelling_figure_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
     run = write_run(tmp_path / "run", Told(travel=8.0))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show="stage", ghost="none", width=160, height=120, fps=10.0), backend)
@@ -144,7 +142,7 @@ def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
     return picture
 
 
-def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(tmp_path: Path, backend: str) -> None:
+def test_ghost_and_force_arrow_are_drawn_only_if_present(tmp_path: Path, backend: str) -> None:
     run, rest = write_run(tmp_path / "run", Told()), write_run(tmp_path / "rest", Told(force=0.0))
     for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):
         red, _, blue = np.moveaxis(drawn(run, "stage", ghost, backend), 2, 0)
@@ -158,7 +156,7 @@ def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(t
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
+def test_film_of_incomplete_run_is_reported_and_shows_the_edited_animation(
     tmp_path: Path, backend: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("imageio_ffmpeg")
@@ -173,7 +171,7 @@ def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
         frames.close()
 
 
-def test_a_film_is_not_replaced_unasked_nor_written_in_a_format_that_is_none(tmp_path: Path) -> None:
+def test_existing_film_or_unknown_format_is_refused(tmp_path: Path) -> None:
     film = tmp_path / "film.mp4"
     film.write_bytes(b"mine")
     with pytest.raises(SimError, match="--overwrite"):
@@ -184,15 +182,13 @@ def test_a_film_is_not_replaced_unasked_nor_written_in_a_format_that_is_none(tmp
 
 
 @pytest.mark.parametrize("wrong", [{"width": 161}, {"height": 20}, {"fps": 0.0}, {"seconds": 0.0}])
-def test_sizes_and_rates_that_make_no_film_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_film_sizes_and_rates_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(SimError, match="expected"):
         Film(**wrong)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("frames", [0, 1])
-def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(
-    frames: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_interrupted_film_keeps_the_old_file(frames: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("imageio_ffmpeg")
     film = tmp_path / "film.mp4"
     film.write_bytes(b"the old one")
@@ -216,7 +212,7 @@ def _hear() -> None:
 
 
 @pytest.mark.slow
-def test_ctrl_c_on_the_command_leaves_nothing(tmp_path: Path, backend: str) -> None:
+def test_ctrl_c_on_render_leaves_no_file(tmp_path: Path, backend: str) -> None:
     pytest.importorskip("imageio_ffmpeg")
     run, film = write_run(tmp_path / "run", Told()), tmp_path / "films" / "film.mp4"
     command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
@@ -231,7 +227,7 @@ def test_ctrl_c_on_the_command_leaves_nothing(tmp_path: Path, backend: str) -> N
     assert not list(film.parent.iterdir())
 
 
-def test_without_graphics_it_says_in_a_line_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_graphics_backend_is_reported_with_packages_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.render.graphics.OFFSCREEN", ("nothing_of_that_name",))
     with pytest.raises(NoGraphics, match=r"^[^\n]*libegl1[^\n]*libosmesa6[^\n]*$"):
         offscreen_backend()

@@ -24,7 +24,7 @@ def captures(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_random_set_stands_on_the_floor_without_skating(captures):
+def test_random_set_stands_without_skating(captures):
     found = [random_sets.captured(captures, name) for name in FILES]
     assert [one.name for one, _ in found if one.reason or one.alone > RESIDUAL] == []
     chosen = next(random_sets.drawn([clip for _, clip in found], 4, seed=1))
@@ -39,7 +39,7 @@ def test_a_random_set_stands_on_the_floor_without_skating(captures):
     assert "| cylindrical | 1, 0 | 1, " in random_sets.summary([row])[-1]
 
 
-def test_a_walk_that_is_not_prepared_is_beyond_the_bounds(captures):
+def test_unprepared_walk_exceeds_the_bounds(captures):
     walk = load_clip(MOCAP / "snu/walk.bvh")
     found = random_sets.animation_measures(walk.poses, walk.fps)
     assert found["lowest"] < -1.0

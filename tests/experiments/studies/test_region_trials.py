@@ -7,7 +7,7 @@ from experiments.studies.region_trials import HANDS, certified_region, simulate_
 
 
 @pytest.mark.slow
-def test_nothing_that_begins_in_the_region_leaves_it():
+def test_trajectories_from_certified_region_stay_inside():
     river, verdict = certified_region()
     assert verdict.verdict == "certified"
     rng = np.random.default_rng(5)

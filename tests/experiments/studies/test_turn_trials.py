@@ -12,7 +12,7 @@ from models.mocap.motion.clip import Clip
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "pace"), [("run", 1.5), ("ginga", 2.3)])
-def test_what_the_floor_cannot_give_is_missed_and_what_it_can_is_followed(name, pace):
+def test_refuted_turns_are_missed_and_feasible_ones_followed(name, pace):
     clip = embedded(name)
     played = clip_ballistics(Clip(clip.poses, pace * clip.fps, name))
     verdict = played.certificate.verdicts["turns"]
@@ -25,7 +25,7 @@ def test_what_the_floor_cannot_give_is_missed_and_what_it_can_is_followed(name, 
     assert parabola(example["acceleration"], seconds, JUDGING.friction, 0.98 * done.rate).miss < 0.1 * done.bound
 
 
-def test_only_the_floor_refuses():
+def test_only_friction_limits_the_followed_motion():
     t = np.linspace(0.0, 0.2, 25)[:, None]
     start = 0.5 * np.array([14.0, 0.0, 0.0]) * t**2
     slippery, rough = (follow(start, 120.0, np.zeros(3), friction) for friction in (0.75, 1.6))

@@ -68,14 +68,14 @@ def summary_of(path: Path, down: np.ndarray | None = None, handled: tuple[tuple[
         )  # fmt: skip
 
 
-def test_a_hand_that_is_never_left_alone_is_not_told_to_have_been(tmp_path: Path) -> None:
+def test_summary_of_hand_never_left_alone(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5")
     never = replace(summary, path=replace(summary.path, deviation_rms_mm=None))
     assert "0.20 mm RMS from the curve when left alone" in summary.lines()[1]
     assert "laps, never left alone." in never.lines()[1]
 
 
-def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
+def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5")
     assert summary.path.deviation_rms_mm == pytest.approx(0.2)
     assert summary.path.laps == pytest.approx((N - 1) * PERIOD / 1.5)
@@ -114,7 +114,7 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("block", [1, 7, 113, 205])
-def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_measures_do_not_depend_on_block_size(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a block ends in the middle of a push."""
     whole = summary_of(tmp_path / "whole.h5")
     monkeypatch.setattr(measures, "BLOCK_FRAMES", block)
@@ -131,7 +131,7 @@ def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.Monk
                 assert other == (value if value is None else pytest.approx(value)), name
 
 
-def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
+def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     with recording_of(tmp_path / "run.h5", np.zeros(N // EVERY)) as recording:
         parts = [
             measures.measured(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
@@ -149,7 +149,7 @@ def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     assert flights == pytest.approx([0.2, 0.0, 0.0])
 
 
-def test_a_hand_that_does_something_else_does_not_push_and_is_not_left_alone(tmp_path: Path) -> None:
+def test_handled_time_counts_neither_as_push_nor_as_left_alone(tmp_path: Path) -> None:
     whole = summary_of(tmp_path / "whole.h5")
     handled = summary_of(tmp_path / "run.h5", handled=((1.9, 2.6),))
     assert handled.path.pushes == ()
@@ -159,7 +159,7 @@ def test_a_hand_that_does_something_else_does_not_push_and_is_not_left_alone(tmp
     assert f"up to {whole.animation.pushed_deg:.2f}° a joint." in " ".join(handled.lines())
 
 
-def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
+def test_tracing_hand_is_reported(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5", handled=((0.0, np.inf),))
     with Recording(tmp_path / "run.h5") as recording:
         trace = measures.trace_summary(recording)
@@ -173,7 +173,7 @@ def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
     assert not any("push" in line.lower() for line in lines)
 
 
-def test_falls_are_told_and_what_follows_does_not_count_until_the_figure_is_back(tmp_path: Path) -> None:
+def test_falls_are_reported_and_down_time_is_excluded(tmp_path: Path) -> None:
     down = np.zeros(N // EVERY)
     down[150:200], down[200:250] = 1.0, 2.0
     down[380:] = 1.0

@@ -18,7 +18,7 @@ def poses(figure: mujoco.MjModel, n: int, seed: int) -> np.ndarray:
     return made
 
 
-def test_segments_are_where_mujoco_s_own_kinematics_has_them(figure: mujoco.MjModel) -> None:
+def test_segment_places_match_mujoco_kinematics(figure: mujoco.MjModel) -> None:
     made, data = poses(figure, 5, 1), mujoco.MjData(figure)
     for pose, places in zip(made, segment_places(made, figure), strict=True):
         data.qpos = pose
@@ -26,7 +26,7 @@ def test_segments_are_where_mujoco_s_own_kinematics_has_them(figure: mujoco.MjMo
         np.testing.assert_allclose(places, [data.body(body).xpos for body in BODIES], atol=1e-12)
 
 
-def test_the_geodesic_is_the_length_of_the_tangent_that_leads_there(figure: mujoco.MjModel) -> None:
+def test_geodesic_distance_is_the_norm_of_the_tangent(figure: mujoco.MjModel) -> None:
     start = poses(figure, 1, 2)
     step = np.random.default_rng(3).normal(scale=0.2, size=N_TANGENT)
     end = start.copy()
@@ -35,7 +35,7 @@ def test_the_geodesic_is_the_length_of_the_tangent_that_leads_there(figure: mujo
     assert geodesic_distance(end, start)[0] == pytest.approx(np.linalg.norm(step), rel=1e-9)
 
 
-def test_a_figure_that_is_carried_is_seen_as_far_away_as_it_is_carried(figure: mujoco.MjModel) -> None:
+def test_seen_distance_of_translated_figure_is_the_translation(figure: mujoco.MjModel) -> None:
     start = poses(figure, 3, 4)
     end = start.copy()
     end[:, :3] += [0.03, -0.04, 0.12]

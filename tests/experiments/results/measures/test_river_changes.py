@@ -20,7 +20,7 @@ def _recorded(path: Path, names: bool) -> Recording:
     return Recording(path)
 
 
-def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_path: Path, monkeypatch) -> None:
+def test_changes_are_found_at_their_first_tick_for_any_block_size(tmp_path: Path, monkeypatch) -> None:
     expected = (
         RiverChange(0.2, "level", "wave"), RiverChange(0.29, "wave", "high"), RiverChange(0.409, "high", "wave"),
     )  # fmt: skip
@@ -31,6 +31,6 @@ def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_pa
     assert expected[0].line() == "t = 0.20 s: level → wave"
 
 
-def test_a_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
+def test_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
     with _recorded(tmp_path / "run.h5", False) as recording:
         assert river_changes(recording) == ()

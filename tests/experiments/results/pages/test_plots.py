@@ -26,7 +26,7 @@ def section(tmp_path: Path) -> str:
         return plots_html(recording)
 
 
-def test_the_numbers_are_the_recording_s_and_a_jolt_of_one_tick_is_among_them(tmp_path: Path) -> None:
+def test_plot_data_matches_recording_including_a_one_tick_peak(tmp_path: Path) -> None:
     made = section(tmp_path)
     (text,) = re.findall(r'<script type="application/json" id="plot-data">(.*?)</script>', made, re.DOTALL)
     data = json.loads(text)
@@ -43,7 +43,7 @@ def test_the_numbers_are_the_recording_s_and_a_jolt_of_one_tick_is_among_them(tm
 
 
 @pytest.mark.processes
-def test_in_a_browser_the_wheel_zooms_and_the_line_is_where_the_replay_is(tmp_path: Path) -> None:
+def test_browser_wheel_zooms_and_cursor_follows_the_replay(tmp_path: Path) -> None:
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = Path("/usr/bin/chromium")
     if not chromium.exists():

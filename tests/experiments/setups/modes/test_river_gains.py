@@ -48,7 +48,7 @@ def rivers_of_a_hand(parts: Parts) -> np.ndarray:
     return rivers
 
 
-def test_the_rivers_gains_are_those_of_their_own_options() -> None:
+def test_rivers_and_follow_have_separate_default_gains() -> None:
     for words, expected in (({}, (16.0 / 150.0, 16.0)), ({"stiffness": 120.0, "damping": 12.0}, (0.1, 12.0))):
         field = parts_with(**words).field
         assert isinstance(field, HigherOrder)
@@ -60,7 +60,7 @@ def test_the_rivers_gains_are_those_of_their_own_options() -> None:
         assert (alone.k_r, alone.b_d) == expected
 
 
-def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
+def test_rivers_of_map_files_have_separate_default_gains() -> None:
     for words, expected in (({}, (50.0, 20.0)), ({"stiffness": 40.0, "damping": 10.0}, (40.0, 10.0))):
         mode = resolved(run_config("rivers", "any.npz", "push", **words)).mode
         assert isinstance(mode, Rivers)
@@ -68,7 +68,7 @@ def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
         assert river_time(mode) == pytest.approx(expected[1] / expected[0])
 
 
-def test_follow_keeps_a_pushed_hand_s_pace_on_composites_and_maps_from_a_file_and_else_flows_as_in_the_paper() -> None:
+def test_default_flow_of_follow_depends_on_the_map() -> None:
     assert resolved(run_config("follow", "any.npz")).mode == FollowMode(flow="parallel")
     assert resolved(run_config("follow", "any.npz", flow="curve")).mode == FollowMode(flow="curve")
     assert resolved(run_config("follow")).mode == FollowMode(flow="curve")
@@ -76,14 +76,14 @@ def test_follow_keeps_a_pushed_hand_s_pace_on_composites_and_maps_from_a_file_an
     assert resolved(run_config("follow", "composite", flow="curve")).mode == FollowMode(flow="curve")
 
 
-def test_the_default_push_takes_the_hand_from_the_level_river_into_another_which_keeps_it() -> None:
+def test_default_push_moves_the_hand_into_another_river() -> None:
     rivers = rivers_of_a_hand(parts_with())
     assert np.all(rivers[:1900] == 0.0)
     assert np.all(rivers[2600:] > 0.0)
     assert np.sum(rivers < 0.0) < 20
 
 
-def test_a_hand_that_does_not_push_stays_and_with_the_gains_of_one_curve_the_push_takes_it_nowhere() -> None:
+def test_hand_stays_in_its_river_without_push_or_with_stiff_gains() -> None:
     assert np.all(rivers_of_a_hand(parts_with(user="relaxed")) == 0.0)
     alone = FollowMode()
     stiff = parts_with(stiffness=alone.stiffness, damping=alone.damping)

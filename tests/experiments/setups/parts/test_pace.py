@@ -19,7 +19,7 @@ from sim.world.world import World, phantom_angles
 CURVE = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01))
 
 
-def test_friction_takes_the_power_that_mujoco_s_joints_lose():
+def test_friction_along_curve_matches_mujoco_joint_losses():
     model = World().model
     dofs = [int(model.joint(PHANTOM + name).dofadr[0]) for name in ("theta1", "theta2", "theta3")]
     phases, step = np.linspace(0.1, 2.0, 7), 1e-5
@@ -31,7 +31,7 @@ def test_friction_takes_the_power_that_mujoco_s_joints_lose():
         assert 0.03 < force < 0.15
 
 
-def test_inertia_along_a_curve_is_what_changes_the_kinetic_energy():
+def test_inertial_force_along_curve_matches_kinetic_energy():
     phases, step = np.linspace(0.1, 2.0, 7), 1e-4
     waved = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01), wave=0.01)
 
@@ -56,13 +56,13 @@ def _turn_rate(lap: float) -> float:
     return float((angle[-1] - angle[0]) / (t[-1] - t[0])) * lap / (2.0 * np.pi)
 
 
-def test_a_hand_that_goes_round_outside_a_bend_keeps_the_curves_angle(monkeypatch):
+def test_hand_outside_a_bend_keeps_the_turn_rate(monkeypatch):
     assert _turn_rate(0.6) == pytest.approx(1.0, abs=0.004)
     monkeypatch.setattr(pace, "_MAX_LENGTHENING", 0.0)
     assert _turn_rate(0.6) < 0.985
 
 
-def test_the_speed_that_is_asked_for_is_that_of_the_curve_and_what_the_device_costs():
+def test_paced_speed_is_curve_speed_plus_device_losses():
     found = paced(CURVE, 8.0, 300.0)
     assert found.periodic
     np.testing.assert_array_equal(found.positions, CURVE.positions)
@@ -78,7 +78,7 @@ def test_the_speed_that_is_asked_for_is_that_of_the_curve_and_what_the_device_co
     assert paced(CURVE, 80.0, 0.0).duration > paced(CURVE, 80.0, 3000.0).duration
 
 
-def test_an_open_curve_stays_open_and_begins_when_it_did():
+def test_open_curve_stays_open_with_same_start():
     way = Trajectory([1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]])
     found = paced(way, 8.0, 300.0)
     assert not found.periodic
@@ -94,11 +94,11 @@ def test_an_open_curve_stays_open_and_begins_when_it_did():
         ("8", 300.0, "drag is '8'; expected a number"),
     ],
 )
-def test_a_drag_that_leads_no_hand_is_told(drag, stiffness, said):
+def test_invalid_drag_or_stiffness_is_refused(drag, stiffness, said):
     with pytest.raises(ParameterError, match=said):
         paced(CURVE, drag, stiffness)
 
 
-def test_a_curve_out_of_reach_is_told():
+def test_curve_out_of_reach_is_refused():
     with pytest.raises(SimError, match="does not reach"):
         paced(Trajectory.circle(0.9, 2.0), 8.0, 300.0)

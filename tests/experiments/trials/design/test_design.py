@@ -19,7 +19,7 @@ def study(**values: object):
 
 
 @pytest.mark.parametrize("n", range(2, 9))
-def test_every_condition_stands_in_every_place_and_follows_every_other_one_equally_often(n: int) -> None:
+def test_order_is_balanced_in_positions_and_sequences(n: int) -> None:
     rows = balanced_rows(n)
     places = Counter((place, condition) for row in rows for place, condition in enumerate(row))
     follows = Counter(pair for row in rows for pair in pairwise(row))
@@ -29,7 +29,7 @@ def test_every_condition_stands_in_every_place_and_follows_every_other_one_equal
     assert len(follows) == n * (n - 1)
 
 
-def test_within_users_every_user_meets_every_condition_as_often_as_it_is_repeated() -> None:
+def test_within_users_every_user_meets_every_condition() -> None:
     made = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
     met = meetings(made)
     assert len(conditions(made)) == 6
@@ -37,25 +37,25 @@ def test_within_users_every_user_meets_every_condition_as_often_as_it_is_repeate
     assert all(sorted(m.position for m in met if m.user == user) == list(range(12)) for user in range(7))
 
 
-def test_between_users_a_user_meets_one_level_and_the_groups_are_equally_large() -> None:
+def test_between_users_groups_are_equal_with_one_level_each() -> None:
     made = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
     levels = {user: {m.condition.levels["damping"] for m in meetings(made) if m.user == user} for user in range(9)}
     assert all(len(met) == 1 for met in levels.values())
     assert set(Counter(next(iter(met)) for met in levels.values()).values()) == {3}
 
 
-def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
+def test_more_users_keep_the_trials_of_earlier_ones() -> None:
     few, many = (planned(study(users={"number": number})) for number in (3, 5))
     assert [trial.key for trial in few] == [trial.key for trial in many[: len(few)]]
     assert len({trial.key for trial in many}) == len(many)
 
 
-def test_people_lead_where_the_mode_is_to_lead() -> None:
+def test_people_lead_in_lead_mode() -> None:
     made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
     assert {trial.config.user.does for trial in planned(made)} == {"lead"}
 
 
-def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
+def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
     file, keys = tmp_path / "device.json", set[str]()
     for content in ("{}", '{"identified": {}}'):
         file.write_text(content, encoding="utf-8")
@@ -88,7 +88,7 @@ def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
         ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
     ],
 )  # fmt: skip
-def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
+def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], says: str) -> None:
     with pytest.raises(StudyError, match=says) as raised:
         planned(study(**values))
     assert "\n" not in str(raised.value)
@@ -106,7 +106,7 @@ def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str,
         ({"between": "map"}, "between is 'map'"),
     ],
 )
-def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says: str) -> None:
+def test_unknown_or_invalid_study_value_is_refused_by_name(values: dict[str, object], says: str) -> None:
     with pytest.raises(ParameterError, match=says) as raised:
         study(**values)
     assert "\n" not in str(raised.value)
@@ -116,7 +116,7 @@ def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says
     ("levels", "says"),
     [([1, 2, 1], "has level 1 twice"), (3, "'stiffness' is 3; expected a list of values, or a table of levels")],
 )
-def test_levels_that_are_none_or_the_same_are_refused(levels: object, says: str) -> None:
+def test_invalid_or_duplicate_levels_are_refused(levels: object, says: str) -> None:
     with pytest.raises(StudyError, match=says):
         study(factors={"stiffness": levels})
 
@@ -129,17 +129,17 @@ def test_levels_that_are_none_or_the_same_are_refused(levels: object, says: str)
         ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
     ],
 )
-def test_a_measure_that_nobody_takes_is_refused(values: dict[str, object], says: str) -> None:
+def test_unavailable_measure_is_refused(values: dict[str, object], says: str) -> None:
     with pytest.raises(StudyError, match=says):
         Study(study(**values)).run("nowhere")
 
 
 @pytest.mark.parametrize("path", [p for p in EXAMPLES if "space" not in p.read_text()], ids=lambda path: path.stem)
-def test_the_shipped_studies_can_be_planned(path: Path) -> None:
+def test_example_studies_can_be_planned(path: Path) -> None:
     assert planned(study_from(read_toml(path, "a study"), str(path)))
 
 
-def test_a_file_that_is_no_toml_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_invalid_toml_is_refused_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("name = ]\n", encoding="utf-8")
     with pytest.raises(StudyError, match="line 1"):
         read_toml(tmp_path / "s.toml", "a study")

@@ -1,0 +1,88 @@
+"""What the command says of itself: the next step, how long it takes, how to go on after Ctrl-C."""
+
+import contextlib
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from experiments.cli import main
+from experiments.trials.study import DATABASE
+from sim.recording.recording import Recording
+
+
+def _hear() -> None:
+    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def stopped(words: list[str], ready: Callable[[], bool], wait: float) -> str:
+    """Run a command, press Ctrl-C so long [s] after it is ready, and return what it says on stderr."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        start_new_session=True, preexec_fn=_hear,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120.0
+    while not ready() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(wait)
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, said
+    return said
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["run", "--figure", "none", "--seconds", "2000", "--out", str(out)]
+    said = stopped(words, (out / "run.h5").exists, wait=1.5)
+    assert f"hvf report {out}" in said.replace("\n", " ")
+    with Recording(out / "run.h5") as recording:
+        assert not recording.complete
+        assert len(recording.channel("ticks", "t")) > 500
+    assert main(["report", str(out)]) == 0
+    assert "The run was stopped: " in (out / "report.html").read_text(encoding="utf-8")
+    assert (out / "summary.json").exists()
+
+
+STUDY = """name = "Stopped"
+seconds = 2.0
+repetitions = 12
+[run]
+figure = "none"
+[users]
+number = 4
+[factors]
+stiffness = [100, 300]
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> None:
+    pytest.importorskip("statsmodels", reason="needs the study extra")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    words = ["trials", str(tmp_path / "study.toml"), "--out", str(tmp_path / "study")]
+    database = f"file:{tmp_path / 'study' / DATABASE}?mode=ro"
+
+    def kept() -> int:
+        with (
+            contextlib.suppress(sqlite3.OperationalError),
+            sqlite3.connect(database, uri=True) as rows,
+        ):
+            return rows.execute("select count(*) from trials").fetchone()[0]
+        return 0
+
+    said = stopped(words, lambda: kept() > 0, wait=0.0)
+    assert "the same command goes on" in said
+    assert str(tmp_path / "study") in said
+    before = kept()
+    assert 0 < before < 96
+    assert main(words) == 0
+    assert kept() == 96

@@ -1,0 +1,28 @@
+"""A take of which the page was closed ends by itself."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.live.session import desk
+from experiments.live.session.desk import UNWATCHED, Desk
+
+
+def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    it: Any = Desk.__new__(Desk)
+    said, stops, now = list[str](), list[float](), [100.0]
+    it._say, it.stop, it._watch_time, it.now = said.append, lambda: stops.append(now[0]), 0.0, {"recording": np.ones(1)}
+    monkeypatch.setattr(desk.time, "monotonic", lambda: now[0])
+    for browsers, seconds in ((1, 1.0), (0, UNWATCHED - 1.0), (1, 1.0), (0, UNWATCHED - 1.0)):
+        now[0] += seconds
+        it.watched(browsers)
+    assert not stops
+    now[0] += 2.0
+    it.watched(0)
+    it.watched(0)
+    assert len(stops) == len(said) == 1
+    it.now["recording"][:] = 0.0
+    now[0] += 2.0 * UNWATCHED
+    it.watched(0)
+    assert len(stops) == 1
