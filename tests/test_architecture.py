@@ -64,11 +64,11 @@ def test_added_import_that_closes_a_cycle_is_detected(view, file: str, imported:
 
 
 def test_test_folders_mirror_package_folders() -> None:
-    held = {
+    test_folders = {
         path.parent.relative_to(ROOT / "tests")
         for package in PACKAGES
         for path in (ROOT / "tests" / package).rglob("*.py")
     }
-    kept = {path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
-    assert len(held) > 20
-    assert not held - kept, "folders of tests without a folder of that name in the packages"
+    package_folders = {path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    assert len(test_folders) > 20
+    assert not test_folders - package_folders, "folders of tests without a folder of that name in the packages"

@@ -23,7 +23,7 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "models").rglob("README.md"))]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-SAID = {  # what the blocks of a page print, where a sentence of the page says so
+EXPECTED_OUTPUT = {  # what the blocks of a page print, where a sentence of the page says so
     "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # of the law's cases
     "docs/tutorials/your-own-study.md": ["48 trials"],
     "docs/tutorials/your-own-law.md": [
@@ -69,13 +69,13 @@ def test_python_blocks_of_page_run_in_order(
     for block in blocks(page, "python"):
         exec(compile(block, f"<{name(page)}>", "exec"), typed.__dict__)  # no file, as typed: its lines are no Python
     plt.close("all")
-    said = capsys.readouterr().out
-    for sentence in SAID.get(name(page), []):
-        assert sentence in said
-    assert " fell at " not in said
-    told = "".join(blocks(page, "python")) + "mine.bvh"
+    stdout = capsys.readouterr().out
+    for sentence in EXPECTED_OUTPUT.get(name(page), []):
+        assert sentence in stdout
+    assert " fell at " not in stdout
+    named = "".join(blocks(page, "python")) + "mine.bvh"
     left = [path.name for path in tmp_path.iterdir() if path.suffix != ".png"]
-    assert not [name for name in left if name not in told]  # a run in memory leaves nothing
+    assert not [name for name in left if name not in named]  # a run in memory leaves nothing
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=name)

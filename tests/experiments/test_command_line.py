@@ -12,7 +12,7 @@ from tests.experiments.refused_command import refused
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "message"),
     [
         (["--stiffness", "-5"], "--stiffness is -5; expected 0 N/m or more"),
         (["--damping", "nan"], "--damping is nan"),
@@ -58,15 +58,15 @@ from tests.experiments.refused_command import refused
     ],
 )
 def test_run_with_invalid_option_is_refused_with_its_value(
-    flags: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    flags: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert told in refused(["run", "--out", str(out), *flags], capsys)
+    assert message in refused(["run", "--out", str(out), *flags], capsys)
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["arm", "--stiffness", "-1"], "--stiffness is -1"),
         (["certify", "--stiffness", "-1"], "--stiffness is -1"),
@@ -78,30 +78,30 @@ def test_run_with_invalid_option_is_refused_with_its_value(
     ],
 )
 def test_other_commands_name_the_invalid_option_or_file(
-    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert told in refused(arguments, capsys)
+    assert message in refused(arguments, capsys)
 
 
 def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.json"
     file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")
-    said = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
-    assert "takes 1 to 4 clips, got 0" in said
+    stderr = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
+    assert "takes 1 to 4 clips, got 0" in stderr
 
 
 def test_unwritable_output_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
-    said = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
-    assert said.startswith(f"hvf: {tmp_path / 'file'}")
-    assert "Errno" not in said
+    stderr = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
+    assert stderr.startswith(f"hvf: {tmp_path / 'file'}")
+    assert "Errno" not in stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
 def test_output_on_a_file_system_without_size_is_not_reported_as_full(capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
-    assert said.startswith("hvf: /proc/nowhere: ")
-    assert "free" not in said
+    stderr = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
+    assert stderr.startswith("hvf: /proc/nowhere: ")
+    assert "free" not in stderr
 
 
 def test_folder_with_a_run_is_kept_unchanged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -163,11 +163,11 @@ def test_closed_pipe_ends_the_command_silently_with_code_141(tmp_path: Path) -> 
         os.close(reading)
         try:
             command = [sys.executable, "-m", "experiments.cli", *arguments]
-            ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=60)
+            completed = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=60)
         finally:
             os.close(writing)
-        assert ended.returncode == 141
-        assert ended.stderr == b""
+        assert completed.returncode == 141
+        assert completed.stderr == b""
 
 
 @pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
@@ -179,8 +179,8 @@ def test_closed_standard_stream_affects_neither_result_nor_exit_code(closed: str
     number = ["stdin", "stdout", "stderr"].index(closed)
     main_of = f"import os, sys; os.close({number}); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     command = ["-m", "experiments.cli", "convert", str(tmp_path / "in.bvh"), str(tmp_path / "out.bvh")]
-    ended = subprocess.run([sys.executable, "-c", main_of, *command], capture_output=True, check=False, timeout=60)
-    assert ended.returncode == 0, ended.stderr
+    completed = subprocess.run([sys.executable, "-c", main_of, *command], capture_output=True, check=False, timeout=60)
+    assert completed.returncode == 0, completed.stderr
     assert (tmp_path / "out.bvh").read_text(encoding="utf-8").startswith("HIERARCHY")
 
 
@@ -188,9 +188,9 @@ def test_interrupt_during_imports_is_one_line() -> None:
     """Also where what is being imported would turn the exception into one of its own, as MuJoCo does."""
     code = "import os, signal, experiments.console.startup\n"
     code += "try: os.kill(os.getpid(), signal.SIGINT)\nexcept BaseException: raise ImportError('initialization failed')"
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
-    assert ended.stderr == "hvf: stopped; nothing is left half done\n"
-    assert ended.returncode == 130
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert completed.stderr == "hvf: stopped; nothing is left half done\n"
+    assert completed.returncode == 130
 
 
 def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_path: Path) -> None:
@@ -200,26 +200,26 @@ def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_p
     )
     code += "from sim.world.world import World; world = World(kind='none'); world.data.qvel[:] = 1e30\n"
     code += "mujoco.mj_checkVel(world.model, world.data); print(world.warnings())"
-    ended = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(Path.cwd())},
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
-    assert (ended.stdout.splitlines()[0], ended.stdout.splitlines()[-1]) == ("None", "{'badqvel': 1}")
-    assert ended.stderr == ""
+    assert (completed.stdout.splitlines()[0], completed.stdout.splitlines()[-1]) == ("None", "{'badqvel': 1}")
+    assert completed.stderr == ""
     assert not list(tmp_path.iterdir())
 
 
 def test_missing_library_for_mujoco_gl_is_named_and_skipped() -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
     code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
-    ended = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"MUJOCO_GL": "osmesa"}, capture_output=True, text=True,
         check=True, timeout=60,
     )  # fmt: skip
-    assert ended.stderr.splitlines()[0] == (
+    assert completed.stderr.splitlines()[0] == (
         "MUJOCO_GL is 'osmesa', and libOSMesa is not on this machine: left out; unset it, or apt-get install libosmesa6"
     )
-    assert ended.stdout.endswith("None\n")
+    assert completed.stdout.endswith("None\n")
 
 
 @pytest.mark.parametrize(

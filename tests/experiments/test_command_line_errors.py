@@ -12,7 +12,7 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["run", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than 9223372036854775808"),
         (["lift", "walk", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than"),
@@ -52,10 +52,14 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
     ],
 )
 def test_mistake_is_refused_in_one_line(
-    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert said in refused(arguments, capsys)
+    assert message in refused(arguments, capsys)
     assert not list(tmp_path.iterdir())
 
 
@@ -66,5 +70,5 @@ def test_bend_too_large_for_the_lap_names_both_options(tmp_path: Path, capsys: p
 
 def test_motion_file_of_unsupported_format_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(WALK, tmp_path / "walk.fbx")
-    said = refused(["convert", str(tmp_path / "walk.fbx"), str(tmp_path / "out.bvh")], capsys)
-    assert "walk.fbx: .fbx files are not read; expected BVH, AMC (with its ASF beside it) or DeepMimic JSON" in said
+    stderr = refused(["convert", str(tmp_path / "walk.fbx"), str(tmp_path / "out.bvh")], capsys)
+    assert "walk.fbx: .fbx files are not read; expected BVH, AMC (with its ASF beside it) or DeepMimic JSON" in stderr

@@ -96,7 +96,7 @@ def test_random_command_line_runs_or_is_refused_in_one_line(
     for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify", "arm"):
         monkeypatch.setattr(command_class(name), "__call__", lambda self: 0)  # arguments are parsed, nothing is run
     rng = random.Random(seed)
-    ran = 0
+    accepted = 0
     for k in range(lines):
         if k % 5:
             name, words = (
@@ -119,6 +119,6 @@ def test_random_command_line_runs_or_is_refused_in_one_line(
         if code == 2:
             assert captured.err.startswith("hvf: "), f"{line}\n{captured.err}"
             assert captured.err.count("\n") == 1, f"{line}\n{captured.err}"
-        ran += code == 0
+        accepted += code == 0
         shutil.rmtree(tmp_path / "runs", ignore_errors=True)
-    assert ran >= 0.05 * lines  # some do: 3 of 60 with seed 1, 7 or more with the others
+    assert accepted >= 0.05 * lines  # some do: 3 of 60 with seed 1, 7 or more with the others

@@ -27,9 +27,9 @@ def _json(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> Any:
 def test_results_are_printed_as_json(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     out = str(tmp_path / "run")
-    ran = _json(["run", "--figure", "none", "--seconds", "0.5", "--out", out], capsys)
-    assert ran["path"]["laps"] > 0.1
-    assert ran == json.loads(Path(out, "summary.json").read_text())
+    result = _json(["run", "--figure", "none", "--seconds", "0.5", "--out", out], capsys)
+    assert result["path"]["laps"] > 0.1
+    assert result == json.loads(Path(out, "summary.json").read_text())
     assert _json(["reproduce", str(run)], capsys)["same"] is True
     assert _json(["convert", str(WALK), str(tmp_path / "walk.bvh")], capsys)["lines"]
     assert {clip["name"] for clip in _json(["clips"], capsys)} >= {"walk", "run"}

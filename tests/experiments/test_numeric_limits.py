@@ -13,7 +13,7 @@ from sim.users.person.population import persona, population
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("certify --hand.stiffness 0 1e300", "stiffness of a hand must be at most 1e+06, got 1e+300"),
         ("certify --hand.mass 0 1e9", "mass of a hand must be at most 1000, got 1e+09"),
@@ -26,16 +26,16 @@ from sim.users.person.population import persona, population
     ],
 )
 def test_excessive_number_is_refused_in_one_line(
-    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(words.split()) == 2
-    assert capsys.readouterr().err.strip() == f"hvf: {said}"
+    assert capsys.readouterr().err.strip() == f"hvf: {message}"
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
-    ("command", "text", "said"),
+    ("command", "text", "message"),
     [
         ("trials", 'seconds = 1e15\n[factors]\nstiffness = [100, 200]', "seconds is 1e+15; expected at most 86400 s"),
         ("tune", "seconds = 1e15\n[space]\nstiffness = {low = 1, high = 2}",
@@ -47,12 +47,12 @@ def test_excessive_number_is_refused_in_one_line(
     ],
 )  # fmt: skip
 def test_file_with_excessive_number_is_refused_in_one_line(
-    command: str, text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: str, text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(f'name = "mine"\n{text}\n', encoding="utf-8")
     assert main([command, str(file), "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err.strip() == f"hvf: {file}: {said}"
+    assert capsys.readouterr().err.strip() == f"hvf: {file}: {message}"
     assert not (tmp_path / "out").exists()
 
 
@@ -64,8 +64,8 @@ def test_tuning_with_too_many_trials_is_refused(tmp_path: Path, capsys: pytest.C
     file, out = tmp_path / "mine.toml", tmp_path / "out"
     file.write_text('name = "mine"\n[space]\nstiffness = { low = 50, high = 200 }\n', encoding="utf-8")
     assert main(["tune", str(file), "--out", str(out), "--candidates", str(many)]) == 2
-    said = f"tuning 'mine': {many} candidates, 6 users, 1 tasks, 1 repetitions are too many"
-    assert capsys.readouterr().err == f"hvf: {said}; expected at most 1000000 trials\n"
+    message = f"tuning 'mine': {many} candidates, 6 users, 1 tasks, 1 repetitions are too many"
+    assert capsys.readouterr().err == f"hvf: {message}; expected at most 1000000 trials\n"
     assert not out.exists()
 
 

@@ -32,9 +32,9 @@ def test_every_example_has_an_expected_output() -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs_and_prints_its_result(path: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, str(path)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr
-    assert PRINTS[path.stem] in done.stdout
+    assert completed.returncode == 0, completed.stderr
+    assert PRINTS[path.stem] in completed.stdout
     assert not list(tmp_path.iterdir())

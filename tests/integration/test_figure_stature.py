@@ -21,11 +21,11 @@ SMALL, SIZE = 1.4, 0.8
 
 def animation(**words: Any) -> Array:
     """References of a run with a kinematic figure, shape (n, 75)."""
-    shown: list[Array] = []
+    references: list[Array] = []
     session = wire(run_config(figure="kinematic", **words))
-    keep = lambda ticks, frames, n: shown.append(frames.reference[: -(-n // 2)].copy())  # noqa: E731
+    keep = lambda ticks, frames, n: references.append(frames.reference[: -(-n // 2)].copy())  # noqa: E731
     Loop(session.servo, session.world, keep).run(words["seconds"])
-    return np.concatenate(shown)
+    return np.concatenate(references)
 
 
 def test_motion_scales_with_stature() -> None:

@@ -90,7 +90,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     with Recording(tmp_path / "pushed" / "run.h5") as recording:
         t, p = recording.channel("ticks", "t")[:], recording.channel("ticks", "p")[:]
         distance = recording.channel("ticks", "distance")[:]
-        residual, shown = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
+        residual, reference = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
         frames, weight = recording.channel("frames", "t")[:], recording.array("body_weight")
     at = p[np.searchsorted(t, change.t)]
     assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
@@ -107,7 +107,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
     assert np.sqrt(np.mean(force[away] ** 2)) < 0.08
     lap = round(2.2 / (frames[1] - frames[0]))
-    speed = np.linalg.norm(shown[-1, :2] - shown[-1 - lap, :2]) / 2.2
+    speed = np.linalg.norm(reference[-1, :2] - reference[-1 - lap, :2]) / 2.2
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 
@@ -130,7 +130,7 @@ def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         (["lift", "walk", "--out", "map.txt"], "a map is written into a .npz file"),
         (["lift", "walk", "nobody"], "no embedded clip 'nobody'"),
@@ -141,12 +141,16 @@ def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pyt
     ],
 )
 def test_invalid_lift_command_is_refused_in_one_line(
-    arguments: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     import re
 
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     error = capsys.readouterr().err
-    assert re.search(says, error), error
+    assert re.search(message, error), error
     assert len(error.strip().splitlines()) == 1

@@ -37,10 +37,10 @@ def test_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> N
     with Recording(folder / "run.h5") as recording:
         t, tool = recording.channel("frames", "t")[:], recording.channel("frames", "tool")[:]
         curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.array("curve")
-    away = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
+    distance = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
     alone = (t > 1.0) & (t < 4.4)
-    assert away[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm
-    assert away[(t > 4.4) & (t < 6.0)].max() > 8.0e-3
+    assert distance[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm
+    assert distance[(t > 4.4) & (t < 6.0)].max() > 8.0e-3
 
 
 @pytest.mark.slow
@@ -67,9 +67,9 @@ def test_arm_run_is_reproduced_exactly(folder: Path, tmp_path: Path, capsys: pyt
     assert main(["report", str(folder)]) == 0
     assert (folder / "report.html").read_text(encoding="utf-8") == page
     assert main(["certify", str(folder), "--out", str(tmp_path / "certificate")]) == 0
-    told = capsys.readouterr().out
-    assert "stability: certified" in told
-    assert "ballistic" not in told  # an arm plays no clip
+    stdout = capsys.readouterr().out
+    assert "stability: certified" in stdout
+    assert "ballistic" not in stdout  # an arm plays no clip
     altered = tmp_path / "altered"
     shutil.copytree(folder, altered)
     with h5py.File(altered / "run.h5", "r+") as file:
@@ -105,7 +105,7 @@ def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("--figure kinematic", "a robot arm takes the figure's place; leave out --figure kinematic"),
         (
@@ -122,11 +122,11 @@ def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureF
     ],
 )
 def test_options_inapplicable_to_an_arm_are_refused(
-    words: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
     assert main(["run", "--map", "robot-arm", *words.split(), "--out", str(out)]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not out.exists()
     assert main(["arm", "--map", "cylindrical", "--out", str(out)]) == 2
     assert "the map cylindrical moves a figure; expected --map robot-arm" in capsys.readouterr().err
@@ -141,17 +141,17 @@ def test_options_inapplicable_to_an_arm_are_refused(
 def test_tool_follows_the_stylus_in_every_mode(mode: str) -> None:
     """By MuJoCo's own kinematics, the tool is where the stylus is, scaled; it lags by the filter between the two."""
     session = wire(run_config(mode, "robot-arm", seconds=4.0, figure_ticks=4))
-    apart: list[np.ndarray] = []
+    distances: list[np.ndarray] = []
     of_block = channels(session.servo, session.world)
 
     def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
         block = of_block(ticks, frames, n)
         tool = block["frames"]["tool"] - HOME - [0.0, 0.0, PEDESTAL]
-        apart.append(np.linalg.norm(tool - 1.5 * block["ticks"]["p"][::4], axis=1))
+        distances.append(np.linalg.norm(tool - 1.5 * block["ticks"]["p"][::4], axis=1))
 
     Loop(session.servo, session.world, keep).run(4.0)
-    away = np.concatenate(apart)[250:]
-    assert 1e-6 < away.max() < 4e-3
+    settled = np.concatenate(distances)[250:]
+    assert 1e-6 < settled.max() < 4e-3
 
 
 @pytest.mark.slow
@@ -185,8 +185,8 @@ def test_robot_arm_map_in_a_python_simulation(tmp_path: Path) -> None:
 def test_figure_numbers_with_a_robot_arm_map_are_refused_in_python() -> None:
     curve = hvf.circle(radius=0.04, lap=4.0)
     river = hvf.Follow(curve, k_r=300, b_d=8)
-    for figure, said in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):
-        with pytest.raises(hvf.ParameterError, match=said):
+    for figure, message in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):
+        with pytest.raises(hvf.ParameterError, match=message):
             hvf.Simulation(field=river, haptic_map=hvf.RobotArm(around=curve), figure=figure)
     for name, value in (("scale", -1.0), ("reach", 0.0), ("scale", float("nan"))):
         with pytest.raises(hvf.ParameterError, match=f"{name} is"):

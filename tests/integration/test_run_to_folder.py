@@ -53,11 +53,11 @@ def test_animation_differs_only_where_pushed(folder: Path) -> None:
     assert edited.fps == pytest.approx(50.0)
     assert edited.fps == default.fps
     t = np.arange(edited.n_frames) / edited.fps
-    apart = np.linalg.norm(edited.poses[:, 7:] - default.poses[:, 7:], axis=1)
+    difference = np.linalg.norm(edited.poses[:, 7:] - default.poses[:, 7:], axis=1)
     pushes = summary["path"]["pushes"]
     pushed = np.any([(t > p["start"]) & (t < p["start"] + p["seconds"]) for p in pushes], axis=0)
     near = np.any([(t > p["start"] - 0.05) & (t < p["start"] + p["seconds"] + 1.0) for p in pushes], axis=0)
-    assert apart[pushed].max() > 10.0 * apart[~near & (t > 1.0)].max()
+    assert difference[pushed].max() > 10.0 * difference[~near & (t > 1.0)].max()
 
 
 def test_physical_figure_follows_without_warnings(folder: Path) -> None:
@@ -77,10 +77,10 @@ def test_peak_memory_is_below_1_gb(tmp_path: Path) -> None:
 def test_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["certify", str(folder), "--no-hand", "--out", str(tmp_path)]
     assert main([*command, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["stability"]["verdict"] == "certified"
-    assert told["ballistic"]["verdict"] == "certified"
-    assert set(told["ballistic"]["figures"]["clips"]) == {"cheer", "angry", "as played"}
+    result = json.loads(capsys.readouterr().out)
+    assert result["stability"]["verdict"] == "certified"
+    assert result["ballistic"]["verdict"] == "certified"
+    assert set(result["ballistic"]["figures"]["clips"]) == {"cheer", "angry", "as played"}
     assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
     assert main(["certify", "--no-hand", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: clips;" in capsys.readouterr().err

@@ -164,6 +164,6 @@ def on_screen(p_H: np.ndarray, height: int = HEIGHT) -> tuple[float, float]:
     forward = camera.look_at - camera.position
     forward /= np.linalg.norm(forward)
     right, up = screen_axes(forward)
-    way = drawn_at(p_H) - camera.position
-    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
-    return 0.5 * WIDTH + scale * (way @ right), 0.5 * height - scale * (way @ up)
+    offset = drawn_at(p_H) - camera.position
+    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (offset @ forward)
+    return 0.5 * WIDTH + scale * (offset @ right), 0.5 * height - scale * (offset @ up)

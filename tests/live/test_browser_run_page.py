@@ -32,8 +32,8 @@ def opened(browser: Any, report: Path, width: int, height: int) -> tuple[Any, An
 
 def seconds_shown(page: Any) -> float:
     """Time that the first plot tells its values of [s]; -1 before there is one."""
-    said = page.locator(".over-time output").first.text_content()
-    return float(said.split(" s:")[0]) if said else -1.0
+    text = page.locator(".over-time output").first.text_content()
+    return float(text.split(" s:")[0]) if text else -1.0
 
 
 def until_beyond(page: Any, seconds: float) -> None:

@@ -136,11 +136,11 @@ def test_takes_are_named_and_invalid_names_answered(tab: Any, served: Served) ->
         served.assert_until(lambda: bool(desk.now["recording"][0] > 2.0), "it is recorded")
         desk.stop()
     served.assert_until(lambda: desk.takes() == ("proud", "shy") and not desk.records, "both are kept")
-    for wrong, said in (("../elsewhere", "cannot be named"), ("shy", "there is a take 'shy' already")):
+    for wrong, message in (("../elsewhere", "cannot be named"), ("shy", "there is a take 'shy' already")):
         fill(tab, "Name", wrong)
         served.assert_until(lambda wrong=wrong: served.page._takes._name.value == wrong, "the name has come")
         button(tab, "Record").click()
-        tab.get_by_text(said, exact=False).last.wait_for()
+        tab.get_by_text(message, exact=False).last.wait_for()
     assert not desk.records
 
 
@@ -210,10 +210,10 @@ def test_timeline_is_scrubbed_to_the_past_and_back(tab: Any, served: Served) -> 
         poses = recording.channel("frames", "reference")[:]
     assert begin <= stage._t <= begin + float(times[-1]) + 3.0
     seen = drawn(stage._figure)
-    apart = np.array([float(np.abs(places(served, pose, np.zeros(3)) - seen).max()) for pose in poses[::4]])
-    assert apart.min() < 5e-3
+    distances = np.array([float(np.abs(places(served, pose, np.zeros(3)) - seen).max()) for pose in poses[::4]])
+    assert distances.min() < 5e-3
     now = float(np.abs(places(served, desk.now["reference"], np.zeros(3)) - seen).max())
-    assert now > 5.0 * apart.min()
+    assert now > 5.0 * distances.min()
     tab.mouse.move(x - 6.0, y)
     tab.mouse.down()
     tab.mouse.move(x, y)

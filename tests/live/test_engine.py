@@ -221,9 +221,9 @@ def test_drag_without_bend_or_lead_is_reported_as_one_push(tmp_path, mode, press
             it.drag = None
         take.add(it.advance(), it)
     lines = take.end(it)
-    told = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
-    assert len(told) == pushes
-    for push in told:
+    reported = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
+    assert len(reported) == pushes
+    for push in reported:
         assert push["start"] == pytest.approx(0.32, abs=1e-9)
         assert push["seconds"] == pytest.approx(0.56, abs=0.002)
         assert push["peak_force"] > 1.0

@@ -33,14 +33,14 @@ def test_unstable_gain_is_red_with_a_reason():
     (found,) = next(GainVerdicts().of(run_config(stiffness=11000.0)))
     assert found.verdict == "refuted"
     assert "k = 11000 N/m" in found.reason
-    shown = verdict_html((found,), False)
-    assert "unstable" in shown
-    assert "#c02020" in shown
+    html = verdict_html((found,), False)
+    assert "unstable" in html
+    assert "#c02020" in html
 
 
 @pytest.mark.slow
 def test_uncertified_configuration_is_unknown_with_a_reason():
-    for words, said in (
+    for words, message in (
         ({"mode": "lead"}, "led"),
         ({"mode": "rivers", "map": "rivers", "governor": True}, "--governor"),
         ({"walls": True}, "--walls"),
@@ -48,5 +48,5 @@ def test_uncertified_configuration_is_unknown_with_a_reason():
     ):
         (found,) = next(GainVerdicts().of(run_config(**words)))
         assert found.verdict == "unknown"
-        assert said in found.reason
+        assert message in found.reason
     assert "checking" in verdict_html((), True)

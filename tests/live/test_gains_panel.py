@@ -53,7 +53,7 @@ def made(**words: object) -> tuple[GainsPanel, Any, Any]:
     return panel, desk, gui.sliders["k_r [N/m]"]
 
 
-def typed(slider: Any, value: float) -> None:
+def type_value(slider: Any, value: float) -> None:
     slider.value = value
     slider.moved(None)
 
@@ -62,9 +62,9 @@ def test_number_beyond_slider_is_refused_and_the_gain_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     panel, desk, slider = made()
-    typed(slider, 400.0)
+    type_value(slider, 400.0)
     with pytest.raises(ParameterError, match="k_r is 20000; expected 10 to 12000 N/m"):
-        typed(slider, 20000.0)
+        type_value(slider, 20000.0)
     assert desk.config.mode.stiffness == 400.0
     panel.write()
     assert slider.value == 20000.0  # a number may be half typed

@@ -56,11 +56,11 @@ def test_other_take_may_be_in_another_lap():
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "said"), [(3.0, 2.0, "two times"), (1.0, 9.0, "two times"), (1.0, 1.2, "lasts 0.20 s")]
+    ("start", "end", "message"), [(3.0, 2.0, "two times"), (1.0, 9.0, "two times"), (1.0, 1.2, "lasts 0.20 s")]
 )
-def test_invalid_region_is_refused(start, end, said):
+def test_invalid_region_is_refused(start, end, message):
     one = take("one", 6.0, 1.0, 1.0)
-    with pytest.raises(ParameterError, match=said):
+    with pytest.raises(ParameterError, match=message):
         mixed(one, [Region(start, end, one)])
 
 

@@ -78,10 +78,10 @@ def test_second_request_on_one_connection_is_not_forwarded(behind):
         with socket.create_connection(("127.0.0.1", gate.port), timeout=10) as peer:
             head = f"GET / HTTP/1.1\r\nHost: x\r\nCookie: hvf_token={TOKEN}\r\n\r\n"
             peer.sendall((head + "GET /secret HTTP/1.1\r\nHost: x\r\n\r\n").encode())
-            said = b""
+            received = b""
             while piece := peer.recv(4096):
-                said += piece
-        assert said.count(b"HTTP/1.1") == 1
+                received += piece
+        assert received.count(b"HTTP/1.1") == 1
     finally:
         gate.close()
 
@@ -111,10 +111,10 @@ def test_foreign_host_name_without_token_is_refused():
 
 def test_non_local_host_always_gets_a_strong_token():
     assert token_for("127.0.0.1", "") is None
-    made = token_for("0.0.0.0", "")
-    assert made is not None
-    assert len(made) == 32
-    assert made != token_for("0.0.0.0", "")
+    token = token_for("0.0.0.0", "")
+    assert token is not None
+    assert len(token) == 32
+    assert token != token_for("0.0.0.0", "")
     assert token_for("127.0.0.1", TOKEN) == TOKEN
     with pytest.raises(ParameterError, match="easily guessed"):
         token_for("0.0.0.0", "secret")

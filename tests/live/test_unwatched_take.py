@@ -11,8 +11,13 @@ from experiments.live.session.desk import UNWATCHED, Desk
 
 def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     it: Any = Desk.__new__(Desk)
-    said, stops, now = list[str](), list[float](), [100.0]
-    it._say, it.stop, it._watch_time, it.now = said.append, lambda: stops.append(now[0]), 0.0, {"recording": np.ones(1)}
+    messages, stops, now = list[str](), list[float](), [100.0]
+    it._say, it.stop, it._watch_time, it.now = (
+        messages.append,
+        lambda: stops.append(now[0]),
+        0.0,
+        {"recording": np.ones(1)},
+    )
     monkeypatch.setattr(desk.time, "monotonic", lambda: now[0])
     for browsers, seconds in ((1, 1.0), (0, UNWATCHED - 1.0), (1, 1.0), (0, UNWATCHED - 1.0)):
         now[0] += seconds
@@ -21,7 +26,7 @@ def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     now[0] += 2.0
     it.watched(0)
     it.watched(0)
-    assert len(stops) == len(said) == 1
+    assert len(stops) == len(messages) == 1
     it.now["recording"][:] = 0.0
     now[0] += 2.0 * UNWATCHED
     it.watched(0)

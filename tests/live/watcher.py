@@ -55,8 +55,8 @@ def pictures(port: int, seconds: float) -> list[float]:
         while time.perf_counter() < end:
             raw = page.recv(timeout=seconds)
             size = int.from_bytes(raw[8:HEADER], "little")
-            told = msgspec.msgpack.decode(unpack.decompress(raw[HEADER : HEADER + size]))["messages"]
-            if any(one["type"] == "SetOrientationMessage" and one["name"].startswith(MOVES) for one in told):
+            messages = msgspec.msgpack.decode(unpack.decompress(raw[HEADER : HEADER + size]))["messages"]
+            if any(one["type"] == "SetOrientationMessage" and one["name"].startswith(MOVES) for one in messages):
                 found.append(time.perf_counter())
     return found
 

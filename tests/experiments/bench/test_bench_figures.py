@@ -35,9 +35,9 @@ def test_nan_fails_upper_and_lower_bounds() -> None:
 
 def test_json_output_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:
     assert print_figures(FIGURES, True, True) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert [one["passes"] for one in told] == [True, False, None]
-    assert told[0] == {
+    result = json.loads(capsys.readouterr().out)
+    assert [one["passes"] for one in result] == [True, False, None]
+    assert result[0] == {
         "name": "a tick", "value": 1.4, "unit": "mj_steps", "at_most": 1.5, "at_least": None, "passes": True,
     }  # fmt: skip
 

@@ -23,6 +23,6 @@ def test_degraded_clip_has_skate_residual_and_open_ends(name):
 @pytest.mark.slow
 def test_degraded_clip_is_prepared_to_a_feasible_motion(tmp_path):
     write_bvh(_add_capture_errors(embedded("walk"), np.random.default_rng(0)), tmp_path / "walk.bvh")
-    made = prepared(tmp_path / "walk.bvh")
-    assert made.near
-    assert made.seconds > 0.0
+    result = prepared(tmp_path / "walk.bvh")
+    assert result.near
+    assert result.seconds > 0.0

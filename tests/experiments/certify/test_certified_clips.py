@@ -25,11 +25,11 @@ def test_animation_is_judged_as_played_and_every_clip_is_listed():
     pace = 0.65
     frames = np.clip(np.arange(0.0, 1.0 + clip.duration / pace, 1.0 / rate) - 1.0, 0.0, None) * pace * clip.fps
     poses = clip.poses[np.minimum(np.round(frames).astype(int), clip.n_frames - 1)]
-    of_run = SimpleNamespace(texts={}, groups={"frames": {"reference": poses}}, rates={"frames": rate},
+    recording = SimpleNamespace(texts={}, groups={"frames": {"reference": poses}}, rates={"frames": rate},
                              channel=lambda group, name: poses)  # fmt: skip
-    (taken,) = played(of_run)
-    told = certify_clips((embedded("walk"), clip, taken))["ballistic"]
-    assert told.verdict == "refuted"
-    assert told.reason.startswith(PLAYED)
-    assert told.figures["clips"] == {"walk": "certified", "jump": "certified", PLAYED: "refuted"}
-    assert "each: walk certified, jump certified, as played refuted" in told.reason
+    (played_clip,) = played(recording)
+    verdict = certify_clips((embedded("walk"), clip, played_clip))["ballistic"]
+    assert verdict.verdict == "refuted"
+    assert verdict.reason.startswith(PLAYED)
+    assert verdict.figures["clips"] == {"walk": "certified", "jump": "certified", PLAYED: "refuted"}
+    assert "each: walk certified, jump certified, as played refuted" in verdict.reason

@@ -123,11 +123,11 @@ def test_symbolic_law_that_differs_from_executed_law_is_rejected():
         certified_cases(hvf.law(of_floats), CURVE)
     with pytest.raises(ControllerError, match="numbers that are not finite"):
         certified_cases(hvf.law(lambda hand: (math.nan, 0, 0)), CURVE)
-    kept = [0.0]
+    state = [0.0]
 
     def filtered(hand):
-        kept[0] = 0.9 * kept[0] + 0.1 * hand.p[2]
-        return 0, 0, -kept[0]
+        state[0] = 0.9 * state[0] + 0.1 * hand.p[2]
+        return 0, 0, -state[0]
 
     with pytest.raises(ControllerError, match="another force when it is asked again"):
         certified_cases(hvf.law(filtered), CURVE)
@@ -155,8 +155,8 @@ def test_states_with_saturated_force_are_excluded_from_linearisation():
         dataclasses.replace(sim, field=field)
         for field in (sim.field.limited(8.0), hvf.Follow(CURVE, k_r=300.0, b_d=8.0).limited(0.5) + plane)
     )
-    free, less, part = (hvf.certify(of, NO_HANDS).stability for of in (sim, cut, in_part))
-    whole, judged = (int(re.findall(r"grows at (\d+) states", told.reason)[0]) for told in (free, less))
+    free, less, part = (hvf.certify(variant, NO_HANDS).stability for variant in (sim, cut, in_part))
+    whole, judged = (int(re.findall(r"grows at (\d+) states", verdict.reason)[0]) for verdict in (free, less))
     assert less.verdict == "certified"
     assert judged < whole
     # Where a part of the field alone is cut, the plane acts without the damping of the river.
@@ -268,7 +268,7 @@ def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
 
 
 @pytest.mark.parametrize(
-    ("function", "says"),
+    ("function", "message"),
     [
         (_boom, r"law _boom \(.*\) raised ValueError: boom"),
         (lambda hand: (1.0, 2.0), r"numbers of shape \(2,\)"),
@@ -277,8 +277,8 @@ def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
         (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
     ],
 )
-def test_law_that_raises_or_returns_wrong_shape_is_named_in_the_error(function, says):
-    with pytest.raises(ParameterError, match=says):
+def test_law_that_raises_or_returns_wrong_shape_is_named_in_the_error(function, message):
+    with pytest.raises(ParameterError, match=message):
         stability(function)
 
 
@@ -289,18 +289,18 @@ def test_reasons_contain_no_library_paths():
 
 @pytest.mark.parametrize("delay", [1, 1000])  # less and more than the hands at which a law is looked at
 def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
-    kept = [0.0] * delay
+    queue = [0.0] * delay
 
     @hvf.law
-    def late(hand, k=50.0):
-        kept.append(hand.p[2])
-        return 0.0, 0.0, -k * kept.pop(0)
+    def delayed(hand, k=50.0):
+        queue.append(hand.p[2])
+        return 0.0, 0.0, -k * queue.pop(0)
 
-    sim, said = simulation(late), "another force when it is asked again|keeps numbers of the hand between calls"
+    sim, message = simulation(delayed), "another force when it is asked again|keeps numbers of the hand between calls"
     for _ in range(2):
         found = hvf.certify(sim).stability
         assert found.verdict == "unknown"
-        assert re.search(said, found.reason), found.reason
+        assert re.search(message, found.reason), found.reason
 
 
 def test_law_that_stores_a_symbol_is_reported_as_stateful() -> None:

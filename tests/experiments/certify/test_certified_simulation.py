@@ -28,7 +28,11 @@ def test_verdict_includes_the_governor_of_the_simulation():
         hvf.certify(simulation(law), NO_HANDS)
         for law in (field, field + Governor(CIRCLE, speeds, 8.0), field + Governor(CIRCLE, speeds, 200.0))
     )
-    assert [it.stability.verdict for it in (plain, soft, hard)] == ["certified", "certified", "refuted"]
+    assert [certificate.stability.verdict for certificate in (plain, soft, hard)] == [
+        "certified",
+        "certified",
+        "refuted",
+    ]
     assert len({plain.inputs_hash, soft.inputs_hash, hard.inputs_hash}) == 3
 
 
@@ -47,7 +51,7 @@ def test_uncovered_law_is_unknown_and_named():
 CURVE = hvf.circle(lap=2.0)
 
 
-def cheering(field: hvf.Law) -> hvf.Simulation:
+def cheer_simulation(field: hvf.Law) -> hvf.Simulation:
     return hvf.Simulation(field=field, haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=CURVE))
 
 
@@ -58,14 +62,14 @@ def level(hand, k=50.0):
 
 @pytest.mark.slow
 def test_certificate_covers_the_composed_field() -> None:
-    alone = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8)))
-    both = hvf.certify(cheering((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)))
-    stiff = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8) + level(k=60000.0)))
-    assert (alone.stability.verdict, both.stability.verdict) == ("certified", "certified")
-    assert any("8 N" in assumed for assumed in both.stability.assumptions)
+    alone = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8)))
+    composed = hvf.certify(cheer_simulation((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)))
+    stiff = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + level(k=60000.0)))
+    assert (alone.stability.verdict, composed.stability.verdict) == ("certified", "certified")
+    assert any("8 N" in assumed for assumed in composed.stability.assumptions)
     # Sixty newtons for a millimetre are far above what the loop bears, though FOLLOW's own gain is low.
     assert stiff.stability.verdict == "refuted"
-    assert len({c.inputs_hash for c in (alone, both, stiff)}) == 3
+    assert len({c.inputs_hash for c in (alone, composed, stiff)}) == 3
 
 
 @hvf.law
@@ -74,8 +78,10 @@ def soft_floor(hand, k=500.0):
 
 
 def test_nonlinear_or_gated_law_is_unknown_and_named() -> None:
-    curved = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8) + soft_floor)).stability
-    gated = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8).gated(hvf.Weight.ball((0, 0, 0), 1.0)))).stability
+    curved = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + soft_floor)).stability
+    gated = hvf.certify(
+        cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8).gated(hvf.Weight.ball((0, 0, 0), 1.0)))
+    ).stability
     assert (curved.verdict, gated.verdict) == ("unknown", "unknown")
     assert "law soft_floor" in curved.reason
     assert "has cases whose force is not linear" in curved.reason
@@ -103,22 +109,22 @@ def with_moment(hand, k=100.0):
 
 
 @pytest.mark.parametrize(
-    ("own", "says"),
+    ("law", "message"),
     [
         (of_time, "depends on the time of the hand"),
         (of_turn, "depends on the orientation and the angular velocity of the hand"),
         (of_switch, "depends on the switch of the hand"),
     ],
 )
-def test_law_of_time_orientation_or_switch_is_not_certified(own: hvf.Law, says: str) -> None:
-    found = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8) + own), NO_HANDS)
+def test_law_of_time_orientation_or_switch_is_not_certified(law: hvf.Law, message: str) -> None:
+    found = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + law), NO_HANDS)
     assert found.stability.verdict in ("unknown", "refuted")
-    assert f"the force of law {own.name} " in found.stability.reason
-    assert says in found.stability.reason
+    assert f"the force of law {law.name} " in found.stability.reason
+    assert message in found.stability.reason
     assert found.passivity.verdict == "unknown"
 
 
 def test_moment_of_own_law_is_listed_as_an_assumption() -> None:
-    told = hvf.certify(cheering(hvf.Follow(CURVE, k_r=300, b_d=8) + with_moment), NO_HANDS).stability
-    assert told.verdict == "certified"
-    assert any("moment on the stylus is not felt" in assumed for assumed in told.assumptions)
+    stability = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + with_moment), NO_HANDS).stability
+    assert stability.verdict == "certified"
+    assert any("moment on the stylus is not felt" in assumed for assumed in stability.assumptions)

@@ -42,10 +42,10 @@ def folder(tmp_path_factory):
 
 @pytest.mark.slow
 def test_demo_river_is_certified_and_reported(folder):
-    held = json.loads((folder / CERTIFICATE).read_text())
-    assert held["stability"]["verdict"] == "certified"
-    assert held["energy"]["verdict"] == "certified"
-    assert held["passivity"]["verdict"] == "refuted"
+    certificate = json.loads((folder / CERTIFICATE).read_text())
+    assert certificate["stability"]["verdict"] == "certified"
+    assert certificate["energy"]["verdict"] == "certified"
+    assert certificate["passivity"]["verdict"] == "refuted"
     page = (folder / PAGE).read_text()
     assert "stability: " in page
     assert "<script" not in page
@@ -63,7 +63,7 @@ def test_certificate_with_same_inputs_is_reused(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "changed_part"),
     [
         ({"stiffness": 301.0}, "gains"),
         ({"damping": 4.1}, "gains"),
@@ -75,10 +75,10 @@ def test_certificate_with_same_inputs_is_reused(folder):
         ({"cutoff": 149.0}, "filter"),
     ],
 )
-def test_changed_field_parameter_invalidates_certificate(folder, change, said):
+def test_changed_field_parameter_invalidates_certificate(folder, change, changed_part):
     file = folder / CERTIFICATE
     verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
-    with pytest.raises(CertificateError, match=f"changed: {said}; certify again"):
+    with pytest.raises(CertificateError, match=f"changed: {changed_part}; certify again"):
         verify_certificate(file, certificate_inputs(run_config(**change), 0.0, HANDS, 1.0))
 
 
@@ -128,7 +128,7 @@ def test_invalid_hand_intervals_are_refused_in_one_line(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("arguments", "message"),
     [
         (
             "runs/demo --stiffness 500",
@@ -146,9 +146,9 @@ def test_invalid_hand_intervals_are_refused_in_one_line(tmp_path, capsys):
         ("--tolerance.yaw 1", "--tolerance.yaw has no meaning with a field alone; it belongs to clips"),
     ],
 )
-def test_options_irrelevant_to_the_certificate_are_refused_by_name(asked, said, tmp_path, capsys):
-    assert main(["certify", *asked.split(), "--out", str(tmp_path / "out")]) == 2
-    assert f"hvf: {said}" in capsys.readouterr().err
+def test_options_irrelevant_to_the_certificate_are_refused_by_name(arguments, message, tmp_path, capsys):
+    assert main(["certify", *arguments.split(), "--out", str(tmp_path / "out")]) == 2
+    assert f"hvf: {message}" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -191,11 +191,11 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     written = (out / CERTIFICATE).stat().st_mtime_ns
     assert main(clip) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
-    check = ["certify", "--verify", str(out / CERTIFICATE), "--clip"]
-    assert main([*check, "jump"]) == 0
-    assert main([*check, "jump", "--friction", "0.5"]) == 1
+    verify = ["certify", "--verify", str(out / CERTIFICATE), "--clip"]
+    assert main([*verify, "jump"]) == 0
+    assert main([*verify, "jump", "--friction", "0.5"]) == 1
     assert "changed: judging;" in capsys.readouterr().err
-    assert main([*check, "walk"]) == 1
+    assert main([*verify, "walk"]) == 1
     assert "changed: clip;" in capsys.readouterr().err
     other = [*clip, "--tolerance.gravity", "9.0", "9.81001"]
     assert main(other) == 2
@@ -203,7 +203,7 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
     assert main([*other, "--overwrite"]) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns != written
-    assert main([*check, "jump"]) == 1
+    assert main([*verify, "jump"]) == 1
     assert "changed: judging;" in capsys.readouterr().err
     assert main([*clip, "--friction", "0"]) == 2
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err

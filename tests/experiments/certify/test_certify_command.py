@@ -14,8 +14,8 @@ def test_certificate_of_other_inputs_is_replaced_only_with_overwrite(
     monkeypatch.chdir(tmp_path)
     assert main(["certify", "--clip", "walk", "--out", "here"]) == 0
     before = Path("here/certificate.json").read_bytes()
-    said = refused(["certify", "--clip", "walk", "--friction", "0.5", "--out", "here"], capsys)
-    assert said == "hvf: here: holds a certificate of something else; choose another --out, or --overwrite it\n"
+    stderr = refused(["certify", "--clip", "walk", "--friction", "0.5", "--out", "here"], capsys)
+    assert stderr == "hvf: here: holds a certificate of something else; choose another --out, or --overwrite it\n"
     assert Path("here/certificate.json").read_bytes() == before
     assert main(["certify", "--clip", "walk", "--friction", "0.5", "--out", "here", "--overwrite"]) == 0
     assert Path("here/certificate.json").read_bytes() != before

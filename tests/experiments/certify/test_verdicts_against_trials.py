@@ -26,12 +26,12 @@ from experiments.cli import main
 from models.mocap.library import embedded
 
 CIRCLE = Trajectory.circle(0.0477, 4.0)
-STILL = Trajectory.circle(0.0477, LAP)
+TRIAL_CURVE = Trajectory.circle(0.0477, LAP)
 DEVICE = phantom_device()
 
 
 # Encoders that round would show accelerations in the path that nothing has.
-RUBBING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
+WITH_FRICTION = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
 
 
 def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
@@ -73,36 +73,37 @@ def _soft(hand):
 
 SPEEDS = np.tile([0.05, 0.1], (8, 1))
 LAWS = {
-    "follow": (Follow(STILL, 300.0, 8.0, 0.25), lambda: governed_stability(river(), 0.0, [HandImpedance()])),
+    "follow": (Follow(TRIAL_CURVE, 300.0, 8.0, 0.25), lambda: governed_stability(river(), 0.0, [HandImpedance()])),
     "follow, too stiff": (
-        Follow(STILL, 12_000.0, 8.0, 0.25), lambda: governed_stability(river(k_r=12_000.0), 0.0, [HandImpedance()]),
+        Follow(TRIAL_CURVE, 12_000.0, 8.0, 0.25),
+        lambda: governed_stability(river(k_r=12_000.0), 0.0, [HandImpedance()]),
     ),
     "bunny": (
-        Bunny(STILL, 300.0, 8.0, 0.05, pace="wait"),
+        Bunny(TRIAL_CURVE, 300.0, 8.0, 0.05, pace="wait"),
         lambda: governed_stability(river(BUNNY_LAW, width=0.05), 0.0, [HandImpedance()]),
     ),
     "seek": (
-        StretchyTubes(STILL, 150.0, 150.0, 14.0, width=STILL.duration / 8.0),
+        StretchyTubes(TRIAL_CURVE, 150.0, 150.0, 14.0, width=TRIAL_CURVE.duration / 8.0),
         lambda: governed_stability(river(SEEK_LAW, 150.0, 14.0, np.inf), 0.0, [HandImpedance()]),
     ),
     "seek, too damped": (
-        StretchyTubes(STILL, 150.0, 150.0, 120.0, width=STILL.duration / 8.0),
+        StretchyTubes(TRIAL_CURVE, 150.0, 150.0, 120.0, width=TRIAL_CURVE.duration / 8.0),
         lambda: governed_stability(river(SEEK_LAW, 150.0, 120.0, np.inf), 0.0, [HandImpedance()]),
     ),
     "governor": (
-        Follow(STILL, 300.0, 8.0, 0.25) + Governor(STILL, SPEEDS, 8.0),
+        Follow(TRIAL_CURVE, 300.0, 8.0, 0.25) + Governor(TRIAL_CURVE, SPEEDS, 8.0),
         lambda: governed_stability(river(), 8.0, [HandImpedance()]),
     ),
     "governor that shakes": (
-        Follow(STILL, 300.0, 8.0, 0.25) + Governor(STILL, SPEEDS, 200.0),
+        Follow(TRIAL_CURVE, 300.0, 8.0, 0.25) + Governor(TRIAL_CURVE, SPEEDS, 200.0),
         lambda: governed_stability(river(), 200.0, [HandImpedance()]),
     ),
     "own law": (
-        Follow(STILL, 300.0, 8.0, 0.25) + CompiledLaw(_soft, {}),
+        Follow(TRIAL_CURVE, 300.0, 8.0, 0.25) + CompiledLaw(_soft, {}),
         lambda: hvf.certify(simulation(Follow(CIRCLE, 300.0, 8.0, 0.25) + CompiledLaw(_soft, {})), NO_HANDS).stability,
     ),
     "own law that shakes": (
-        Follow(STILL, 300.0, 8.0, 0.25) + CompiledLaw(_push_away, {}),
+        Follow(TRIAL_CURVE, 300.0, 8.0, 0.25) + CompiledLaw(_push_away, {}),
         lambda: (
             hvf.certify(simulation(Follow(CIRCLE, 300.0, 8.0, 0.25) + CompiledLaw(_push_away, {})), NO_HANDS).stability
         ),
@@ -116,19 +117,19 @@ def test_trials_oscillate_exactly_where_refuted(name):
     law, certify = LAWS[name]
     found = certify()
     verdict, example = found.verdict, found.counterexample
-    rng, shook = np.random.default_rng(20), 0
+    rng, oscillating = np.random.default_rng(20), 0
     for _ in range(20):
         # Refuted is a place, the counterexample's; certified is every place.
         phase, across = rng.uniform(0.0, LAP), np.array([0.0, 0.0, 1.0])
         phase = float(example["phase"]) * LAP / 4.0 if example else phase
-        trial = LawTrial(STILL, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
+        trial = LawTrial(TRIAL_CURVE, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
         loop = trial.loop()
         inverse, state = np.linalg.inv(loop.linear.jacobian[0]), np.zeros(12)
         state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.05, size=3)
         state[6:9], state[9:12] = state[:3], state[3:6]
-        path = simulate(trial, 300.0, 400, RUBBING, state)
+        path = simulate(trial, 300.0, 400, WITH_FRICTION, state)
         # Acceleration of the last fifth: a hand that is carried or rests has little of it.
         fast = np.linalg.norm(np.diff(path[-80:], 2, axis=0), axis=1) / 1e-6
-        shook += len(path) < 400 or float(np.median(fast)) > 5.0
+        oscillating += len(path) < 400 or float(np.median(fast)) > 5.0
     assert verdict in ("certified", "refuted")
-    assert shook == 0 if verdict == "certified" else shook >= 18, (verdict, shook)
+    assert oscillating == 0 if verdict == "certified" else oscillating >= 18, (verdict, oscillating)

@@ -15,7 +15,7 @@ from experiments.hardware.parts import served
 
 
 @pytest.mark.parametrize(
-    ("numbers", "says"),
+    ("numbers", "message"),
     [
         ({"kind": "none", "residual_force": 0.1},
          "--residual-force 0.1 has no meaning with --figure none; it belongs to --figure physical"),
@@ -25,11 +25,11 @@ from experiments.hardware.parts import served
          "--blend 0.1 has no meaning with --figure none; it belongs to --figure physical, kinematic"),
     ],
 )  # fmt: skip
-def test_figure_number_inapplicable_to_its_kind_is_refused(numbers: dict[str, Any], says: str) -> None:
-    with pytest.raises(ParameterError, match=f"^{keywords(says, figure='kind')}$") as error:
+def test_figure_number_inapplicable_to_its_kind_is_refused(numbers: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{keywords(message, figure='kind')}$") as error:
         Figure(**numbers)
-    assert in_options(error.value) == says
-    with pytest.raises(ParameterError, match=f"^a file: {keywords(says)}$"):
+    assert in_options(error.value) == message
+    with pytest.raises(ParameterError, match=f"^a file: {keywords(message)}$"):
         from_dict(RunConfig, to_dict(RunConfig()) | {"figure": numbers}, "a file")
 
 
@@ -52,13 +52,13 @@ def test_inapplicable_figure_option_is_refused_even_at_its_default(figure: Any, 
 
 
 def test_file_omits_inapplicable_numbers_and_may_contain_their_defaults() -> None:
-    held = to_dict(run_config(figure="none"))
-    assert held["figure"] == json.loads(to_json(run_config(figure="none")))["figure"] == {"kind": "none"}
+    values = to_dict(run_config(figure="none"))
+    assert values["figure"] == json.loads(to_json(run_config(figure="none")))["figure"] == {"kind": "none"}
     assert repr(Figure(kind="none")) == "Figure(kind='none')"
     kinematic = to_dict(run_config(figure="kinematic"))["figure"]
     assert kinematic == {"kind": "kinematic"} | {name: FIGURE_DEFAULTS[name] for name in (
         "stature", "smoothing", "figure_ticks", "blend")}  # fmt: skip
-    whole = held | {"figure": dict(FIGURE_DEFAULTS) | {"kind": "none"}}
+    whole = values | {"figure": dict(FIGURE_DEFAULTS) | {"kind": "none"}}
     assert from_dict(RunConfig, whole, "a recording") == run_config(figure="none")
 
 

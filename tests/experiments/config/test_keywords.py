@@ -23,7 +23,7 @@ SIM = hvf.Simulation(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("--wall-margin is 3 rad", "wall_margin is 3 rad"),
         ("expected --lap 1.1 or more, or --bump 0.24.", "expected lap=1.1 or more, or bump=0.24."),
@@ -38,8 +38,8 @@ SIM = hvf.Simulation(
         ("0.4 m --> 0.5 m", "0.4 m --> 0.5 m"),
     ],
 )
-def test_option_in_message_becomes_keyword(text: str, said: str) -> None:
-    assert keywords(text, out="record") == said
+def test_option_in_message_becomes_keyword(text: str, message: str) -> None:
+    assert keywords(text, out="record") == message
 
 
 def test_error_type_and_traceback_are_preserved() -> None:
@@ -70,12 +70,12 @@ NAN, DESIGN = float("nan"), {"name": "s", "factors": {"stiffness": [100.0, 300.0
 PUSH = hvf.Push(0.0, 1.0, 1.0)
 
 
-def meant(**does: Any) -> Any:
+def person_session(**does: Any) -> Any:
     return replace(SIM, user=hvf.User(person=hvf.Person(), **does)).session(1.0)
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: hvf.Figure(stature=-1.0), "stature is -1; expected more than 0 m, and finite"),
         (lambda: hvf.Figure(kind="ghost"), "kind is 'ghost'; expected 'physical', 'kinematic' or 'none'"),  # pyright: ignore
@@ -122,7 +122,7 @@ def meant(**does: Any) -> Any:
         (lambda: hvf.sweep(SIM, {"field.k_r": [200, -1]}), "k_r must be finite and at least 0 N/m, got -1"),
         (lambda: hvf.sweep(SIM, {3: [1]}), "a path of values is 3; expected text"),  # pyright: ignore
         (lambda: hvf.sweep(SIM, {"seed": [1]}, seconds=NAN), "a run of nan s; expected 0.004 s or more, and finite"),
-        (lambda: meant(intent=hvf.intents.Trace(), pushes=[PUSH]), "expected an intent or pushes, not both"),
+        (lambda: person_session(intent=hvf.intents.Trace(), pushes=[PUSH]), "expected an intent or pushes, not both"),
         (lambda: hvf.Search(journal=""), "journal is empty; expected a path"),
         (lambda: hvf.tune(SIM, SPACE, lambda: 1.0), "cost is <lambda>(); expected a function of a run"),  # pyright: ignore
         (lambda: hvf.tune(SIM, {"field.k_r": (-5.0, 90.0)}, len), "k_r must be finite and at least 0 N/m, got -5"),  # pyright: ignore
@@ -131,12 +131,12 @@ def meant(**does: Any) -> Any:
     ],
 )  # fmt: skip
 def test_messages_of_public_interface_name_keywords(
-    make: Callable[[], Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make: Callable[[], Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises((hvf.ControllerError, hvf.ModelError, hvf.SimError)) as error:
         make()
-    assert said in str(error.value)
+    assert message in str(error.value)
     assert "--" not in str(error.value)
     assert "\n" not in str(error.value)
     assert not list(tmp_path.iterdir())
@@ -145,8 +145,8 @@ def test_messages_of_public_interface_name_keywords(
 @pytest.mark.parametrize("wrong", ["x", True, None])
 def test_non_numeric_cost_is_refused_with_its_values(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
-    said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
-    with pytest.raises(hvf.ParameterError, match=said):
+    message = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
+    with pytest.raises(hvf.ParameterError, match=message):
         hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 
 
@@ -160,7 +160,7 @@ def test_messages_use_keywords_in_python_and_options_on_the_command_line(
             begin()
     assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(tmp_path)]) == 2
     assert "choose another --out, or --overwrite it" in capsys.readouterr().err
-    for given, said in (
+    for keyword_arguments, message in (
         ({"foo": 3}, "^foo is not known; there are "),
         (
             {"figure": "none", "smoothing": 6.0},
@@ -169,8 +169,8 @@ def test_messages_use_keywords_in_python_and_options_on_the_command_line(
         ({"mode": "lead", "clips": ["walk", "run"]}, "expected clips of one, such as walk or run$"),
         ({"stiffness": -1.0}, "^stiffness is -1; expected 0 N/m or more"),
     ):
-        with pytest.raises(hvf.ParameterError, match=said):
-            hvf.run(**given)
+        with pytest.raises(hvf.ParameterError, match=message):
+            hvf.run(**keyword_arguments)
     with pytest.raises(hvf.ParameterError, match=r"^--foo is not known; there are "):
         run_config(foo=3)
     with pytest.raises(hvf.ParameterError, match=r"got 0; expected so many clips$"):
@@ -188,8 +188,8 @@ def test_warning_of_infeasible_capture_names_keywords(monkeypatch: pytest.Monkey
         feasible, remarks, clip = False, ("not feasible; --raw takes the capture as it is",), SIM
 
     monkeypatch.setattr("experiments.public.prepared_clips", lambda *given: (Found(),))
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         hvf.load("mine.bvh")
-    assert [str(one.message) for one in said] == ["not feasible; raw takes the capture as it is"]
-    assert said[0].filename == __file__
+    assert [str(one.message) for one in caught] == ["not feasible; raw takes the capture as it is"]
+    assert caught[0].filename == __file__

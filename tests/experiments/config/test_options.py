@@ -128,7 +128,7 @@ def test_number_outside_its_interval_is_refused_by_name(cls: type, name: str) ->
 
 
 def test_message_says_what_is_expected() -> None:
-    for options, said in (
+    for options, message in (
         (lambda: Outer(wide_gap=0.4), "wide_gap is 0.4; expected 0.5 s or more, and finite"),
         (lambda: Outer(wide_gap=nan), "wide_gap is nan; expected 0.5 s or more, and finite"),
         (lambda: Outer(reach=0.0), "reach is 0; expected 1 or more"),
@@ -142,7 +142,7 @@ def test_message_says_what_is_expected() -> None:
     ):  # fmt: skip
         with pytest.raises(ParameterError) as error:
             options()
-        assert str(error.value) == said
+        assert str(error.value) == message
     assert Outer(wide_gap=0.5, reach=inf).wide_gap == 0.5
 
 
@@ -163,7 +163,7 @@ def test_seed_beyond_int64_is_refused(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"stifness": 3.0}, "--stifness is not known; there are "),
         ({"river_stiffness": 3.0}, "--river-stiffness is not known; there are "),
@@ -189,10 +189,10 @@ def test_seed_beyond_int64_is_refused(seed: int) -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_unknown_or_inapplicable_word_is_refused_with_its_place(words: dict[str, Any], said: str) -> None:
+def test_unknown_or_inapplicable_word_is_refused_with_its_place(words: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError) as error:
         run_config(**words)
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_lead_mode_and_led_map_require_each_other() -> None:
@@ -217,21 +217,21 @@ def _every_config() -> list[RunConfig]:
         Stretch(), Stretch(seek=0.0, tube_damping=3.0, walls=JointWalls(wall_margin=0.05)),
         StretchThenFollow(), StretchThenFollow(seek=70.0, bump=0.3, stiffness=200.0),
     )  # fmt: skip
-    made = [RunConfig(mode=mode, map=h_map) for mode in modes for h_map in maps]
-    made += [
+    configs = [RunConfig(mode=mode, map=h_map) for mode in modes for h_map in maps]
+    configs += [
         RunConfig(mode=mode, user=replace(user, does=does, grabs=() if does == "trace" else user.grabs))
         for mode in modes
         for does in ("trace", "push", "turn")
     ]
-    made += [RunConfig(mode=lead, map=Led(clips=clips), user=User(does="lead"))
+    configs += [RunConfig(mode=lead, map=Led(clips=clips), user=User(does="lead"))
              for lead, clips in ((Lead(), ("walk",)), (Lead(leash=90.0, floor_scale=70.0), ("run",)))]  # fmt: skip
     arm, by_arm = RobotArm(around=Circle(lap=3.0), reach=0.02, scale=1.2), Figure(smoothing=5.0, figure_ticks=4)
-    made += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
-    made.append(RunConfig(
+    configs += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
+    configs.append(RunConfig(
         figure=Figure(stature=1.6, mass=60.0, smoothing=5.0, figure_ticks=4, blend=0.0), device=Phantom(cutoff=99.0),
         clock=Clock(servo_period=2e-3, physics_step=5e-4), seconds=3.0, seed=2**63 - 1,
     ))  # fmt: skip
-    return made
+    return configs
 
 
 @pytest.mark.parametrize("config", _every_config(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
@@ -244,13 +244,13 @@ def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> 
 
 
 def test_round_trip_cases_cover_every_mode_and_map() -> None:
-    made = _every_config()
-    assert {type(config.mode) for config in made} == set(MODES)
-    assert {type(config.map) for config in made} == {*MAPS, Led}
+    configs = _every_config()
+    assert {type(config.mode) for config in configs} == set(MODES)
+    assert {type(config.map) for config in configs} == {*MAPS, Led}
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ('"stiffness"', '"stifness"', "mode.follow.stifness is not known; expected some of kind, stiffness, damping"),
         ('"lap"', '"lab"', "map.cylindrical.around.lab is not known; expected some of lap, radius"),
@@ -266,14 +266,14 @@ def test_round_trip_cases_cover_every_mode_and_map() -> None:
         ("{", "", "is not JSON"),
     ],
 )
-def test_error_in_configuration_file_names_file_and_key(old: str, new: str, said: str, tmp_path) -> None:
+def test_error_in_configuration_file_names_file_and_key(old: str, new: str, message: str, tmp_path) -> None:
     path, text = tmp_path / "my.json", to_json(run_config())
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ParameterError) as error:
         load_config(path)
     assert str(error.value).startswith(f"{path}: ")
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_missing_configuration_file_is_named(tmp_path) -> None:
@@ -328,8 +328,8 @@ def test_run_refuses_a_file_with_a_misspelt_key_in_one_line(tmp_path, capsys) ->
     path = tmp_path / "typo.json"
     path.write_text(to_json(run_config()).replace("stiffness", "stifness"), encoding="utf-8")
     assert main(["run", "--config", str(path), "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"hvf: {path}: mode.follow.stifness is not known; expected some of kind, stiffness, ")
+    stderr = capsys.readouterr().err
+    assert stderr.startswith(f"hvf: {path}: mode.follow.stifness is not known; expected some of kind, stiffness, ")
     assert not (tmp_path / "run").exists()
 
 
@@ -341,7 +341,7 @@ def test_leading_hand_outside_lead_mode_is_refused(mode: str, map: str, does: st
 
 
 @pytest.mark.parametrize(
-    ("does", "actions", "says"),
+    ("does", "actions", "message"),
     [
         ("lead", {"pushes": PUSHES}, "a hand that leads follows its own path; leave out its pushes"),
         ("trace", {"person": persona("median"), "pushes": PUSHES}, "a person either pushes or has the intent 'trace'"),
@@ -349,8 +349,8 @@ def test_leading_hand_outside_lead_mode_is_refused(mode: str, map: str, does: st
         ("trace", {"grabs": GRABS}, 'a hand that traces cannot grab; choose user="relaxed", push or turn'),
     ],
 )
-def test_contradictory_hand_actions_are_refused(does: str, actions: dict[str, Any], says: str) -> None:
-    with pytest.raises(ParameterError, match=says):
+def test_contradictory_hand_actions_are_refused(does: str, actions: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         User(does=does, **actions)  # pyright: ignore[reportArgumentType]
 
 

@@ -37,7 +37,7 @@ def test_default_user_has_no_person() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"person": "nobody"}, "median, expert"),
         ({"user": "exaggerate"}, "add a person"),
@@ -45,8 +45,8 @@ def test_default_user_has_no_person() -> None:
         ({"user": "fly", "person": "median"}, "no user"),
     ],
 )
-def test_inapplicable_person_options_are_refused(words: dict[str, object], said: str) -> None:
-    with pytest.raises((ParameterError, SimError), match=said):
+def test_inapplicable_person_options_are_refused(words: dict[str, object], message: str) -> None:
+    with pytest.raises((ParameterError, SimError), match=message):
         run_config(**words)  # pyright: ignore[reportArgumentType]
 
 
@@ -56,10 +56,10 @@ def test_invalid_person_number_in_file_is_refused_in_one_line(
     text = to_json(run_config(person="median")).replace('"visual_delay": 0.2', '"visual_delay": -0.2')
     (tmp_path / "config.json").write_text(text)
     assert main(["run", "--config", str(tmp_path / "config.json"), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert "visual_delay" in said
-    assert "expected 0.15 to 0.25 s" in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert "visual_delay" in stderr
+    assert "expected 0.15 to 0.25 s" in stderr
+    assert stderr.count("\n") == 1
 
 
 def test_user_actions_map_to_person_intents() -> None:

@@ -25,7 +25,7 @@ PLACES = [
 ]
 
 
-def _made(cls: Any, **values: object) -> Any:
+def _part(cls: Any, **values: object) -> Any:
     return cls(**NEEDED.get(cls, {}), **values)
 
 
@@ -35,22 +35,22 @@ def test_text_and_booleans_are_not_accepted_as_numbers(cls: Any, name: str) -> N
     right = max(1, *(math.ceil(bound) for bound in bounds if bound is not None), 0)
     for wrong in (True, np.True_, "1", str(right), ""):
         with pytest.raises(ParameterError, match=rf"^{name} is {re.escape(repr(wrong))}; expected a number$"):
-            _made(cls, **{name: wrong})
+            _part(cls, **{name: wrong})
     most = min((bound.le for bound in cls.__pydantic_fields__[name].metadata if hasattr(bound, "le")), default=right)
     for number in (right, np.int64(right), float(right), np.float32(right)) if right <= most else (most,):
-        assert getattr(_made(cls, **{name: number}), name) == number
+        assert getattr(_part(cls, **{name: number}), name) == number
 
 
 @pytest.mark.parametrize("wrong", [0, 1, "yes", "true", 1.0])
 def test_switch_accepts_only_true_or_false(wrong: object) -> None:
     with pytest.raises(ParameterError, match=rf"^expressive is {wrong!r}; expected true or false$"):
-        _made(Cylindrical, expressive=wrong)
+        _part(Cylindrical, expressive=wrong)
     with pytest.raises(ParameterError, match=rf"^--walls is {wrong!r}; expected true or false$"):
         run_config(walls=wrong)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ('{"seconds": true}', "seconds is True; expected a number"),
         ('{"mode": {"kind": "rivers", "stiffness": "300"}}', "mode.rivers.stiffness is '300'; expected a number"),
@@ -59,16 +59,16 @@ def test_switch_accepts_only_true_or_false(wrong: object) -> None:
         ('{"user": {"person": {"age": true}}}', "user.person.age is True; expected a number"),
     ],
 )
-def test_wrong_type_in_file_is_named_by_its_path(text: str, said: str) -> None:
-    with pytest.raises(ParameterError, match=rf"^my\.json: {re.escape(said)}$"):
+def test_wrong_type_in_file_is_named_by_its_path(text: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=rf"^my\.json: {re.escape(message)}$"):
         from_json(RunConfig, text, "my.json")
 
 
 def test_integers_in_a_file_are_accepted_as_floats() -> None:
     text = '{"seconds": 3, "mode": {"kind": "follow", "stiffness": 200}, "figure": {"figure_ticks": 2.0}}'
-    made = from_json(RunConfig, text, "my.json")
-    assert made == run_config(seconds=3.0, stiffness=200.0)
-    assert made.figure == Figure()
+    config = from_json(RunConfig, text, "my.json")
+    assert config == run_config(seconds=3.0, stiffness=200.0)
+    assert config.figure == Figure()
 
 
 def test_non_numeric_study_and_tuning_values_are_refused() -> None:
@@ -89,7 +89,7 @@ def test_non_finite_range_bounds_are_refused(end: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"map": 3}, "--map is 3; expected a name"),
         ({"mode": ["follow"]}, "--mode is ['follow']; expected a name"),
@@ -99,6 +99,6 @@ def test_non_finite_range_bounds_are_refused(end: str, value: float) -> None:
     ],
     ids=str,
 )
-def test_name_options_accept_only_text_and_part_names_are_unknown(words: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError, match=f"^{re.escape(said)}"):
+def test_name_options_accept_only_text_and_part_names_are_unknown(words: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{re.escape(message)}"):
         run_config(**words)

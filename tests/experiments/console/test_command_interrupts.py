@@ -17,33 +17,33 @@ from experiments.trials.study import DATABASE
 from sim.recording.recording import Recording
 
 
-def _hear() -> None:
+def _default_interrupt() -> None:
     """A command that is begun in the background of a shell would not hear Ctrl-C."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def stopped(words: list[str], ready: Callable[[], bool], wait: float) -> str:
+def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: float) -> str:
     """Run a command, press Ctrl-C so long [s] after it is ready, and return what it says on stderr."""
     process = subprocess.Popen(
         [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-        start_new_session=True, preexec_fn=_hear,
+        start_new_session=True, preexec_fn=_default_interrupt,
     )  # fmt: skip
     deadline = time.monotonic() + 120.0
     while not ready() and time.monotonic() < deadline:
         time.sleep(0.1)
     time.sleep(wait)
     os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
-    assert process.returncode == 130, said
-    return said
+    stderr = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, stderr
+    return stderr
 
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Path) -> None:
     out = tmp_path / "run"
     words = ["run", "--figure", "none", "--seconds", "2000", "--out", str(out)]
-    said = stopped(words, (out / "run.h5").exists, wait=1.5)
-    assert f"hvf report {out}" in said.replace("\n", " ")
+    stderr = stderr_of_interrupted(words, (out / "run.h5").exists, wait=1.5)
+    assert f"hvf report {out}" in stderr.replace("\n", " ")
     with Recording(out / "run.h5") as recording:
         assert not recording.complete
         assert len(recording.channel("ticks", "t")) > 500
@@ -71,7 +71,7 @@ def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> N
     words = ["trials", str(tmp_path / "study.toml"), "--out", str(tmp_path / "study")]
     database = f"file:{tmp_path / 'study' / DATABASE}?mode=ro"
 
-    def kept() -> int:
+    def stored_trials() -> int:
         with (
             contextlib.suppress(sqlite3.OperationalError),
             sqlite3.connect(database, uri=True) as rows,
@@ -79,10 +79,10 @@ def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> N
             return rows.execute("select count(*) from trials").fetchone()[0]
         return 0
 
-    said = stopped(words, lambda: kept() > 0, wait=0.0)
-    assert "the same command goes on" in said
-    assert str(tmp_path / "study") in said
-    before = kept()
+    stderr = stderr_of_interrupted(words, lambda: stored_trials() > 0, wait=0.0)
+    assert "the same command goes on" in stderr
+    assert str(tmp_path / "study") in stderr
+    before = stored_trials()
     assert 0 < before < 96
     assert main(words) == 0
-    assert kept() == 96
+    assert stored_trials() == 96

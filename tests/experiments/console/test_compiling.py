@@ -20,7 +20,7 @@ from sim.errors import SimError
 TOYS = Path(__file__).parents[2] / "sim" / "compilation"
 
 
-class _Told(Exception):
+class _UnitsAnnounced(Exception):
     """Stops a wiring when it has said what it needs."""
 
 
@@ -29,7 +29,7 @@ def _names(units: tuple[Unit, ...]) -> list[str]:
 
 
 def _stop(units: tuple[Unit, ...]) -> None:
-    raise _Told(units)
+    raise _UnitsAnnounced(units)
 
 
 @pytest.fixture
@@ -52,27 +52,27 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
 def test_missing_units_are_compiled_in_parallel_and_reported_once(toys, capsys):
     assert missing_units((*toys, *toys)) == (toys[1], toys[0])
     compile_once(Console(), toys)
-    told = capsys.readouterr().out
-    assert "Compiling" in told
-    assert "2 of 2" in told
+    stdout = capsys.readouterr().out
+    assert "Compiling" in stdout
+    assert "2 of 2" in stdout
     assert missing_units(toys) == ()
     compile_once(Console(), toys)
     assert not capsys.readouterr().out
 
 
 def test_only_missing_units_are_compiled(toys):
-    done: list[Unit] = []
+    compiled: list[Unit] = []
     toys[0].load()
-    compile_units(toys, done.append)
-    assert done == [toys[1]]
+    compile_units(toys, compiled.append)
+    assert compiled == [toys[1]]
 
 
 @pytest.mark.slow
 def test_unit_that_fails_to_compile_stays_missing(toys):
-    done: list[Unit] = []
+    compiled: list[Unit] = []
     wrong = Unit(toys[0].module, "other", (types.float64, types.float64))
-    compile_units((wrong, toys[1]), done.append)
-    assert done == [toys[1]]
+    compile_units((wrong, toys[1]), compiled.append)
+    assert compiled == [toys[1]]
     assert missing_units((wrong, toys[1])) == (wrong,)
 
 
@@ -91,9 +91,9 @@ def test_unknown_unit_function_is_refused():
 
 
 def test_robot_arm_run_announces_its_units_before_wiring():
-    with pytest.raises(_Told) as told:
+    with pytest.raises(_UnitsAnnounced) as stopped:
         wire(run_config(map="robot-arm"), ready=_stop)
-    assert _names(told.value.args[0]) == [
+    assert _names(stopped.value.args[0]) == [
         "run_block", "update_reference", "robot_torque", "robot_arm_map", "follow_wrench", "_poses_along",
     ]  # fmt: skip
 
@@ -113,9 +113,9 @@ def test_robot_arm_run_announces_its_units_before_wiring():
     ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
 )
 def test_run_announces_its_units_before_wiring(config: RunConfig, more: list[str]):
-    with pytest.raises(_Told) as told:
+    with pytest.raises(_UnitsAnnounced) as stopped:
         wire(config, ready=_stop)
-    names = _names(told.value.args[0])
+    names = _names(stopped.value.args[0])
     update = "update_river_reference" if config.mode.kind == "rivers" else "update_reference"
     assert names[:3] == ["run_block", update, "figure_torque"]
     assert set(more) <= set(names)
@@ -124,7 +124,7 @@ def test_run_announces_its_units_before_wiring(config: RunConfig, more: list[str
 def test_modes_share_the_units_of_loop_and_figure():
     parts: list[tuple[Unit, ...]] = []
     for config in (run_config(), run_config(mode="bunny"), run_config(mode="lead")):
-        with pytest.raises(_Told) as told:
+        with pytest.raises(_UnitsAnnounced) as stopped:
             wire(config, ready=_stop)
-        parts.append(told.value.args[0][:3])
+        parts.append(stopped.value.args[0][:3])
     assert parts[0] == parts[1] == parts[2]

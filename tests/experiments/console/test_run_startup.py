@@ -49,9 +49,9 @@ def test_compilation_listener_reports_compiled_functions() -> None:
 
 def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
     """As a certificate does with the program of a run."""
-    for ran in (process(TELLS + _EVALUATES), process(TELLS + _EVALUATES)):
-        assert float(ran.stdout) > 0.0
-    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(ran)).split())
+    for completed in (process(TELLS + _EVALUATES), process(TELLS + _EVALUATES)):
+        assert float(completed.stdout) > 0.0
+    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(completed)).split())
 
 
 @pytest.fixture(scope="module")
@@ -67,9 +67,9 @@ def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> None:
-    ran = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
-    assert "The stylus ran" in ran.stdout
-    assert compiled(ran) == []
+    completed = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    assert "The stylus ran" in completed.stdout
+    assert compiled(completed) == []
 
 
 @pytest.mark.slow
@@ -80,17 +80,17 @@ def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> No
 )
 def test_run_compiles_nothing_in_its_own_process(arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path) -> None:
     given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
-    ran = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
-    assert "The stylus ran" in ran.stdout
-    assert compiled(ran) == []
+    completed = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
+    assert "The stylus ran" in completed.stdout
+    assert compiled(completed) == []
 
 
 @pytest.mark.slow
 def test_drawing_modules_are_not_imported_before_the_first_tick() -> None:
-    late = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
+    drawing = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
     code = (
         "import sys, experiments.cli, experiments.runs.run, experiments.setups.wiring; "
-        f"print([name for name in {late} if name in sys.modules])"
+        f"print([name for name in {drawing} if name in sys.modules])"
     )
-    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
-    assert told.strip() == "[]"
+    stdout = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert stdout.strip() == "[]"

@@ -6,8 +6,8 @@ from experiments.console.welcome import WELCOME
 
 def test_welcome_text_names_only_existing_commands(capsys) -> None:
     assert main([]) == 0
-    said = capsys.readouterr().out
-    assert said == WELCOME + "\n"
-    for line in said.splitlines():
+    stdout = capsys.readouterr().out
+    assert stdout == WELCOME + "\n"
+    for line in stdout.splitlines():
         if line.startswith("  hvf "):
             assert callable(parsed(line.strip().split("  ")[0].split()[1:])), line

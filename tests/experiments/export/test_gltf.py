@@ -132,16 +132,16 @@ def test_blender_reproduces_joint_positions_and_its_bvh_round_trips(tmp_path: Pa
     write_bvh(clip, paths[1])
     script = Path(__file__).with_name("in_blender.py")
     command = [BLENDER, str(script), *map(str, paths), str(clip.fps), str(FRAMES)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
     places = joints_of(clip)
-    seen = np.stack((places[..., 1], -places[..., 0], places[..., 2]), axis=-1)  # Blender's axes: facing −Y
-    with np.load(paths[2]) as there:
-        assert there["meshes"] >= 1
+    expected = np.stack((places[..., 1], -places[..., 0], places[..., 2]), axis=-1)  # Blender's axes: facing −Y
+    with np.load(paths[2]) as in_blender:
+        assert in_blender["meshes"] >= 1
         for kind in ("gltf", "bvh"):
             for k, segment in enumerate(SEGMENTS):
-                apart = np.linalg.norm(there[f"{kind} {segment.joint}"] - seen[:, k], axis=1)
-                assert apart.max() < 1e-3, (kind, segment.joint)
+                distance = np.linalg.norm(in_blender[f"{kind} {segment.joint}"] - expected[:, k], axis=1)
+                assert distance.max() < 1e-3, (kind, segment.joint)
     back = load(paths[3])
     assert back.report is None  # it is the figure's own skeleton, not another's
     difference = pose_difference(back.clip.poses, clip.poses)

@@ -46,7 +46,7 @@ def test_unknown_keys_are_refused_with_the_known_ones(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "entry", "says"),
+    ("name", "entry", "message"),
     [("coulomb", {"value": [0.01, 0.01]}, "coulomb.value has 2 numbers, not 3"),
      ("offset", {"value": [0, 0, 0], "margin": [1e-4, 1e-4]}, "offset.margin has 2 numbers, not 3"),
      ("delay", {"value": [1e-4, 1e-4]}, "delay.value has 2 numbers, not 1"),
@@ -55,5 +55,5 @@ def test_unknown_keys_are_refused_with_the_known_ones(tmp_path: Path) -> None:
      ("viscous", {"value": [True, 0, 0]}, "viscous.value True is not from"),
      ("offset", {"value": [0, 0, 0], "margin": [1e-4, -1e-4, 0]}, "offset.margin -0.0001 is not from 0 to inf")],
 )  # fmt: skip
-def test_implausible_device_numbers_are_refused(tmp_path: Path, name: str, entry: dict, says: str) -> None:
-    assert says in refusal(tmp_path / "device.json", **{name: entry})
+def test_implausible_device_numbers_are_refused(tmp_path: Path, name: str, entry: dict, message: str) -> None:
+    assert message in refusal(tmp_path / "device.json", **{name: entry})

@@ -66,9 +66,9 @@ def upper_body():
     return Cylindrical([*clips(), clips()[0]], R, Z, legs(), upper=(3, 4), legs_of=2).with_share(0.25)
 
 
-@pytest.mark.parametrize("made", [swaying, apart, lifted, upper_body])
-def test_map_round_trips_exactly_through_its_file(made, tmp_path):
-    haptic_map, path = made(), tmp_path / "map.npz"
+@pytest.mark.parametrize("make_map", [swaying, apart, lifted, upper_body])
+def test_map_round_trips_exactly_through_its_file(make_map, tmp_path):
+    haptic_map, path = make_map(), tmp_path / "map.npz"
     save_map(haptic_map, path)
     again = load_map(path)
     assert type(again) is type(haptic_map)
@@ -167,11 +167,11 @@ def test_map_file_is_certified_along_all_curves_with_its_clips(tmp_path, capsys)
     save_map(lifted(), path)
     command = ["certify", "--map", str(path), "--no-hand", "--json", "--out", str(tmp_path)]
     assert main(command) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {name for name in told if name.startswith("stability")} == {
+    result = json.loads(capsys.readouterr().out)
+    assert {name for name in result if name.startswith("stability")} == {
         "stability", "stability_a/b", "stability_../jump",
     }  # fmt: skip
-    assert told["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
+    assert result["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
     assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
     assert main([*command, "--curve", "a/b", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: curve;" in capsys.readouterr().err
@@ -189,10 +189,10 @@ def test_run_with_changed_map_file_is_not_reproduced(tmp_path, capsys):
         recorder.append("ticks", {"t": np.zeros(1)})
     save_map(swaying(), path)
     assert main(["reproduce", str(folder)]) == 2
-    told = capsys.readouterr().err
-    assert f"{path}: the map has changed since the run was recorded" in told
-    assert map_digest(path)[:12] in told
-    assert str(static["map_sha256"])[:12] in told
+    stderr = capsys.readouterr().err
+    assert f"{path}: the map has changed since the run was recorded" in stderr
+    assert map_digest(path)[:12] in stderr
+    assert str(static["map_sha256"])[:12] in stderr
     path.unlink()
     assert main(["reproduce", str(folder)]) == 2
     assert "No such file" in capsys.readouterr().err
@@ -207,6 +207,6 @@ def test_non_map_file_is_refused_without_mentioning_pickle(
         np.savez(path, version=np.array([1, None], dtype=object), kind="Lifted", keys=[])
     else:
         path.write_bytes(random.Random(1).randbytes(3000) if content == "noise" else b"hello")
-    said = refused(["run", "--map", str(path), "--out", str(tmp_path / "run")], capsys)
-    assert said.endswith("is no file of a map, or damaged; expected what hvf lift writes\n")
-    assert "pickle" not in said
+    stderr = refused(["run", "--map", str(path), "--out", str(tmp_path / "run")], capsys)
+    assert stderr.endswith("is no file of a map, or damaged; expected what hvf lift writes\n")
+    assert "pickle" not in stderr

@@ -23,10 +23,10 @@ from models.mocap.library import embedded
 def test_clips_that_turn_over_or_fly_are_reported() -> None:
     walk, jump, flip = embedded("walk"), embedded("jump"), embedded("backflip")
     assert not_blendable((walk, walk)) == not_blendable((flip, flip)) == ()
-    said = not_blendable((walk, flip, jump))
-    assert len(said) == 2
-    assert said[0].startswith("backflip turns over")
-    assert said[1].startswith("jump flies for 0.")
+    remarks = not_blendable((walk, flip, jump))
+    assert len(remarks) == 2
+    assert remarks[0].startswith("backflip turns over")
+    assert remarks[1].startswith("jump flies for 0.")
 
 
 def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
@@ -43,9 +43,9 @@ def test_lap_is_timed_by_the_first_grounded_clip() -> None:
     run, walk, cheer = embedded("run"), embedded("walk"), embedded("cheer")
     assert [grounded(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
     # At this lap the cheer is off its pace, so nothing but arms is blended, and each goes at its own.
-    made = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
-    assert made.haptic_map.legs_of == 1
-    assert not any("run at" in remark or "walk at" in remark for remark in made.remarks)
+    parts = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
+    assert parts.haptic_map.legs_of == 1
+    assert not any("run at" in remark or "walk at" in remark for remark in parts.remarks)
 
 
 def test_map_remarks_name_flying_and_off_pace_clips() -> None:
@@ -97,8 +97,10 @@ def test_lifted_map_remarks_name_clips_that_turn_over(tmp_path: Path) -> None:
     clips = [embedded(name) for name in ("walk", "backflip")]
     angles = [2.0 * np.pi * np.linspace(0.0, 1.0, clip.n_frames) for clip in clips]
     sites = np.tile([[0.045, 0.0], [0.055, 0.0]], (16, 1, 1))
-    made = Lifted([(clip.poses, clip.fps) for clip in clips], [True] * 2, angles, sites, names=["walk", "backflip"])
-    save_map(made, tmp_path / "map.npz")
+    haptic_map = Lifted(
+        [(clip.poses, clip.fps) for clip in clips], [True] * 2, angles, sites, names=["walk", "backflip"]
+    )
+    save_map(haptic_map, tmp_path / "map.npz")
     remarks = map_parts(run_config(map=str(tmp_path / "map.npz"), seconds=1.0), figure_model()).remarks
     assert any(remark.startswith("backflip turns over") for remark in remarks)
     assert not any("walk" in remark and "flies" in remark for remark in remarks)
@@ -109,13 +111,13 @@ def test_two_lap_period_scales_admissible_speeds_like_one_lap() -> None:
     for lap in (2.4, 1.2):
         config = run_config(map="rivers", mode="rivers", clips=("walk", "jump", "walk"), lap=lap, seconds=1.0)
         parts = map_parts(config, figure_model())
-        made = parts.haptic_map
-        assert isinstance(made, RiverClips)
-        assert made.laps == round(2.4 / lap)
-        speeds = speeds_along(parts, made.curves[1], 1)
+        haptic_map = parts.haptic_map
+        assert isinstance(haptic_map, RiverClips)
+        assert haptic_map.laps == round(2.4 / lap)
+        speeds = speeds_along(parts, haptic_map.curves[1], 1)
         # At the clip's own pace the hand is admitted; a flight bounds it from below.
         assert (speeds[:, 0].max() * lap, speeds[:, 1].min() * lap) == pytest.approx(
-            (1.03 * made.curves[1].length, 1.04 * made.curves[1].length), rel=0.02
+            (1.03 * haptic_map.curves[1].length, 1.04 * haptic_map.curves[1].length), rel=0.02
         )
         shares.append(np.mean(speeds[:, 0] > 0.0))
     # The flight lasts as long, of a lap half as long.

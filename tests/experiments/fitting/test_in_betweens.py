@@ -20,11 +20,11 @@ CONFIG = run_config(seconds=1.0)
 FIGURE_CLIPS = Cylindrical().clips
 STANDING = ("walk", "cheer", "angry", "squat_dance")
 STEPPING = (("walk", "run"), ("ginga", "walk"))
-ALIKE = (("cheer", "angry"), ("cheer", "ginga"))  # blended as a whole, legs and all
+SIMILAR = (("cheer", "angry"), ("cheer", "ginga"))  # blended as a whole, legs and all
 SLOWER = (("ginga", "cheer", "walk", "angry"), ("ginga", "walk", "run", "spin"))
 ROWS = 160
 MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
-MANY = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
+DENSE_MIXTURES = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
 
 
 @cache
@@ -71,14 +71,14 @@ def slide(places):
     return worst
 
 
-@pytest.mark.parametrize("clips", ALIKE)
+@pytest.mark.parametrize("clips", SIMILAR)
 def test_similar_clips_are_blended_including_legs(clips):
     assert map_of(clips).upper == ()
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *ALIKE, *SLOWER))])
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
 def test_in_between_feet_neither_slide_nor_sink(clips):
-    for r, z in MANY:
+    for r, z in DENSE_MIXTURES:
         places = soles(laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.02, (r, z)
         assert places[..., 2].min() > -0.007, (r, z)
@@ -96,8 +96,8 @@ def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
 
 
 # The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
-@pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
-def test_floor_can_provide_the_forces_of_in_betweens(clips, most, usual):
+@pytest.mark.parametrize(("clips", "max_share", "mean_share"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
+def test_floor_can_provide_the_forces_of_in_betweens(clips, max_share, mean_share):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
         poses = laps(map_of(clips), r, z, count=1.0 + 4 / ROWS)
@@ -107,5 +107,5 @@ def test_floor_can_provide_the_forces_of_in_betweens(clips, most, usual):
         left = residual(demand, floor.grip(demand, soles(q)[..., 2] < PUSHES))[:, :3] / floor.body_weight
         shares.append(float(np.sqrt((left**2).sum(axis=1).mean())))
     # Hicks et al. 2015: good below 5 %; where a walk has just begun to fade, a little more.
-    assert max(shares) < most
-    assert np.mean(shares) < usual
+    assert max(shares) < max_share
+    assert np.mean(shares) < mean_share

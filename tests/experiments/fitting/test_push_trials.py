@@ -27,24 +27,24 @@ def lifted() -> Lifted:
 
 def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
-    shown = push_trials.toured(lifted, curve, True).poses
+    pushed = push_trials.toured(lifted, curve, True).poses
     monkeypatch.setattr(push_trials, "_PUSHED", 0.0)
-    alone = push_trials.toured(lifted, curve, True).poses
-    apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
-    times = np.arange(len(shown)) / 120.0
-    assert apart[times < 1.69].max() < 1e-9
-    assert apart[(times > 2.1) & (times < 4.7)].min() > 1e-3
-    assert apart.max() > 0.05
+    unpushed = push_trials.toured(lifted, curve, True).poses
+    difference = np.abs(pose_difference(unpushed, pushed)[:, 6:]).max(axis=1)
+    times = np.arange(len(pushed)) / 120.0
+    assert difference[times < 1.69].max() < 1e-9
+    assert difference[(times > 2.1) & (times < 4.7)].min() > 1e-3
+    assert difference.max() > 0.05
 
 
 def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    late = np.arange(360) / 120.0 - push_trials._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
-    assert np.abs(late[:61]).max() < 1e-12
+    lateness = np.arange(360) / 120.0 - push_trials._slowed(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    assert np.abs(lateness[:61]).max() < 1e-12
     # On radii of 40 to 60 mm.
-    assert 8.0 / 68.0 < late[180] < 8.0 / 48.0
-    assert late[359] < late[240]
+    assert 8.0 / 68.0 < lateness[180] < 8.0 / 48.0
+    assert lateness[359] < lateness[240]
 
 
 FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
@@ -52,7 +52,7 @@ WHOLE = "pushed off its curve to those beside it, the physical figure {} with th
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "legs", "share", "said"),
+    ("verdicts", "legs", "share", "expected"),
     [
         ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
         ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE.format("falls at 3.0 s"),)),
@@ -72,7 +72,7 @@ WHOLE = "pushed off its curve to those beside it, the physical figure {} with th
     ],
 )  # fmt: skip
 def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
-    verdicts: dict[str | float, Verdict], legs: int | None, share: float, said: tuple[str, ...], lifted: Lifted,
+    verdicts: dict[str | float, Verdict], legs: int | None, share: float, expected: tuple[str, ...], lifted: Lifted,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     def tried(module: str, show: Callable[[], Lifted], *_: object) -> Verdict:
@@ -82,28 +82,28 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(push_trials, "tried", tried)
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: True)
-    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
-    assert (part.legs_of, part.share, told) == (legs, share, said)
+    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    assert (part.legs_of, part.share, remarks) == (legs, share, expected)
 
 
 def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(push_trials, "tried", lambda *_: Verdict(0.01, np.inf))
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
-    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
-    assert "feet skate" in told[0]
+    assert "feet skate" in remarks[0]
 
 
 def test_legs_of_pushed_figure_equal_its_own_clip(lifted: Lifted) -> None:
     curve = lifted.curve(1)
-    kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
-    alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
-    pushed, own = (push_trials.toured(part, curve, True).poses for part in (kept, alone))
-    apart = np.abs(pose_difference(pushed, own))
+    with_arms = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
+    without_arms = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
+    pushed, own = (push_trials.toured(part, curve, True).poses for part in (with_arms, without_arms))
+    difference = np.abs(pose_difference(pushed, own))
     upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
-    assert apart[:, upper].max() > 0.01
-    assert np.delete(apart, upper, axis=1).max() < 1e-6
+    assert difference[:, upper].max() > 0.01
+    assert np.delete(difference, upper, axis=1).max() < 1e-6
 
 
 def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_path: Path) -> None:

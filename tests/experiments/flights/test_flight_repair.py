@@ -32,10 +32,10 @@ def test_repaired_flight_conserves_angular_momentum_and_falls_freely(pace):
 def test_jump_below_the_floor_is_lifted_out():
     clip = embedded("jump")
     sunk = Clip(clip.poses - 0.07 * UP, 1.2 * clip.fps, "sunk")
-    done = repair_clip(sunk)
+    repaired = repair_clip(sunk)
     assert contacts(sunk).clearance.min() < -0.069
-    assert contacts(done.clip).clearance.min() > -0.01
-    assert done.after.certificate.verdicts["ballistic"].verdict == "certified"
+    assert contacts(repaired.clip).clearance.min() > -0.01
+    assert repaired.after.certificate.verdicts["ballistic"].verdict == "certified"
 
 
 def test_lift_is_smooth_and_leaves_valid_clips_unchanged():

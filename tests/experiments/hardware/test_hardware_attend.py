@@ -17,10 +17,10 @@ from sim.hardware.controls import RecorderStatus, RunStatus
 from sim.hardware.gated_servo import ROW_SIZE, columns
 
 ROW = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
-Script = dict[int, Callable[["Stand"], object]]
+Script = dict[int, Callable[["ScriptedRun"], object]]
 
 
-class Stand:
+class ScriptedRun:
     """A run without processes: what is asked for happens at once; the script has what else happens, by poll."""
 
     def __init__(self, script: Script):
@@ -54,53 +54,58 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]
 
 
 def test_end_of_recording_is_reported_once_with_its_reason(keys, capsys) -> None:
-    stand, console = Stand({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
+    stand, console = ScriptedRun({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
-    said = capsys.readouterr().out
-    assert said.count("The recording has ended (No space left on device) after 700 ticks") == 1
+    stdout = capsys.readouterr().out
+    assert stdout.count("The recording has ended (No space left on device) after 700 ticks") == 1
 
 
-def _fills_the_disk(stand: Stand) -> None:
+def _fills_the_disk(stand: ScriptedRun) -> None:
     stand.recorded = RecorderStatus(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
 
 
-def asked(script: Script, arm: bool = False) -> list[int]:
+def requests_of(script: Script, arm: bool = False) -> list[int]:
     """What is asked of a run that the script ends with Ctrl-C, if with nothing else."""
-    stand = Stand(script | {30: _interrupt})
+    stand = ScriptedRun(script | {30: _interrupt})
     attend(stand, 60.0, SimpleNamespace(arm=arm, dead_man=True), Console(quiet=True))  # type: ignore[arg-type]
     return stand.asked
 
 
-def _interrupt(stand: Stand) -> None:
+def _interrupt(stand: ScriptedRun) -> None:
     raise KeyboardInterrupt
 
 
 @pytest.mark.slow
 def test_enter_toggles_arming(keys) -> None:
-    assert asked({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
-    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
-    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
+    assert requests_of({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
+    assert requests_of({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
 
 
 def test_keys_typed_before_the_prompt_are_ignored(keys) -> None:
     keys(b"\n\n")
-    assert asked({}) == [DISARM]
+    assert requests_of({}) == [DISARM]
 
 
 def test_enter_typed_before_a_fault_does_not_clear_it(keys) -> None:
-    def typed_and_fails(stand: Stand) -> None:
+    def typed_and_fails(stand: ScriptedRun) -> None:
         keys(b"\n")
         stand.fails()
 
-    assert asked({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
 
 
 def test_enter_after_a_fault_clears_it(keys) -> None:
-    assert asked({3: lambda _: keys(b"\n"), 6: Stand.fails, 9: lambda _: keys(b"\n")}) == [ARM, CLEAR, ARM, DISARM]
+    assert requests_of({3: lambda _: keys(b"\n"), 6: ScriptedRun.fails, 9: lambda _: keys(b"\n")}) == [
+        ARM,
+        CLEAR,
+        ARM,
+        DISARM,
+    ]
 
 
 def test_end_of_input_ends_the_run_without_arming(keys) -> None:
-    stand = Stand({3: lambda _: keys(b"\x04")})
+    stand = ScriptedRun({3: lambda _: keys(b"\x04")})
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
     assert stand.asked == [DISARM]
     assert stand.looks < 10
@@ -108,4 +113,4 @@ def test_end_of_input_ends_the_run_without_arming(keys) -> None:
 
 def test_unattended_run_ends_at_a_fault(keys) -> None:
     keys(b"\n")
-    assert asked({4: Stand.fails}, arm=True) == [ARM]
+    assert requests_of({4: ScriptedRun.fails}, arm=True) == [ARM]

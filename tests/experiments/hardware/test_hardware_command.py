@@ -35,45 +35,45 @@ def test_empty_device_list_points_to_doctor(capsys) -> None:
 
 def test_doctor_reports_missing_drivers_and_lateness(capsys) -> None:
     assert main(["hardware", "doctor", "--seconds", "0.05", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    state = {finding["what"]: finding for finding in told["findings"]}
+    result = json.loads(capsys.readouterr().out)
+    state = {finding["what"]: finding for finding in result["findings"]}
     assert state["hidapi"]["state"] == OK
     assert state["OpenHaptics (HD)"]["state"] == state["Force Dimension (dhd)"]["state"] == MISSING
     assert "OpenHaptics" in state["OpenHaptics (HD)"]["remedy"]
     assert {"kernel", "realtime priority", "memory lock", "processor's frequency"} <= set(state)
-    assert 0.0 <= told["lateness"]["p50"] <= told["lateness"]["p99"] <= told["lateness"]["worst"]
-    assert told["link"] is None
+    assert 0.0 <= result["lateness"]["p50"] <= result["lateness"]["p99"] <= result["lateness"]["worst"]
+    assert result["link"] is None
 
 
 def test_missed_deadlines_are_counted() -> None:
-    late = measured_lateness(0.1)
-    assert late.loops + late.missed == 100
+    lateness = measured_lateness(0.1)
+    assert lateness.loops + lateness.missed == 100
 
 
 @pytest.mark.parametrize(
-    ("device", "says"),
+    ("device", "message"),
     [
         ("frob", "no device is called 'frob'"), ("hidraw", "no device is called 'hidraw'"),
         ("hid:7", "no devices are connected for 'hid:7'"), ("hdapi", "install 3D Systems' OpenHaptics"),
         ("dhd", "install the Force Dimension SDK"), ("dhd:3", "no device is called 'dhd:3'"),
     ],
 )  # fmt: skip
-def test_missing_device_is_refused_in_one_line(capsys, device, says) -> None:
+def test_missing_device_is_refused_in_one_line(capsys, device, message) -> None:
     assert main(["hardware", "doctor", "--device", device, "--seconds", "0.01"]) == 2
-    said = capsys.readouterr().err
-    assert says in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert message in stderr
+    assert stderr.count("\n") == 1
 
 
 def test_missing_device_is_reported_before_a_certificate_is_required(capsys, tmp_path) -> None:
-    kept = tmp_path / "run" / "kept"
-    kept.parent.mkdir()
-    kept.write_text("")
-    for device, says in (("frob", "no device is called 'frob'"), ("hid", "no devices are connected for 'hid'; "),
+    old_file = tmp_path / "run" / "kept"
+    old_file.parent.mkdir()
+    old_file.write_text("")
+    for device, message in (("frob", "no device is called 'frob'"), ("hid", "no devices are connected for 'hid'; "),
                          ("hdapi", "install 3D Systems' OpenHaptics")):  # fmt: skip
-        assert main(["hardware", "run", "--device", device, "--arm", "--out", str(kept.parent), "--overwrite"]) == 2
-        assert says in capsys.readouterr().err
-    assert kept.exists()
+        assert main(["hardware", "run", "--device", device, "--arm", "--out", str(old_file.parent), "--overwrite"]) == 2
+        assert message in capsys.readouterr().err
+    assert old_file.exists()
 
 
 @pytest.mark.parametrize("pose", [("9", "9", "9"), ("nan", "0", "0"), ("0", "inf", "0")])
@@ -84,8 +84,8 @@ def test_unreachable_calibration_pose_is_refused(capsys, tmp_path, pose) -> None
 
 
 def test_emulate_option_with_a_real_device_is_refused(capsys, tmp_path) -> None:
-    given = "--device", "hid", "--emulate", "x.json", "--out", str(tmp_path / "device.json")
-    assert main(["hardware", "calibrate", *given]) == 2
+    arguments = "--device", "hid", "--emulate", "x.json", "--out", str(tmp_path / "device.json")
+    assert main(["hardware", "calibrate", *arguments]) == 2
     assert "--emulate x.json has no meaning with --device hid" in capsys.readouterr().err
 
 
@@ -127,8 +127,8 @@ def test_installed_library_is_listed_and_inaccessible_node_gets_udev_rule(monkey
 def test_closed_stdin_is_not_a_terminal(tmp_path) -> None:
     closed = "import os, sys; os.close(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     command = ["-m", "experiments.cli", "hardware", "run", "--out", str(tmp_path / "run")]
-    ended = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", closed, *command], capture_output=True, text=True, check=False, timeout=60
     )
-    assert ended.stderr == "hvf: nobody is at a terminal to arm the device; expected --arm, or a terminal\n"
-    assert ended.returncode == 2
+    assert completed.stderr == "hvf: nobody is at a terminal to arm the device; expected --arm, or a terminal\n"
+    assert completed.returncode == 2

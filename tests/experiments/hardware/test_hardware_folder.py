@@ -35,7 +35,7 @@ def record(out: Path, ticks: int) -> None:
             recorder.append("ticks", {"state": np.zeros(ticks)})
 
 
-def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
+def interrupted_run(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
     """A run that Ctrl-C ends once it has made its recording, or before, with so many ticks."""
     with run_folder(options(out, overwrite)):
         if ticks is not None:
@@ -63,23 +63,23 @@ def test_concurrent_run_into_the_folder_is_refused(tmp_path: Path) -> None:
 def test_run_without_ticks_leaves_no_folder(tmp_path: Path, ticks: int | None) -> None:
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        stopped(out, ticks)
+        interrupted_run(out, ticks)
     assert not out.exists()
 
 
 def test_foreign_files_are_kept(tmp_path: Path) -> None:
     (tmp_path / "figures").mkdir()
-    for mine in (tmp_path / "notes.txt", tmp_path / "figures" / "mine.tex"):
-        mine.write_text("mine")
+    for file in (tmp_path / "notes.txt", tmp_path / "figures" / "mine.tex"):
+        file.write_text("mine")
     with pytest.raises(KeyboardInterrupt):
-        stopped(tmp_path, 0, overwrite=True)
+        interrupted_run(tmp_path, 0, overwrite=True)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["figures", "mine.tex", "notes.txt"]
 
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_interrupted_or_damaged_recording_is_kept(tmp_path: Path, damaged: bool) -> None:
     with pytest.raises(KeyboardInterrupt):
-        stopped(tmp_path, 3, damaged=damaged)
+        interrupted_run(tmp_path, 3, damaged=damaged)
     assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json"}
 
 
@@ -91,8 +91,8 @@ def test_outcome_of_killed_servo_marks_unknown_values(tmp_path: Path, ticks: int
     row = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
     last = RunStatus(False, State.ACTIVE, Fault.NONE, 0.0, row, None)
     outcome = outcome_of(tmp_path / "run.h5", ready, None, last)
-    said = "\n".join(outcome.lines())
-    assert "the servo was gone before it told how long they took" in said
-    assert "By how much the servo grew is not known" in said
-    told = outcome.to_json()
-    assert [told[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4
+    text = "\n".join(outcome.lines())
+    assert "the servo was gone before it told how long they took" in text
+    assert "By how much the servo grew is not known" in text
+    values = outcome.to_json()
+    assert [values[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4

@@ -57,9 +57,9 @@ def found(**values: float) -> Identified:
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(["hardware", *arguments]) == 2
-    said = capsys.readouterr()
-    assert said.err.count("\n") == 1
-    return said.err
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    return captured.err
 
 
 def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -> None:
@@ -69,22 +69,22 @@ def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -
 
 def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
-    said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
-    assert "expected --certificate" in said
+    stderr = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
+    assert "expected --certificate" in stderr
 
 
 @pytest.mark.parametrize(
     "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
 )
 def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
-    said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
-    assert limit[0] in said
-    assert "on a real device" in said
+    stderr = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
+    assert limit[0] in stderr
+    assert "on a real device" in stderr
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("option", "message"),
     [(("--user", "push"), "on a device: whoever holds the stylus is the hand"),
      (("--person", "median"), "on a device: whoever holds the stylus is the hand"),
      (("--figure", "physical"), "on a device: its figure is the animation"),
@@ -92,15 +92,15 @@ def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limi
      (("--mass", "60.0"), "on a device: its figure is the animation"),
      (("--delay", "5"), "without --certificate"), (("--emulate", "x.json", "--device", "hid"), "with --device hid")],
 )  # fmt: skip
-def test_options_without_effect_on_a_device_are_refused_by_name(tmp_path: Path, capsys, given, says) -> None:
-    said = refused(capsys, "run", "--arm", *given, "--out", str(tmp_path / "run"))
-    assert f"{given[0]} {given[1]} has no meaning {says}" in said
+def test_options_without_effect_on_a_device_are_refused_by_name(tmp_path: Path, capsys, option, message) -> None:
+    stderr = refused(capsys, "run", "--arm", *option, "--out", str(tmp_path / "run"))
+    assert f"{option[0]} {option[1]} has no meaning {message}" in stderr
     assert not (tmp_path / "run").exists()
 
 
 def test_excessive_silence_limit_is_refused(tmp_path: Path, capsys) -> None:
-    said = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
-    assert "--silence is 2e+06; expected at most 5000 periods" in said
+    stderr = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
+    assert "--silence is 2e+06; expected at most 5000 periods" in stderr
 
 
 def test_folder_with_a_run_is_kept_without_overwrite(tmp_path: Path, capsys) -> None:
@@ -117,11 +117,11 @@ def test_certificate_of_other_inputs_does_not_arm(tmp_path: Path) -> None:
 
 
 def test_unknown_or_smaller_delay_certificate_does_not_arm(tmp_path: Path, monkeypatch) -> None:
-    for outcome, says in (("unknown", "stability is unknown"), ("certified", "")):
+    for outcome, message in (("unknown", "stability is unknown"), ("certified", "")):
         certificate = Certificate({"stability": Verdict(outcome, "because")}, "0" * 16)
         monkeypatch.setattr("experiments.hardware.permit.verify_certificate", lambda file, inputs, c=certificate: c)
-        if says:
-            with pytest.raises(SimError, match=says):
+        if message:
+            with pytest.raises(SimError, match=message):
                 verified(tmp_path, RunConfig(), 0.0)
         else:
             assert verified(tmp_path, RunConfig(), 0.0) is certificate
@@ -166,35 +166,35 @@ def test_device_file_round_trips_and_changes_linkage_and_certificate(tmp_path: P
 
 def test_identify_and_calibrate_keep_each_others_results(tmp_path: Path) -> None:
     calibrated = calibrated_json([0.01, -0.02, 0.03], [1e-4] * 3, KNOWN, {})
-    both = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
-    assert linkage_from(both).offset == pytest.approx((0.01, -0.019, 0.028))
-    assert both["calibration"] == {"name": "arm", "serial": "", "power_up": 0}
-    again = calibrated_json([0.0, 0.0, 0.5], [1e-4] * 3, KNOWN, both)
+    identified = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
+    assert linkage_from(identified).offset == pytest.approx((0.01, -0.019, 0.028))
+    assert identified["calibration"] == {"name": "arm", "serial": "", "power_up": 0}
+    again = calibrated_json([0.0, 0.0, 0.5], [1e-4] * 3, KNOWN, identified)
     assert linkage_from(again).offset == (0.0, 0.0, 0.5)
-    assert linkage_from(again).coulomb == linkage_from(both).coulomb
+    assert linkage_from(again).coulomb == linkage_from(identified).coulomb
     save_device(again, tmp_path / "device.json")
     assert read_device_file(tmp_path / "device.json") == again
     config = RunConfig(device=Phantom(device_file=str(tmp_path / "device.json")))
-    save_device(both, tmp_path / "other.json")
+    save_device(identified, tmp_path / "other.json")
     other = RunConfig(device=Phantom(device_file=str(tmp_path / "other.json")))
     of, of_other = (certificate_inputs(c, 0.0, HandRange(), 1.0)["device"] for c in (config, other))
     assert of == of_other  # where the zero is changes no verdict
 
 
 @pytest.mark.parametrize(
-    ("changed", "says"),
+    ("changed", "message"),
     [({"mode": Follow(stiffness=400.0)}, r"certifies another field or device: stiffness 300.0 \(here 400.0\)"),
      ({"clock": Clock(servo_period=0.002)}, r"servo_period 0.001 \(here 0.002\)"),
      ({"device": Phantom(cutoff=90.0)}, r"cutoff 150.0 \(here 90.0\)")],
 )  # fmt: skip
-def test_certificate_of_another_field_names_the_differing_option(tmp_path: Path, changed, says) -> None:
+def test_certificate_of_another_field_names_the_differing_option(tmp_path: Path, changed, message) -> None:
     config = resolved(RunConfig())
     inputs = certificate_inputs(config, 0.0, HandRange(), HAND_PUSH)
     certificate = Certificate({"stability": Verdict("certified", "it is")}, hash_of(inputs), hashes_of(inputs))
     (tmp_path / "certificate.json").write_text(json.dumps(certificate.to_json()))
     (tmp_path / OPTIONS).write_text(json_text(certified_options(config, 0.0, HandRange(), HAND_PUSH)))
     assert verified(tmp_path, config, 0.0).inputs == certificate.inputs
-    with pytest.raises(ChangedInputs, match=says) as refused:
+    with pytest.raises(ChangedInputs, match=message) as refused:
         verified(tmp_path, resolved(replace(RunConfig(), **changed)), 0.0)
     assert "\n" not in str(refused.value)
 
@@ -206,12 +206,12 @@ def test_calibration_finds_hidden_offset_and_keeps_file_content(tmp_path: Path, 
     save_device({"format": "hvf-device-1", "delay": {"value": [1e-4], "margin": [1e-5]}}, file)
     arguments = ["calibrate", "--emulate", str(other), "--out", str(file), "--seconds", "0.2"]
     assert main(["hardware", *arguments, "--pose", "0.1", "-0.2", "0.3"]) == 0
-    told = read_device_file(file)
-    margin = np.array(told["offset"]["margin"])
-    assert np.all(np.abs(np.array(told["offset"]["value"]) - [0.02, -0.03, 0.015]) <= margin)
+    content = read_device_file(file)
+    margin = np.array(content["offset"]["margin"])
+    assert np.all(np.abs(np.array(content["offset"]["value"]) - [0.02, -0.03, 0.015]) <= margin)
     assert margin.max() < 5e-4
-    assert told["delay"]["value"] == [1e-4]
-    assert told["calibration"]["name"] == "emulated Phantom"
+    assert content["delay"]["value"] == [1e-4]
+    assert content["calibration"]["name"] == "emulated Phantom"
     assert "--overwrite" in refused(capsys, *arguments)
     capsys.readouterr()
     assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
@@ -248,19 +248,21 @@ def test_invalid_device_file_is_refused(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
+    ("content", "message"),
     [('{"format": "hvf-device-1", "delay": {"value": [0.5]}}', "a delay of 0.5 s; expected at most"),
      ('{"format": "hvf-device-1", "offset": {"value": [0.1, 0, 0]}}', "is not calibrated"),
      ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
 )  # fmt: skip
-def test_invalid_emulated_device_is_refused_and_the_folder_unchanged(tmp_path: Path, capsys, content, says) -> None:
-    file, kept = tmp_path / "device.json", tmp_path / "run" / "kept"
-    kept.parent.mkdir()
-    kept.write_text("")
+def test_invalid_emulated_device_is_refused_and_the_folder_unchanged(tmp_path: Path, capsys, content, message) -> None:
+    file, old_file = tmp_path / "device.json", tmp_path / "run" / "kept"
+    old_file.parent.mkdir()
+    old_file.write_text("")
     if content is not None:
         file.write_text(content)
-    assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
-    assert list(kept.parent.iterdir()) == [kept]
+    assert message in refused(
+        capsys, "run", "--arm", "--emulate", str(file), "--out", str(old_file.parent), "--overwrite"
+    )
+    assert list(old_file.parent.iterdir()) == [old_file]
 
 
 def test_device_recording_is_certified_but_not_reproduced_or_drawn(tmp_path: Path, capsys) -> None:
@@ -295,11 +297,11 @@ def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsy
                  "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
     for _ in range(3):  # a machine that is too busy for the device is no failure of ours
         code = main([*arguments, "--overwrite"])
-        said = capsys.readouterr().out
-        if "no new reading" not in said:
+        stdout = capsys.readouterr().out
+        if "no new reading" not in stdout:
             break
-    assert code == 0, said
-    assert "mm RMS from the curve" in said
+    assert code == 0, stdout
+    assert "mm RMS from the curve" in stdout
     summary = json.loads((out / "summary.json").read_text())
     assert summary["ticks"] > 500
     assert summary["active"] > 1.0
@@ -325,9 +327,9 @@ def test_hidden_device_parameters_are_identified_from_the_command_line(tmp_path:
     for lap in ("4", "2.5"):
         assert main(["hardware", *run, "--device-file", "device.json", "--lap", lap, "--out", f"runs/{lap}"]) in (0, 1)
     assert main(["hardware", "identify", "runs/4", "runs/2.5", "--out", "found.json"]) == 0
-    told = read_device_file(Path("found.json"))
+    found = read_device_file(Path("found.json"))
     for name, value in hidden.items():
-        assert np.all(np.abs(np.array(told[name]["value"]) - value) <= np.array(told[name]["margin"])), name
-    linkage = linkage_from(told)
+        assert np.all(np.abs(np.array(found[name]["value"]) - value) <= np.array(found[name]["margin"])), name
+    linkage = linkage_from(found)
     assert linkage_of(Phantom(device_file="found.json")) == linkage
     assert main(["run", "--figure", "none", "--seconds", "1", "--device-file", "found.json", "--out", "runs/sim"]) == 0

@@ -160,8 +160,8 @@ def test_motion_faults_are_measured_quantitatively():
     # What moves above the floor does not slide.
     assert moved(x=0.04 * s, z=0.0045).slide == 0.0
     assert moved(z=-0.01).penetration == pytest.approx(still.penetration + 0.01, abs=1e-9)
-    most = joint_range()[JOINTS.index("left_knee"), 1, 1]
-    assert moved(knee=most + 0.2 * s, z=0.5).limits == pytest.approx(0.2, abs=1e-9)
+    limit = joint_range()[JOINTS.index("left_knee"), 1, 1]
+    assert moved(knee=limit + 0.2 * s, z=0.5).limits == pytest.approx(0.2, abs=1e-9)
     t = s * 59.0 / 60.0
     assert moved(z=5.0 + 3.0 * t - 0.5 * 9.81 * t**2).ballistic < 1e-3
     assert moved(z=5.0 + 3.0 * t - 0.5 * 9.81 * t**2 + 0.2 * np.sin(3.0 * TURN * s)).ballistic > 0.1

@@ -55,8 +55,8 @@ def test_all_eight_figures_are_written_as_pdf_and_png(tmp_path: Path, monkeypatc
     monkeypatch.setattr("experiments.paper_figures.draw.DPI", 60)
     # Faster: nobody looks at the pages of these runs, and their figures are only shown.
     monkeypatch.setattr("experiments.results.pages.report_of.write_report", lambda *_: None)
-    shown = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
-    monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: shown)
+    kinematic = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
+    monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: kinematic)
     files = draw_all(tmp_path, time.perf_counter())
     assert len(files) == 8
     for file in files:

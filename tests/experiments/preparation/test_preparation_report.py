@@ -18,8 +18,8 @@ from tests.models.mocap.retargeting.rigs import Rig, write_rig
 def test_clip_flights_equal_those_of_its_certificate(name):
     clip = embedded(name)
     fits = [flight.fit for flight in clip_ballistics(clip).flights]
-    told = [(fit.time, fit.time + fit.duration) for fit in fits]
-    np.testing.assert_allclose(np.reshape(clip_flights(clip), (-1, 2)), np.reshape(told, (-1, 2)))
+    expected = [(fit.time, fit.time + fit.duration) for fit in fits]
+    np.testing.assert_allclose(np.reshape(clip_flights(clip), (-1, 2)), np.reshape(expected, (-1, 2)))
     assert well_formed(clip, clip_flights(clip)).flights == len(fits)
 
 

@@ -48,8 +48,8 @@ def test_retargeted_motion_deviates_little_from_its_file(rig, tmp_path):
 
 def test_deviation_ignores_place_and_heading(dance):
     source, poses = dance
-    there = PlanarDisplacement(3.0, -2.0, 2.5).moved(poses)
-    np.testing.assert_allclose(deviation(source, there)[::2], deviation(source, poses)[::2], atol=1e-6)
+    moved = PlanarDisplacement(3.0, -2.0, 2.5).moved(poses)
+    np.testing.assert_allclose(deviation(source, moved)[::2], deviation(source, poses)[::2], atol=1e-6)
 
 
 @pytest.mark.parametrize("line", [line for line in LINES if "_" in line])
@@ -91,11 +91,13 @@ def test_prepared_part_is_compared_at_the_times_of_the_file(tmp_path, pace):
     clip, report, _ = load(tmp_path / "walk.bvh")
     part = looped(resampled(Clip(clip.poses, pace * clip.fps, "walk"), 120.0), "open")
     assert part.start < -0.2
-    made = SimpleNamespace(clip=part.clip, captured=clip, report=report, looped=part, paced=SimpleNamespace(pace=pace))
-    was, now = deviations(tmp_path / "walk.bvh", made)
+    result = SimpleNamespace(
+        clip=part.clip, captured=clip, report=report, looped=part, paced=SimpleNamespace(pace=pace)
+    )
+    was, now = deviations(tmp_path / "walk.bvh", result)
     assert now.direction == pytest.approx(was.direction, abs=np.deg2rad(0.1))
     assert now.place == pytest.approx(was.place, abs=0.002)
-    late = SimpleNamespace(**vars(made) | {"looped": part._replace(start=part.start + 0.1, end=part.end + 0.1)})
+    late = SimpleNamespace(**vars(result) | {"looped": part._replace(start=part.start + 0.1, end=part.end + 0.1)})
     assert deviations(tmp_path / "walk.bvh", late)[1].direction > np.deg2rad(3.0)
 
 

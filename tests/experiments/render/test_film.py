@@ -44,7 +44,7 @@ def backend() -> str:
 
 
 @dataclass
-class Told:
+class RunSpec:
     """What a run of a second did: how deep its figure was under the floor, and how far it went."""
 
     kind: str = "physical"
@@ -54,32 +54,32 @@ class Told:
     complete: bool = True
 
 
-def write_run(folder: Path, told: Told) -> Path:
+def write_run(folder: Path, spec: RunSpec) -> Path:
     """A recording in which the figure stands, or goes along x, and the stylus is pushed."""
-    world = World(kind=told.kind)
+    world = World(kind=spec.kind)
     world.reset(np.zeros(3), rest_pose())
     n, m = round(SECONDS * RATE), round(SECONDS * FRAME_RATE)
     poses = np.tile(rest_pose(), (m, 1))
-    poses[:, 0] = told.travel * np.linspace(0.0, 1.0, m)
-    poses[:, 2] -= told.depth
+    poses[:, 0] = spec.travel * np.linspace(0.0, 1.0, m)
+    poses[:, 2] -= spec.depth
     qpos = np.tile(world.data.qpos, (m, 1))
-    if told.kind == "kinematic":
+    if spec.kind == "kinematic":
         qpos = np.hstack((qpos, poses))
-    elif told.kind == "physical":
+    elif spec.kind == "physical":
         qpos[:, world.pose_at : world.pose_at + N_POSE] = poses
     angle = np.linspace(0.0, 2.0 * np.pi, 241)
     static = {
         "curve": 0.05 * np.column_stack((np.cos(angle) - 1.0, np.sin(angle), 0.0 * angle)), "tube_radius": 0.02,
-        "p_WH": P_WH, "scene": np.array([1.75, 75.0, 1e-3, 1.25e-4]), "figure": told.kind,
+        "p_WH": P_WH, "scene": np.array([1.75, 75.0, 1e-3, 1.25e-4]), "figure": spec.kind,
     }  # fmt: skip
     frames: dict[str, tuple[int, ...]] = {"t": (), "qpos": (qpos.shape[1],)}
     rows = {"t": np.arange(m) / FRAME_RATE, "qpos": qpos}
-    if told.kind != "none":
+    if spec.kind != "none":
         frames["reference"], rows["reference"] = (N_POSE,), poses
     ticks = {
         "t": np.arange(n) / RATE,
         "p": np.zeros((n, 3)),
-        "force": np.tile(told.force * np.array([0.6, -0.8, 0.0]), (n, 1)),
+        "force": np.tile(spec.force * np.array([0.6, -0.8, 0.0]), (n, 1)),
         "user": np.zeros((n, 3)),
     }
     shapes = {"t": (), "p": (3,), "force": (3,), "user": (3,)}
@@ -88,7 +88,7 @@ def write_run(folder: Path, told: Told) -> Path:
     with Recorder(folder / "run.h5", {}, 1, groups, static) as recorder:
         recorder.append("ticks", ticks)
         recorder.append("frames", rows)
-        if told.complete:
+        if spec.complete:
             recorder.close({"lines": []})
             write_bvh(Clip(poses[::5], FRAME_RATE / 5, "default"), folder / "default.bvh")
     return folder
@@ -99,7 +99,7 @@ def write_run(folder: Path, told: Told) -> Path:
 )
 def test_every_figure_kind_is_rendered_to_playable_films(kind: str, tmp_path: Path, backend: str) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"
+    run, target = write_run(tmp_path / "run", RunSpec(kind)), tmp_path / "film.mp4"
     render(run, target, SMALL, gif=True)
     frames, seconds = ffmpeg.count_frames_and_secs(str(target))
     assert (frames, seconds) == (10, pytest.approx(1.0, abs=0.11))
@@ -109,7 +109,7 @@ def test_every_figure_kind_is_rendered_to_playable_films(kind: str, tmp_path: Pa
 
 @pytest.mark.parametrize("kind", ["physical", "kinematic"])
 def test_figures_are_drawn_above_the_floor_and_their_depth_is_reported(kind: str, tmp_path: Path, backend: str) -> None:
-    run = write_run(tmp_path / "run", Told(kind, depth=0.03))
+    run = write_run(tmp_path / "run", RunSpec(kind, depth=0.03))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, SMALL, backend)
         frames.frame(5)
@@ -121,7 +121,7 @@ def test_figures_are_drawn_above_the_floor_and_their_depth_is_reported(kind: str
 
 
 def test_travelling_figure_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
-    run = write_run(tmp_path / "run", Told(travel=8.0))
+    run = write_run(tmp_path / "run", RunSpec(travel=8.0))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show="stage", ghost="none", width=160, height=120, fps=10.0), backend)
         for row in (0, 5, 9):
@@ -143,7 +143,7 @@ def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
 
 
 def test_ghost_and_force_arrow_are_drawn_only_if_present(tmp_path: Path, backend: str) -> None:
-    run, rest = write_run(tmp_path / "run", Told()), write_run(tmp_path / "rest", Told(force=0.0))
+    run, rest = write_run(tmp_path / "run", RunSpec()), write_run(tmp_path / "rest", RunSpec(force=0.0))
     for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):
         red, _, blue = np.moveaxis(drawn(run, "stage", ghost, backend), 2, 0)
         assert least <= np.count_nonzero((blue > red + 40) & (red > 90)) <= most, ghost
@@ -160,7 +160,7 @@ def test_film_of_incomplete_run_is_reported_and_shows_the_edited_animation(
     tmp_path: Path, backend: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    run = write_run(tmp_path / "run", Told(complete=False))
+    run = write_run(tmp_path / "run", RunSpec(complete=False))
     filmed = render(run, tmp_path / "film.mp4", SMALL)
     assert "cut short" in capsys.readouterr().err
     assert any("lowest point of the figure" in line for line in filmed.lines())
@@ -206,7 +206,7 @@ def test_interrupted_film_keeps_the_old_file(frames: int, tmp_path: Path, capfd:
     assert capfd.readouterr() == ("", "")  # not a word of ffmpeg's
 
 
-def _hear() -> None:
+def _default_interrupt() -> None:
     """A command that is begun in the background of a shell would not hear Ctrl-C."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -214,16 +214,18 @@ def _hear() -> None:
 @pytest.mark.slow
 def test_ctrl_c_on_render_leaves_no_file(tmp_path: Path, backend: str) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    run, film = write_run(tmp_path / "run", Told()), tmp_path / "films" / "film.mp4"
+    run, film = write_run(tmp_path / "run", RunSpec()), tmp_path / "films" / "film.mp4"
     command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear)
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_default_interrupt
+    )
     deadline = time.monotonic() + 60.0
     while not list(film.parent.glob(".*.mp4")) and time.monotonic() < deadline:
         time.sleep(0.1)
     os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=30)[1]
-    assert process.returncode == 130, said
-    assert "Traceback" not in said
+    stderr = process.communicate(timeout=30)[1]
+    assert process.returncode == 130, stderr
+    assert "Traceback" not in stderr
     assert not list(film.parent.iterdir())
 
 

@@ -19,11 +19,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def _drawn(out: Path, picture: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    kept = {name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "DISPLAY")}
+def _draw(out: Path, picture: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    inherited = {name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "DISPLAY")}
     command = [sys.executable, "-m", "experiments.cli", "picture", str(out), str(picture)]
     return subprocess.run(
-        command, env=kept | {"PYTHONPATH": str(ROOT)} | environment, capture_output=True, text=True, check=False
+        command, env=inherited | {"PYTHONPATH": str(ROOT)} | environment, capture_output=True, text=True, check=False
     )
 
 
@@ -31,10 +31,10 @@ def _drawn(out: Path, picture: Path, **environment: str) -> subprocess.Completed
 @pytest.mark.parametrize("backend", [None, "glfw", "bogus"])
 def test_picture_is_drawn_without_display_for_any_mujoco_gl(backend: str | None, run: Path, tmp_path: Path) -> None:
     picture = tmp_path / "x.png"  # an existing one is left as it is
-    done = _drawn(run, picture) if backend is None else _drawn(run, picture, MUJOCO_GL=backend)
-    assert "Traceback" not in done.stderr
-    if done.returncode == 2:  # a machine without EGL and OSMesa
-        assert "expected EGL or OSMesa: apt-get install" in done.stderr
+    completed = _draw(run, picture) if backend is None else _draw(run, picture, MUJOCO_GL=backend)
+    assert "Traceback" not in completed.stderr
+    if completed.returncode == 2:  # a machine without EGL and OSMesa
+        assert "expected EGL or OSMesa: apt-get install" in completed.stderr
         pytest.skip("nothing can be drawn on this machine")
-    assert done.returncode == 0, done.stderr
+    assert completed.returncode == 0, completed.stderr
     assert picture.stat().st_size > 10_000

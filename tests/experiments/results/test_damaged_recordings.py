@@ -28,8 +28,8 @@ def test_truncated_recording_is_refused(
     shutil.copytree(run, spoiled)
     (spoiled / "run.h5").write_bytes((run / "run.h5").read_bytes()[:200_000])
     target = [str(tmp_path / "x.png")] if reader == ["picture"] else []
-    said = refused([*reader, str(spoiled), *target], capsys)
-    assert "run.h5: not a recording, cut short: 200000 bytes of " in said
+    stderr = refused([*reader, str(spoiled), *target], capsys)
+    assert "run.h5: not a recording, cut short: 200000 bytes of " in stderr
 
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader[0])
@@ -41,22 +41,22 @@ def test_recording_with_missing_rows_is_refused_with_the_channel(
     with h5py.File(spoiled / "run.h5", "r+") as file:
         file["ticks/force"].resize(100, axis=0)
     target = [str(tmp_path / "x.png")] if reader == ["picture"] else []
-    said = refused([*reader, str(spoiled), *target], capsys)
-    assert "run.h5: not a recording, or damaged (ticks/force has 100 rows, ticks/rows says 1000)" in said
+    stderr = refused([*reader, str(spoiled), *target], capsys)
+    assert "run.h5: not a recording, or damaged (ticks/force has 100 rows, ticks/rows says 1000)" in stderr
 
 
 @pytest.mark.parametrize(
-    ("lacks", "told"),
+    ("missing", "message"),
     [("static/curve", "no array or text curve; there are"), ("ticks/p", "no channel ticks/p; there are")],
 )
 def test_missing_channel_or_array_is_named(
-    lacks: str, told: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    missing: str, message: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spoiled = tmp_path / "run"
     shutil.copytree(run, spoiled)
     with h5py.File(spoiled / "run.h5", "r+") as file:
-        del file[lacks]
-    assert f"run.h5: {told}" in refused(["report", str(spoiled)], capsys)
+        del file[missing]
+    assert f"run.h5: {message}" in refused(["report", str(spoiled)], capsys)
 
 
 def test_recording_with_missing_frames_is_not_reproduced(

@@ -19,7 +19,7 @@ SIM = hvf.Simulation(field=hvf.Follow(CURVE, 300.0, 8.0), haptic_map=MAP, figure
 STUDY = hvf.Study.of(name="mine", factors={"stiffness": [100, 200]})
 HALF = hvf.Weight.constant(0.5)
 SPACE = {"field.k_r": (50.0, 200.0)}
-MADE: list[tuple[Any, dict[str, Any]]] = [
+VALID_ARGUMENTS: list[tuple[Any, dict[str, Any]]] = [
     (hvf.Cylindrical, {"clips": [DANCE], "around": CURVE, "reach": 0.02, "expressive": False}),
     (hvf.Composite, {"clips": [DANCE], "around": CURVE, "reach": 0.02, "expressive": False}),
     (hvf.Push, {"at": 1, "seconds": 1, "force": 1, "direction": (0, 0, 1), "place": (0, 0, 0), "radius": 0.1}),
@@ -43,9 +43,9 @@ MADE: list[tuple[Any, dict[str, Any]]] = [
 OPTIONAL = {"traces", "person", "direction", "place"}
 
 
-@pytest.mark.parametrize(("make", "name"), [(make, name) for make, given in MADE for name in given])
+@pytest.mark.parametrize(("make", "name"), [(make, name) for make, given in VALID_ARGUMENTS for name in given])
 def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None:
-    given = next(given for made, given in MADE if made is make) | ({"fps": 30.0} if make is hvf.Clip else {})
+    given = next(given for made, given in VALID_ARGUMENTS if made is make) | ({"fps": 30.0} if make is hvf.Clip else {})
     make(**given)
     for wrong in (object(), {"x": 1} if name != "values" else 3, hvf.Wrench, *(() if name in OPTIONAL else (None,))):
         with pytest.raises((hvf.ParameterError, hvf.ModelError, hvf.SimError), match=name):
@@ -57,7 +57,7 @@ def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: hvf.certify(3), "sim is 3; expected Simulation"),  # pyright: ignore
         (lambda: hvf.certify(SIM, delay="1"), "delay is '1'; expected a number"),  # pyright: ignore
@@ -90,10 +90,10 @@ def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None
         (lambda: hvf.Clip(np.array([["1"] * 75]), 30.0, "mine"), "poses are no array of numbers"),
     ],
 )  # fmt: skip
-def test_message_says_what_is_expected(make: Any, said: str) -> None:
+def test_message_says_what_is_expected(make: Any, message: str) -> None:
     with pytest.raises((hvf.ControllerError, hvf.ModelError, hvf.SimError)) as error:
         make()
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(("kind", "most"), [(hvf.Cylindrical, 4), (hvf.Composite, 3)])
@@ -119,16 +119,16 @@ def test_curve_beyond_the_workspace_is_refused_as_on_the_command_line(
     radius: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "--radius", str(radius), "--figure", "none", "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err.removeprefix("hvf: ").strip()
-    assert "beyond the Phantom's stops" in said
+    message = capsys.readouterr().err.removeprefix("hvf: ").strip()
+    assert "beyond the Phantom's stops" in message
     far, rivers = hvf.circle(radius=radius), (hvf.River(CURVE), hvf.River(hvf.circle(radius=radius)))
     bundle = hvf.RiverBundle(rivers, ("near", "far"))
     higher = hvf.HigherOrder(bundle, admission=0.05, sigma=0.02)
     tubes = hvf.StretchyTubes(far, k_f=100, k_s=100)
     for field in (hvf.Follow(far, 300, 8), hvf.Bunny(far, 300, 8, 0.1), bundle, higher, tubes, rivers[1].gated(HALF)):
-        with pytest.raises(hvf.SimError, match=f"^{re.escape(said)}$"):
+        with pytest.raises(hvf.SimError, match=f"^{re.escape(message)}$"):
             replace(SIM, field=field).session(1.0)
-    with pytest.raises(hvf.SimError, match=f"^{re.escape(said)}$"):
+    with pytest.raises(hvf.SimError, match=f"^{re.escape(message)}$"):
         replace(SIM, user=hvf.User(traces=far)).session(1.0)
 
 

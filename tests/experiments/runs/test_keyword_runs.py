@@ -14,7 +14,7 @@ from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
-WORDS: dict[str, Any] = {"clips": ["walk", "run"], "lap": 2.0, "figure": "none", "seconds": 0.3}
+KEYWORDS: dict[str, Any] = {"clips": ["walk", "run"], "lap": 2.0, "figure": "none", "seconds": 0.3}
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_keyword_run_equals_command_line_run(tmp_path: Path) -> None:
-    run = hvf.run(**WORDS)
+    run = hvf.run(**KEYWORDS)
     options = ["--clips", "walk", "run", "--lap", "2", "--figure", "none", "--seconds", "0.3", "--out"]
     assert main(["run", *options, str(tmp_path / "run")]) == 0
     with Recording(tmp_path / "run" / "run.h5") as recording:
@@ -43,22 +43,22 @@ def test_keyword_run_equals_command_line_run(tmp_path: Path) -> None:
 
 
 def test_recorded_keyword_run_is_reproduced_and_changed_from_its_folder(tmp_path: Path) -> None:
-    hvf.run(**WORDS, record=tmp_path / "run")
+    hvf.run(**KEYWORDS, record=tmp_path / "run")
     assert main(["reproduce", str(tmp_path / "run")]) == 0
     changed = hvf.run(tmp_path / "run" / "config.json", seconds=0.2)
     assert changed.ticks["t"].shape == (200,)
     with pytest.raises(hvf.SimError, match="overwrite"):
-        hvf.run(**WORDS, record=tmp_path / "run")
+        hvf.run(**KEYWORDS, record=tmp_path / "run")
 
 
 def test_run_has_remarks_on_unsuitable_clips() -> None:
-    run = hvf.run(**WORDS | {"lap": 1.0, "clips": ["walk", "angry"]})
+    run = hvf.run(**KEYWORDS | {"lap": 1.0, "clips": ["walk", "angry"]})
     assert any("times its own pace" in remark for remark in run.remarks)
     assert str(run).startswith(run.remarks[0])
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"mode": "flow"}, "no mode 'flow'"),
         ({"lapp": 2.0}, "^lapp is not known"),
@@ -70,22 +70,22 @@ def test_run_has_remarks_on_unsuitable_clips() -> None:
         ({"seconds": -1.0}, "seconds"),
     ],
 )
-def test_wrong_keyword_is_named(words: dict[str, Any], said: str) -> None:
-    with pytest.raises(hvf.ParameterError, match=said):
+def test_wrong_keyword_is_named(words: dict[str, Any], message: str) -> None:
+    with pytest.raises(hvf.ParameterError, match=message):
         hvf.run(**words)
 
 
 def test_lifted_curve_plays_its_clip(lifted: Path) -> None:
-    made = hvf.Lifted(lifted, "cheer")
-    assert made.names == ("walk", "cheer")
-    field = hvf.Follow(made.around, k_r=300, b_d=8)
-    run = hvf.Simulation(field=field, haptic_map=made, figure=hvf.Figure(kind="kinematic")).run(4.0)
+    lifted_map = hvf.Lifted(lifted, "cheer")
+    assert lifted_map.names == ("walk", "cheer")
+    field = hvf.Follow(lifted_map.around, k_r=300, b_d=8)
+    run = hvf.Simulation(field=field, haptic_map=lifted_map, figure=hvf.Figure(kind="kinematic")).run(4.0)
     assert run.summary.path.deviation_rms < 1e-3
-    shown, clip = run.frames["reference"][-1], made.clips[1]
+    shown, clip = run.frames["reference"][-1], lifted_map.clips[1]
     assert np.abs(clip.poses[:, 7:] - shown[7:]).max(axis=1).min() < 0.05
-    other = made.clips[0]
+    other = lifted_map.clips[0]
     assert np.abs(other.poses[:, 7:] - shown[7:]).max(axis=1).min() > 0.2
-    assert len(repr(made)) < 200
+    assert len(repr(lifted_map)) < 200
 
 
 def test_invalid_lifted_map_or_curve_is_refused(lifted: Path, tmp_path: Path) -> None:
@@ -117,13 +117,13 @@ def test_loaded_capture_is_prepared_as_in_a_run(
 
 @pytest.mark.slow
 def test_prepare_returns_clip_and_measures(capture: Path, tmp_path: Path) -> None:
-    made = hvf.prepare(capture, tmp_path / "ready.bvh")
-    assert "well-formed" in str(made)
-    many = made._replace(flights=tuple(f"flight {k}" for k in range(7)))
+    prepared = hvf.prepare(capture, tmp_path / "ready.bvh")
+    assert "well-formed" in str(prepared)
+    many = prepared._replace(flights=tuple(f"flight {k}" for k in range(7)))
     assert "flight 2; 4 more flights are refuted, as the report lists" in str(many)
     assert "flight 3" not in str(many)
     assert set(many.flights) <= set(many.faults())
-    np.testing.assert_allclose(hvf.load(tmp_path / "ready.bvh").poses, made.clip.poses, atol=1e-5)
+    np.testing.assert_allclose(hvf.load(tmp_path / "ready.bvh").poses, prepared.clip.poses, atol=1e-5)
     with pytest.raises(hvf.ModelError, match="exists"):
         hvf.prepare(capture, tmp_path / "ready.bvh")
     with pytest.raises(hvf.ParameterError, match="loop"):

@@ -18,7 +18,7 @@ CURVE = hvf.circle(radius=RADIUS, lap=LAP)
 STRONG, LIGHT = (150.0, 8.0), (20.0, 2.0)  # k_r [N/m] and b_d [N s/m] of a river that leads, and of one that yields
 
 
-def done(
+def channels_of(
     intent: PersonIntent, seconds: float, river: tuple[float, float] = LIGHT, seed: int = 3
 ) -> dict[str, np.ndarray]:
     """Channels of the ticks of a person who does something on a circle with FOLLOW, without a figure."""
@@ -48,39 +48,39 @@ def angle_gone(found: dict[str, np.ndarray], start: float, end: float) -> float:
 
 def test_relaxed_hand_is_led_along_the_curve() -> None:
     """The river's damper (8 N s/m) takes along what a slack arm still resists with, some 7 N s/m."""
-    found = done(hvf.intents.Relax(), 5.0, STRONG)
+    found = channels_of(hvf.intents.Relax(), 5.0, STRONG)
     assert angle_gone(found, 1.0, 5.0) > 0.4
     assert np.median(within(found, "distance", 1.0, 5.0)) < 4e-3
     assert np.sum(within(found, "force", 1.0, 5.0) * within(found, "v", 1.0, 5.0)) > 0.0  # the river carries her
 
 
 def test_tracing_person_follows_the_curve_unguided() -> None:
-    found = done(hvf.intents.Trace(), 5.0, (0.0, 0.0))
+    found = channels_of(hvf.intents.Trace(), 5.0, (0.0, 0.0))
     assert 0.9 < angle_gone(found, 1.0, 5.0) < 1.1
     assert np.median(within(found, "distance", 1.0, 5.0)) < 3e-3
 
 
 def test_exaggerating_person_enlarges_and_reduces_the_radius() -> None:
-    found = done(hvf.intents.Exaggerate(larger=1.3, calmer=0.7), 8.0)
+    found = channels_of(hvf.intents.Exaggerate(larger=1.3, calmer=0.7), 8.0)
     assert np.median(radius(found, 4.7, 5.3)) > 1.15 * RADIUS
     assert np.median(radius(found, 6.7, 7.3)) < 0.85 * RADIUS
 
 
 def test_corner_cutting_person_leaves_the_curve_only_there() -> None:
-    found = done(hvf.intents.CutCorner(0.25, 0.5), 8.0)
+    found = channels_of(hvf.intents.CutCorner(0.25, 0.5), 8.0)
     chord = RADIUS * np.cos(np.pi / 4.0)
     assert np.min(radius(found, 5.0, 6.0)) < 0.5 * (chord + RADIUS)
     assert np.median(radius(found, 6.5, 7.8)) > 0.93 * RADIUS
 
 
 def test_changing_person_ends_on_the_other_curve() -> None:
-    found = done(hvf.intents.ChangeOver(hvf.circle(radius=0.06, lap=LAP), at=2.0), 6.0)
+    found = channels_of(hvf.intents.ChangeOver(hvf.circle(radius=0.06, lap=LAP), at=2.0), 6.0)
     assert np.median(radius(found, 1.0, 2.0)) < 0.052
     assert np.median(radius(found, 4.5, 6.0)) > 0.056
 
 
 def test_resisting_person_stops_and_continues() -> None:
-    found = done(hvf.intents.Resist(at=1.5, seconds=2.0), 6.0, (60.0, 4.0))
+    found = channels_of(hvf.intents.Resist(at=1.5, seconds=2.0), 6.0, (60.0, 4.0))
     stayed = within(found, "p", 2.0, 3.5)
     assert np.max(np.linalg.norm(stayed - stayed.mean(axis=0), axis=1)) < 0.015
     assert angle_gone(found, 4.0, 6.0) > 0.25
@@ -88,14 +88,14 @@ def test_resisting_person_stops_and_continues() -> None:
 
 @pytest.mark.slow
 def test_lost_person_leaves_the_curve_and_returns() -> None:
-    found = [done(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0, seed=seed) for seed in (3, 4, 5)]
+    found = [channels_of(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0, seed=seed) for seed in (3, 4, 5)]
     assert min(np.max(within(one, "distance", 1.5, 3.5)) for one in found) > 8e-3
     # One person comes back to within 0.9 to 2.9 mm, as the seed has it; eight were tried.
     assert np.median([np.median(within(one, "distance", 5.5, 7.0)) for one in found]) < 4e-3
 
 
 def test_pressing_person_pushes_outward_in_time() -> None:
-    found = done(hvf.intents.Press([hvf.Push(2.0, 1.0, 2.0)]), 5.0, STRONG)
+    found = channels_of(hvf.intents.Press([hvf.Push(2.0, 1.0, 2.0)]), 5.0, STRONG)
     outward = found["p"][:, :2] / np.linalg.norm(found["p"][:, :2], axis=1, keepdims=True)
     pushed = np.sum(found["user"][:, :2] * outward, axis=1)
     pushing = (found["t"] > 2.3) & (found["t"] < 2.9)
@@ -111,8 +111,8 @@ def test_own_intent_runs_in_python_and_compiled() -> None:
     def still(t, place, force, rows):
         rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 9] = 0.03, 0.0, 0.01, 1.0
 
-    assert np.median(radius(done(hvf.intents.Own(smaller), 4.0), 2.0, 4.0)) == pytest.approx(0.03, abs=4e-3)
-    held = within(done(hvf.intents.Own(still, compiled=True), 3.0), "p", 2.0, 3.0)
+    assert np.median(radius(channels_of(hvf.intents.Own(smaller), 4.0), 2.0, 4.0)) == pytest.approx(0.03, abs=4e-3)
+    held = within(channels_of(hvf.intents.Own(still, compiled=True), 3.0), "p", 2.0, 3.0)
     assert np.linalg.norm(np.median(held, axis=0) - [0.03, 0.0, 0.01]) < 8e-3
 
 

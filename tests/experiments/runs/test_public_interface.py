@@ -59,7 +59,7 @@ def test_run_too_large_for_any_disk_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("part", "said"),
+    ("part", "message"),
     [
         ({"field": lambda hand: (0.0, 0.0, 0.0)}, r"^field is <function .*expected a law of force, .*@hvf\.law"),
         ({"haptic_map": hvf.clips("walk")[0]}, r"^haptic_map is <clip 'walk'.*expected a map"),
@@ -69,8 +69,8 @@ def test_run_too_large_for_any_disk_is_refused() -> None:
         ({"seed": -1}, r"^seed is -1"),
     ],
 )
-def test_part_of_wrong_type_is_refused_by_name(part: dict[str, Any], said: str) -> None:
-    with pytest.raises(hvf.ParameterError, match=said):
+def test_part_of_wrong_type_is_refused_by_name(part: dict[str, Any], message: str) -> None:
+    with pytest.raises(hvf.ParameterError, match=message):
         replace(simulation(hvf.Follow(CURVE, k_r=300, b_d=8)), **part)
 
 
@@ -125,10 +125,10 @@ def reading(hand):
 
 def test_compiled_law_that_raises_is_named() -> None:
     sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + hvf.law(compiled=True)(reading))
-    said = r"law reading \(.*test_public_interface\.py, line \d+\) raised IndexError: .*; for a hand at p = \[0\.0"
-    with pytest.raises(hvf.ParameterError, match=said):
+    message = r"law reading \(.*test_public_interface\.py, line \d+\) raised IndexError: .*; for a hand at p = \[0\.0"
+    with pytest.raises(hvf.ParameterError, match=message):
         sim.run(0.1)
-    with pytest.raises(hvf.ParameterError, match=said):
+    with pytest.raises(hvf.ParameterError, match=message):
         for _ in zip(range(100), sim, strict=False):
             pass
 
@@ -221,9 +221,9 @@ def test_animation_is_written_only_to_new_bvh_files(tmp_path: Path) -> None:
 
 def test_repr_of_field_and_certificate_is_short() -> None:
     field = (0.5 * hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)
-    said = repr(field)
-    assert said.startswith("<field of Follow(curve=<closed curve of 97 samples, 0.3 m in 2 s>, k_r=300, ")
-    assert said.endswith("level(k=50.0), joined by gate, add, limit>")
+    text = repr(field)
+    assert text.startswith("<field of Follow(curve=<closed curve of 97 samples, 0.3 m in 2 s>, k_r=300, ")
+    assert text.endswith("level(k=50.0), joined by gate, add, limit>")
     verdicts = repr(hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8))))
     assert len(verdicts) < 1500
     assert "array(" not in verdicts

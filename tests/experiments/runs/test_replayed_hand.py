@@ -59,9 +59,9 @@ def test_replay_in_another_field_changes_only_the_force(recorded: hvf.Run) -> No
 def test_summary_names_the_replayed_recording_in_every_mode(recorded: hvf.Run) -> None:
     summary = replayed(recorded, 100.0).run(SECONDS).summary
     led = SimpleNamespace(lines=lambda: ["The figure was led."])
-    for told in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
-        assert [line for line in told.lines() if line.startswith("The hand was that of")]
-        assert "The figure was led." in told.lines()
+    for variant in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
+        assert [line for line in variant.lines() if line.startswith("The hand was that of")]
+        assert "The figure was led." in variant.lines()
 
 
 def test_replay_begins_at_the_recorded_hand(recorded: hvf.Run) -> None:
@@ -92,7 +92,7 @@ def wired(folder: Path, **parts: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ask", "says"),
+    ("make", "message"),
     [
         (lambda run: wired(run / "nothing"), r"nothing/run.h5: cannot be opened \(there is no such file\)"),
         (lambda run: wired(run, clock=hvf.Clock(servo_period=2e-3)), "recorded every 0.001 s, and the servo runs every "
@@ -111,10 +111,10 @@ def wired(folder: Path, **parts: Any) -> None:
          "certified"],
 )  # fmt: skip
 def test_options_incompatible_with_replay_are_refused(
-    recorded: hvf.Run, ask: Callable[[Path], None], says: str
+    recorded: hvf.Run, make: Callable[[Path], None], message: str
 ) -> None:
-    with pytest.raises((hvf.ParameterError, SimError), match=says):
-        ask(recorded.folder)
+    with pytest.raises((hvf.ParameterError, SimError), match=message):
+        make(recorded.folder)
 
 
 def test_refused_replay_creates_no_folder(recorded: hvf.Run, tmp_path: Path) -> None:

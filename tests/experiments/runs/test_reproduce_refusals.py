@@ -25,10 +25,10 @@ def test_recording_of_python_simulation_refers_to_its_script(
     sim.run(0.1, record=tmp_path / "run")
     capsys.readouterr()
     assert main(["reproduce", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err
-    assert "is of a simulation put together in Python" in said
-    assert "run the script again" in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert "is of a simulation put together in Python" in stderr
+    assert "run the script again" in stderr
+    assert stderr.count("\n") == 1
 
 
 def test_recording_of_another_version_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -43,7 +43,7 @@ def test_recording_of_another_version_is_refused(tmp_path: Path, capsys: pytest.
         file["config"] = json.dumps(config)
     capsys.readouterr()
     assert main(["reproduce", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert "it was recorded by another version of the program, which can run it again" in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert "it was recorded by another version of the program, which can run it again" in stderr
+    assert stderr.count("\n") == 1
     assert RunConfig()

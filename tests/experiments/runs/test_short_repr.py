@@ -38,9 +38,9 @@ SHOWN = [
 ]
 
 
-@pytest.mark.parametrize(("part", "said"), SHOWN, ids=lambda value: type(value).__name__)
-def test_repr_is_short_and_without_addresses(part: object, said: str) -> None:
-    assert said in repr(part)
+@pytest.mark.parametrize(("part", "text"), SHOWN, ids=lambda value: type(value).__name__)
+def test_repr_is_short_and_without_addresses(part: object, text: str) -> None:
+    assert text in repr(part)
     assert len(repr(part)) <= 250, repr(part)
     assert "0x" not in repr(part)
 

@@ -44,8 +44,8 @@ def run(sim: hvf.Simulation) -> hvf.Run:
 
 
 def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
-    shown = [sim, sim.field, sim.haptic_map, run, run.ticks, hvf.circle(), hvf.clips("walk")[0], hvf.persona("median")]
-    for value in shown:
+    values = [sim, sim.field, sim.haptic_map, run, run.ticks, hvf.circle(), hvf.clips("walk")[0], hvf.persona("median")]
+    for value in values:
         assert len(repr(value)) < 600, repr(value)
         assert "array(" not in repr(value), repr(value)
         assert "0x" not in repr(value), repr(value)
@@ -96,9 +96,9 @@ def test_errors_of_own_map_end_the_run() -> None:
 
     curve = hvf.circle(lap=1.0)
     field = hvf.Follow(curve, k_r=300, b_d=8)
-    made = hvf.Simulation(field=field, haptic_map=Fails(), figure=hvf.Figure(kind="kinematic"))
+    failing = hvf.Simulation(field=field, haptic_map=Fails(), figure=hvf.Figure(kind="kinematic"))
     with pytest.raises(ValueError, match="no such place"):
-        made.run(0.5)
+        failing.run(0.5)
 
     class Small(hvf.HapticMap):
         def pose(self, x):

@@ -52,7 +52,7 @@ def test_force_bound_of_limited_field_is_set() -> None:
         np.testing.assert_array_equal(other.field.program().params, by_hand.params)
         np.testing.assert_array_equal(other.field.wrench(hand).force, by_hand.wrench(hand).force)
     assert np.linalg.norm(sim.field.wrench(hand).force) == pytest.approx(8.0)
-    for field, path, said in (
+    for field, path, message in (
         (
             level + level,
             "limited.force",
@@ -63,24 +63,24 @@ def test_force_bound_of_limited_field_is_set() -> None:
         (level.limited(1.0), "limited", "expected limited.force or limited.torque"),
         (level.limited(1.0), "force", "0 laws of the field have 'force'; expected one among level, or limited$"),
     ):
-        with pytest.raises(hvf.ParameterError, match=said):
+        with pytest.raises(hvf.ParameterError, match=message):
             with_values(simulation(field), {f"field.{path}": 1.0})
     with pytest.raises(hvf.ParameterError, match=r"field.limited.force must be at least 0 N, got -1"):
         with_values(sim, {"field.limited.force": -1.0})
 
 
 @pytest.mark.parametrize(
-    ("path", "said"),
+    ("path", "message"),
     [
         ("field.stiffness", "0 laws of the field have 'stiffness'; expected one among Follow, level"),
         ("clock.rate", "Clock has no 'rate'; expected some of servo_period, physics_step"),
         ("speed", "Simulation has no 'speed'"),
     ],
 )
-def test_unknown_path_is_named(path: str, said: str) -> None:
+def test_unknown_path_is_named(path: str, message: str) -> None:
     with pytest.raises(hvf.ParameterError, match="^" + path) as error:
         with_values(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + level), {path: 1.0})
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_invalid_sweep_tuning_or_record_arguments_are_refused() -> None:

@@ -25,9 +25,9 @@ def _angle(out: Path, flow: Literal["curve", "parallel"], user: Literal["push", 
 def test_pushed_hand_keeps_its_angle_only_in_parallel_flow(
     tmp_path: Path,
 ) -> None:
-    late = {
+    lag = {
         flow: float(np.abs(_angle(tmp_path, flow, "push") - _angle(tmp_path, flow, "relaxed")).max())
         for flow in ("parallel", "curve")
     }
-    assert late["parallel"] < 0.02
-    assert late["curve"] > 0.1
+    assert lag["parallel"] < 0.02
+    assert lag["curve"] > 0.1

@@ -60,9 +60,9 @@ def test_lifted_map_of_copies_adds_at_most_three_points_of_residual(name: str, t
 
 def test_lap_at_map_corner_has_the_residual_of_its_clip() -> None:
     clip = embedded("walk")
-    made = wire(run_config(clips=("walk",) * 4, lap=clip.duration, seconds=1.0)).haptic_map
-    assert isinstance(made, Cylindrical)
-    corner, own = motion_at(made, (0.0, 0.0), clip.duration), motion_of(clip.poses, clip.fps)
+    haptic_map = wire(run_config(clips=("walk",) * 4, lap=clip.duration, seconds=1.0)).haptic_map
+    assert isinstance(haptic_map, Cylindrical)
+    corner, own = motion_at(haptic_map, (0.0, 0.0), clip.duration), motion_of(clip.poses, clip.fps)
     assert corner.residual == pytest.approx(own.residual, abs=0.002)
     assert corner.skate == pytest.approx(own.skate, abs=0.005)
 

@@ -25,6 +25,6 @@ def test_single_clip_off_its_pace_is_tried_and_reported(
     """The run has flights; 2.2 s and 1.47 s are whole numbers of its strides, 1.8 s is off both by 20 %."""
     monkeypatch.setattr(leg_choice, "verdict_on", lambda *_: Verdict(0.2, 1.5))
     own = embedded("run").duration
-    for lap, said in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
+    for lap, remarks in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
         parts = map_parts(run_config(clips=("run",) * 4, lap=lap, seconds=1.0), figure_model())
-        assert parts.refine(physical=True).remarks[len(parts.remarks) :] == said
+        assert parts.refine(physical=True).remarks[len(parts.remarks) :] == remarks

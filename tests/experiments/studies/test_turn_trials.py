@@ -18,11 +18,11 @@ def test_refuted_turns_are_missed_and_feasible_ones_followed(name, pace):
     verdict = played.certificate.verdicts["turns"]
     assert verdict.verdict == "refuted"
     example = verdict.counterexample
-    done = trial(played.motion, example, JUDGING.friction)
-    assert done.onset == pytest.approx(done.rate, rel=0.005)
-    assert min(done.miss, done.miss_of_mean) > done.bound > 3e-3
+    outcome = trial(played.motion, example, JUDGING.friction)
+    assert outcome.onset == pytest.approx(outcome.rate, rel=0.005)
+    assert min(outcome.miss, outcome.miss_of_mean) > outcome.bound > 3e-3
     seconds = (example["end"] - example["start"]) / played.motion.fps
-    assert parabola(example["acceleration"], seconds, JUDGING.friction, 0.98 * done.rate).miss < 0.1 * done.bound
+    assert parabola(example["acceleration"], seconds, JUDGING.friction, 0.98 * outcome.rate).miss < 0.1 * outcome.bound
 
 
 def test_only_friction_limits_the_followed_motion():

@@ -44,16 +44,16 @@ def test_lost_scheduler_is_one_line_and_the_study_resumes(tmp_path: Path) -> Non
         while not (database.exists() and database.stat().st_size > 60_000) and time.monotonic() < until:
             time.sleep(0.1)
         scheduler.kill()
-        _, said = driver.communicate(timeout=120)
+        _, stderr = driver.communicate(timeout=120)
     finally:
         for process in (driver, worker, scheduler):
             process.kill()
             process.wait()
-    last = said.decode().strip().splitlines()[-1]
+    last = stderr.decode().strip().splitlines()[-1]
     assert driver.returncode == 2
     assert "the scheduler is lost" in last
     assert "every trial so far is kept" in last
-    assert "Traceback" not in said.decode()
+    assert "Traceback" not in stderr.decode()
     finish(start(study, tmp_path / "out", "--threads", "2"))
     finish(start(study, tmp_path / "one", "--threads", "2"))
     assert (tmp_path / "out" / "trials.csv").read_bytes() == (tmp_path / "one" / "trials.csv").read_bytes()

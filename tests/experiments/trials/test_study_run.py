@@ -20,11 +20,11 @@ pytest.importorskip("statsmodels")
 
 
 def small(**values: object) -> Study:
-    told: dict[str, object] = {
+    defaults: dict[str, object] = {
         "name": "small", "seconds": 0.5, "run": {"figure": "none"}, "factors": {"stiffness": [100, 300]},
         "users": {"number": 3}, "cost": "effort", "measures": ["tracking_error", "effort", "sparc"],
     }  # fmt: skip
-    return Study.of(**(told | values))
+    return Study.of(**(defaults | values))
 
 
 @pytest.mark.slow
@@ -54,17 +54,17 @@ def test_folder_with_another_study_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fewer", "says"),
+    ("fewer", "message"),
     [({"users": {"number": 2}}, "with 3 users.*those of 2 would"), ({"repetitions": 1}, "with 2 repetitions.*of 1")],
 )
 def test_fewer_users_or_repetitions_than_stored_are_refused(
-    tmp_path: Path, fewer: dict[str, object], says: str
+    tmp_path: Path, fewer: dict[str, object], message: str
 ) -> None:
     whole = small(repetitions=2)
     trial = whole.trials[0]
     with Database(tmp_path / DATABASE, whole._identity(), "small", "") as database:
         database.add(Row(trial.key, "failed", "", {}, 0.0, "", ""), {"user": 2, "repetition": 1})
-    with pytest.raises(StudyError, match=says):
+    with pytest.raises(StudyError, match=message):
         small(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, "study.lock"}
 
@@ -140,7 +140,7 @@ def test_trial_key_covers_the_smoothness_code() -> None:
 
 
 @pytest.mark.parametrize(
-    ("threads", "workers", "cluster", "says"),
+    ("threads", "workers", "cluster", "message"),
     [
         (2, 2, None, "threads and workers contradict"),
         (0, None, None, "threads is 0"),
@@ -148,8 +148,8 @@ def test_trial_key_covers_the_smoothness_code() -> None:
     ],
 )
 def test_contradictory_executors_are_refused_without_output(
-    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, says: str
+    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, message: str
 ) -> None:
-    with pytest.raises(ParameterError, match=says):
+    with pytest.raises(ParameterError, match=message):
         small().run(tmp_path / "out", threads, workers, cluster)
     assert not (tmp_path / "out").exists()

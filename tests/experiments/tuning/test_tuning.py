@@ -77,9 +77,9 @@ def test_resumed_search_equals_an_uninterrupted_one(tmp_path: Path, sampler: str
 @pytest.mark.usefixtures("certificates")
 def test_objectives_use_the_tasks_that_provide_them(tmp_path: Path) -> None:
     trade = {"objectives": ["tracking_error", "expressiveness"], "run": {"figure": "kinematic"}, "candidates": 1}
-    both = searched(tuning(tasks=["trace", "exaggerate"], **trade), tmp_path / "both")
-    assert both[0].objectives is not None
-    assert all(value > 0.0 for value in both[0].objectives)
+    candidates = searched(tuning(tasks=["trace", "exaggerate"], **trade), tmp_path / "both")
+    assert candidates[0].objectives is not None
+    assert all(value > 0.0 for value in candidates[0].objectives)
     with pytest.raises(StudyError, match=r"no trial of its users has 'expressiveness'; expected tasks"):
         searched(tuning(**trade), tmp_path / "one")
 
@@ -104,9 +104,9 @@ def test_candidate_with_a_failed_trial_is_not_chosen(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("certificates")
 def test_database_search_equals_journal_search_and_resumes(tmp_path: Path) -> None:
-    whole, kept = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
-    searched(tuning(candidates=2, storage=kept), tmp_path / "database")
-    assert searched(tuning(candidates=5, storage=kept), tmp_path / "database") == whole
+    whole, url = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
+    searched(tuning(candidates=2, storage=url), tmp_path / "database")
+    assert searched(tuning(candidates=5, storage=url), tmp_path / "database") == whole
 
 
 @pytest.mark.parametrize("text", ["root:x:0:0\nme:x:1:1\n", "a line", "[1, 2]\n", "5\n", '{"a": 1}\n'])
@@ -166,7 +166,7 @@ def test_pareto_front_and_its_middle_choice() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"space": {}}, "empty space"),
         ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "stifness is not known"),
@@ -182,8 +182,8 @@ def test_pareto_front_and_its_middle_choice() -> None:
         ({"sampler": "cma-es", "objectives": ["tracking_error", "effort"]}, "CMA-ES needs one objective"),
     ],
 )
-def test_contradictory_tuning_is_refused_in_one_line(values: dict[str, object], says: str) -> None:
-    with pytest.raises((StudyError, ParameterError), match=says) as raised:
+def test_contradictory_tuning_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
+    with pytest.raises((StudyError, ParameterError), match=message) as raised:
         check_tuning(tuning(**values))
     assert "\n" not in str(raised.value)
 
@@ -219,9 +219,9 @@ def test_cached_verdict_equals_the_computed_one_and_follows_the_gain() -> None:
 def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
     found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
-    taken = load_config(tmp_path / CHOSEN)
-    assert taken.mode.stiffness == found.values["stiffness"]  # pyright: ignore
-    assert kept_stability(taken).verdict == "certified"
+    config_of_run = load_config(tmp_path / CHOSEN)
+    assert config_of_run.mode.stiffness == found.values["stiffness"]  # pyright: ignore
+    assert kept_stability(config_of_run).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
@@ -240,5 +240,5 @@ def test_python_search_resumes_only_its_own_candidates(tmp_path: Path) -> None:
     assert found(8.0, lambda run: 1.0).costs == first.costs == (1.0,)
     assert found(8.0, lambda run: 2.0).costs == (2.0,)
     assert found(9.0, lambda run: 3.0 - 2.0).costs == (1.0,)
-    kept = storage_of(tmp_path / "journal")
-    assert len(kept.get_all_studies()) == 3
+    storage = storage_of(tmp_path / "journal")
+    assert len(storage.get_all_studies()) == 3

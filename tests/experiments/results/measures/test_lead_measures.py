@@ -125,11 +125,11 @@ def test_leading_path_is_reachable_and_closed() -> None:
     assert field.walking.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
 
 
-@pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
-def test_led_figure_begins_in_its_largest_support(name: str, most: int) -> None:
+@pytest.mark.parametrize(("name", "feet"), [("walk", 2), ("run", 1)])
+def test_led_figure_begins_in_its_largest_support(name: str, feet: int) -> None:
     led, gait = led_map(embedded(name), figure_model())
-    assert gait.support[0] == most
-    assert support_at(gait, np.array([0.0]))[0] == most
+    assert gait.support[0] == feet
+    assert support_at(gait, np.array([0.0]))[0] == feet
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
 
@@ -194,7 +194,7 @@ def test_lead_summary_lines() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "message"),
     [
         ({"map": "composite"}, "leave out --map"),
         ({"user": "push"}, "--user push"),
@@ -205,8 +205,8 @@ def test_lead_summary_lines() -> None:
         ({"leash": -1.0}, "leash is -1; expected 0 N/m or more, and finite"),
     ],
 )
-def test_invalid_lead_options_are_refused(options: dict, says: str) -> None:
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_lead_options_are_refused(options: dict, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         wire(run_config(mode="lead", **options))
 
 

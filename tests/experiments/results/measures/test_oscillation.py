@@ -53,21 +53,21 @@ def test_force_from_encoder_rounding_is_not_oscillation():
     step = 1.2e-4 * 0.2  # [m] of an encoder's count at the tip
     reading = step * (np.random.default_rng(5).uniform(size=(len(T), 3)) - 0.5)
     force = 0.6 * np.random.default_rng(6).choice([-1.0, 1.0], size=len(T))
-    told = {}
+    summaries = {}
     for name, amplitude in (("rounded", 0.0), ("moving", 2.0 * step)):
         moved = amplitude * np.outer(np.sin(2.0 * np.pi * 120.0 * T), AXIS)
-        told[name] = oscillation_summary(recording(np.outer(force, AXIS), reading + moved))
-    assert told["rounded"].since == told["moving"].since < 0.2
-    assert [told[name].oscillates for name in told] == [False, True]
-    assert told["rounded"].motion_over_rounding == pytest.approx(1.0, abs=0.15)
-    assert "Rounded encoders are felt" in told["rounded"].lines()[0]
-    assert "oscillates" not in told["rounded"].lines()[0]
+        summaries[name] = oscillation_summary(recording(np.outer(force, AXIS), reading + moved))
+    assert summaries["rounded"].since == summaries["moving"].since < 0.2
+    assert [summaries[name].oscillates for name in summaries] == [False, True]
+    assert summaries["rounded"].motion_over_rounding == pytest.approx(1.0, abs=0.15)
+    assert "Rounded encoders are felt" in summaries["rounded"].lines()[0]
+    assert "oscillates" not in summaries["rounded"].lines()[0]
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(
-    ("gains", "said"),  # 8217 N/m and 61 N s/m are critical
+    ("gains", "expected"),  # 8217 N/m and 61 N s/m are critical
     [
         (("--stiffness", "12000"), "It oscillates"),
         (("--stiffness", "12000", "--user", "push"), "It oscillates"),
@@ -77,8 +77,8 @@ def test_force_from_encoder_rounding_is_not_oscillation():
         (("--mode", "rivers", "--map", "rivers", "--user", "push"), None),
     ],
 )
-def test_run_beyond_critical_gain_is_reported_to_oscillate(gains, said, tmp_path):
+def test_run_beyond_critical_gain_is_reported_to_oscillate(gains, expected, tmp_path):
     assert main(["run", *gains, "--figure", "none", "--seconds", "6", "--out", str(tmp_path / "run")]) == 0
     lines = " ".join(json.loads((tmp_path / "run" / "summary.json").read_text())["lines"])
-    told = [words for words in ("It oscillates", "Rounded encoders are felt") if words in lines]
-    assert told == ([] if said is None else [said])
+    reported = [words for words in ("It oscillates", "Rounded encoders are felt") if words in lines]
+    assert reported == ([] if expected is None else [expected])

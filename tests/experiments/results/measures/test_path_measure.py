@@ -6,7 +6,7 @@ import pytest
 from experiments.results.measures.run_measures import PathMeasure
 
 
-class Bare:
+class PathRecording:
     """What `PathMeasure` takes of a recording."""
 
     def __init__(self, clip_seconds: float):
@@ -24,13 +24,13 @@ def test_stylus_at_end_of_open_curve_is_reported_as_stopped(block: int) -> None:
     jitter = 2e-4 * np.sin(300.0 * t)
     p = np.stack([0.01 * phase + jitter, 0.0 * t, 0.0 * t], axis=1)
     rows = {"t": t, "phase": phase, "p": p, "nearest": p, "distance": 0.0 * t, "user": 0.0 * p}
-    measure = PathMeasure(Bare(4.0))  # pyright: ignore[reportArgumentType]
+    measure = PathMeasure(PathRecording(4.0))  # pyright: ignore[reportArgumentType]
     for first in range(0, len(t), block):
         measure.add({name: values[first : first + block] for name, values in rows.items()})
     path = measure.summary()
     assert path.stopped_at == pytest.approx(1.95, abs=0.1)
     assert path.pace == pytest.approx(2.0, rel=0.05)
     assert "stood still from" in (path.line() or "")
-    going = PathMeasure(Bare(np.nan))  # pyright: ignore[reportArgumentType]
+    going = PathMeasure(PathRecording(np.nan))  # pyright: ignore[reportArgumentType]
     going.add({name: values[:1900] for name, values in rows.items()})
     assert going.summary().line() is None

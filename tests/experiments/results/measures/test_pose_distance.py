@@ -12,15 +12,15 @@ def figure() -> mujoco.MjModel:
 
 
 def poses(figure: mujoco.MjModel, n: int, seed: int) -> np.ndarray:
-    rng, made = np.random.default_rng(seed), np.tile(rest_pose(), (n, 1))
-    for pose in made:
+    rng, result = np.random.default_rng(seed), np.tile(rest_pose(), (n, 1))
+    for pose in result:
         mujoco.mj_integratePos(figure, pose, rng.normal(scale=0.3, size=N_TANGENT), 1.0)
-    return made
+    return result
 
 
 def test_segment_places_match_mujoco_kinematics(figure: mujoco.MjModel) -> None:
-    made, data = poses(figure, 5, 1), mujoco.MjData(figure)
-    for pose, places in zip(made, segment_places(made, figure), strict=True):
+    samples, data = poses(figure, 5, 1), mujoco.MjData(figure)
+    for pose, places in zip(samples, segment_places(samples, figure), strict=True):
         data.qpos = pose
         mujoco.mj_kinematics(figure, data)
         np.testing.assert_allclose(places, [data.body(body).xpos for body in BODIES], atol=1e-12)

@@ -11,10 +11,10 @@ from experiments.results.measures.smoothness import (
 )
 
 
-def reach(seconds: float, rate: float = 100.0, way: float = 1.0) -> np.ndarray:
+def reach(seconds: float, rate: float = 100.0, length: float = 1.0) -> np.ndarray:
     """Speed of a minimum-jerk reach, ẋ = (A/T) 30 (s² − 2 s³ + s⁴)."""
     s = np.arange(0.0, seconds, 1.0 / rate) / seconds
-    return way / seconds * 30.0 * (s**2 - 2.0 * s**3 + s**4)
+    return length / seconds * 30.0 * (s**2 - 2.0 * s**3 + s**4)
 
 
 def test_jerk_of_minimum_jerk_reach_matches_closed_form() -> None:
@@ -25,7 +25,7 @@ def test_jerk_of_minimum_jerk_reach_matches_closed_form() -> None:
 @pytest.mark.parametrize("measure", [spectral_arc_length, log_dimensionless_jerk])
 def test_smoothness_is_invariant_to_amplitude_and_duration(measure) -> None:
     first = measure(reach(1.0, 1000.0), 1000.0)
-    assert measure(reach(1.0, 1000.0, way=0.03), 1000.0) == pytest.approx(first, abs=1e-9)
+    assert measure(reach(1.0, 1000.0, length=0.03), 1000.0) == pytest.approx(first, abs=1e-9)
     assert measure(reach(2.0, 1000.0), 1000.0) == pytest.approx(first, abs=0.05)
 
 

@@ -87,9 +87,9 @@ def test_presses_of_default_tour_match_the_field_memory(tmp_path: Path, monkeypa
     for press, edit in zip(bending, edits, strict=True):
         phase = press.lap * CURVE.duration
         assert phase == pytest.approx(edit[0], abs=1.0 / 32.0)
-        kept = 1e3 * np.linalg.norm(bent.point(phase) - CURVE.point(phase))
-        assert press.deviation_mm == pytest.approx(kept, abs=1e-6)
-        assert press.dragged_mm == pytest.approx(kept, abs=0.3)
+        bent_mm = 1e3 * np.linalg.norm(bent.point(phase) - CURVE.point(phase))
+        assert press.deviation_mm == pytest.approx(bent_mm, abs=1e-6)
+        assert press.dragged_mm == pytest.approx(bent_mm, abs=0.3)
         assert press.dragged_mm > 3.0
         assert press.peak_force > 0.3
     assert [press.line() for press in presses[2:4]] == ["undone", "redone"]
@@ -173,6 +173,6 @@ def test_editing_and_performance_summary_lines() -> None:
         "The performed animation differs from the unedited one by up to 31.0° a joint where it was pushed, 27.0° "
         "elsewhere; residual force 12.4 % of body weight RMS.",
     ]
-    ended = EditingSummary(6.0, 14.3, (), (), animation, figure).lines()
-    assert ended[0] == "Editing, 6.0 s: the switch was not pressed."
-    assert ended[-1] == "It was to be performed from 14.3 s on, but the run ended before."
+    lines = EditingSummary(6.0, 14.3, (), (), animation, figure).lines()
+    assert lines[0] == "Editing, 6.0 s: the switch was not pressed."
+    assert lines[-1] == "It was to be performed from 14.3 s on, but the run ended before."

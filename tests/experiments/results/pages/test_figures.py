@@ -256,5 +256,7 @@ def test_figures_need_no_display(tmp_path):
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"} | {"MPLBACKEND": "tkagg"}
-    done = subprocess.run([sys.executable, "-c", script, tmp_path / "run.h5", tmp_path], env=environment, check=False)
-    assert done.returncode == 0
+    completed = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "run.h5", tmp_path], env=environment, check=False
+    )
+    assert completed.returncode == 0

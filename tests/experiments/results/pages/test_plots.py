@@ -27,8 +27,8 @@ def section(tmp_path: Path) -> str:
 
 
 def test_plot_data_matches_recording_including_a_one_tick_peak(tmp_path: Path) -> None:
-    made = section(tmp_path)
-    (text,) = re.findall(r'<script type="application/json" id="plot-data">(.*?)</script>', made, re.DOTALL)
+    html = section(tmp_path)
+    (text,) = re.findall(r'<script type="application/json" id="plot-data">(.*?)</script>', html, re.DOTALL)
     data = json.loads(text)
     assert (data["start"], data["end"]) == (0.0, pytest.approx(19.999))
     distance, forces = data["plots"]
@@ -38,8 +38,8 @@ def test_plot_data_matches_recording_including_a_one_tick_peak(tmp_path: Path) -
     field = np.array(forces["lines"][0]["y"])
     assert field.max() == 7.0
     assert np.argmax(field) / POINTS == pytest.approx(12_345 / N, abs=1.5 / POINTS)
-    assert len(made) < 60_000
-    assert "from </script>" not in made
+    assert len(html) < 60_000
+    assert "from </script>" not in html
 
 
 @pytest.mark.processes

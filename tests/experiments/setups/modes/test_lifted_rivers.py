@@ -30,8 +30,8 @@ def test_default_gains_are_soft_for_lifted_rivers():
         assert (mode.stiffness, mode.damping) == (300.0, 8.0)
     around = resolved(run_config(mode="rivers")).mode
     assert river_gains(around) == (around.stiffness, around.damping) == (150.0, 16.0)
-    given = resolved(run_config(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)).mode
-    assert river_gains(given) == (300.0, 8.0)
+    explicit = resolved(run_config(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)).mode
+    assert river_gains(explicit) == (300.0, 8.0)
     one = resolved(run_config(map="map.npz", mode="rivers", stiffness=40.0)).mode
     assert river_gains(one) == (40.0, 20.0)
 
@@ -41,8 +41,8 @@ def test_default_seek_gains_are_soft_for_lifted_maps():
         soft, firm = (resolved(run_config(mode, map)).mode for map in ("map.npz", "cylindrical"))
         assert (soft.seek, soft.tube_damping) == (50.0, 20.0)
         assert (firm.seek, firm.tube_damping) == (150.0, 14.0)
-        given = resolved(run_config(mode, "map.npz", seek=70.0)).mode
-        assert (given.seek, given.tube_damping) == (70.0, 20.0)
+        explicit = resolved(run_config(mode, "map.npz", seek=70.0)).mode
+        assert (explicit.seek, explicit.tube_damping) == (70.0, 20.0)
 
 
 def test_admissible_speeds_are_half_to_twice_the_river_speed():

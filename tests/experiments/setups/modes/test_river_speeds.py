@@ -59,10 +59,10 @@ def test_hysteresis_is_a_share_of_speed_above_encoder_noise(lap: float, margin: 
 
 @pytest.mark.parametrize("name", ["rivers", "cylindrical"])
 def test_rivers_too_slow_for_pushes_are_reported(name: str) -> None:
-    def said(lap: float) -> list[str]:
+    def remarks_on_speed(lap: float) -> list[str]:
         config = run_config(mode="rivers", map=name, figure="none", clips=("walk",), lap=lap)
         return [remark for remark in wire(config).remarks if "mm/s" in remark]
 
-    (slow,) = said(21.0)
+    (slow,) = remarks_on_speed(21.0)
     assert slow.startswith("the rivers lead the hand at 14.3 mm/s")
-    assert not said(8.0)
+    assert not remarks_on_speed(8.0)

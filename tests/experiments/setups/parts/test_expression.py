@@ -91,7 +91,7 @@ def test_orientation_moment_is_added_only_on_request():
     damped = run_config(orientation_damping=1e-3).mode.orientation
     assert len(with_moment(program, damped, curve, 0.25).ops) == len(program.ops) + 2
     belongs = "it belongs to --mode follow, --mode bunny, --mode rivers"
-    for options, says in (
+    for options, message in (
         (
             {"mode": "stretch", "orientation_stiffness": 0.1},
             f"--orientation-stiffness has no meaning with --mode stretch; {belongs}",
@@ -99,5 +99,5 @@ def test_orientation_moment_is_added_only_on_request():
         ({"orientation_stiffness": -0.1}, "orientation_stiffness is -0.1; expected 0 N m/rad or more, and finite"),
         ({"orientation_damping": np.nan}, "orientation_damping is nan; expected 0 N m s/rad or more, and finite"),
     ):
-        with pytest.raises(ParameterError, match=says):
+        with pytest.raises(ParameterError, match=message):
             run_config(**options)

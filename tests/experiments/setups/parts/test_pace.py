@@ -66,27 +66,29 @@ def test_paced_speed_is_curve_speed_plus_device_losses():
     found = paced(CURVE, 8.0, 300.0)
     assert found.periodic
     np.testing.assert_array_equal(found.positions, CURVE.positions)
-    own = np.asarray(CURVE.times)
-    middles = 0.5 * (own[1:] + own[:-1])
-    asked = np.linalg.norm(np.diff(CURVE.point(own), axis=0), axis=1) / np.diff(np.asarray(found.times))
+    times = np.asarray(CURVE.times)
+    middles = 0.5 * (times[1:] + times[:-1])
+    paced_speed = np.linalg.norm(np.diff(CURVE.point(times), axis=0), axis=1) / np.diff(np.asarray(found.times))
     speed = np.linalg.norm(CURVE.velocity(middles), axis=1)
     along, bending = inertia_along(CURVE, middles)
     cost = friction_along(CURVE, middles) + along
-    np.testing.assert_allclose(asked, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
+    np.testing.assert_allclose(paced_speed, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
     # The more a field drags and the stiffer it is, the less the device matters; without a spring no bend is kept.
     assert found.duration < paced(CURVE, 80.0, 300.0).duration < paced(CURVE, 80.0, 3000.0).duration < CURVE.duration
     assert paced(CURVE, 80.0, 0.0).duration > paced(CURVE, 80.0, 3000.0).duration
 
 
 def test_open_curve_stays_open_with_same_start():
-    way = Trajectory([1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]])
-    found = paced(way, 8.0, 300.0)
+    curve = Trajectory(
+        [1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]]
+    )
+    found = paced(curve, 8.0, 300.0)
     assert not found.periodic
     assert found.start == 1.0
 
 
 @pytest.mark.parametrize(
-    ("drag", "stiffness", "said"),
+    ("drag", "stiffness", "message"),
     [
         (-1.0, 300.0, "drag must be finite and at least 0 N s/m, got -1"),
         (0, 300.0, "drag must be more than 0 N s/m, got 0"),
@@ -94,8 +96,8 @@ def test_open_curve_stays_open_with_same_start():
         ("8", 300.0, "drag is '8'; expected a number"),
     ],
 )
-def test_invalid_drag_or_stiffness_is_refused(drag, stiffness, said):
-    with pytest.raises(ParameterError, match=said):
+def test_invalid_drag_or_stiffness_is_refused(drag, stiffness, message):
+    with pytest.raises(ParameterError, match=message):
         paced(CURVE, drag, stiffness)
 
 

@@ -30,16 +30,16 @@ def test_order_is_balanced_in_positions_and_sequences(n: int) -> None:
 
 
 def test_within_users_every_user_meets_every_condition() -> None:
-    made = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
-    met = meetings(made)
-    assert len(conditions(made)) == 6
+    design = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
+    met = meetings(design)
+    assert len(conditions(design)) == 6
     assert set(Counter((m.user, m.number) for m in met).values()) == {2}
     assert all(sorted(m.position for m in met if m.user == user) == list(range(12)) for user in range(7))
 
 
 def test_between_users_groups_are_equal_with_one_level_each() -> None:
-    made = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
-    levels = {user: {m.condition.levels["damping"] for m in meetings(made) if m.user == user} for user in range(9)}
+    design = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
+    levels = {user: {m.condition.levels["damping"] for m in meetings(design) if m.user == user} for user in range(9)}
     assert all(len(met) == 1 for met in levels.values())
     assert set(Counter(next(iter(met)) for met in levels.values()).values()) == {3}
 
@@ -51,8 +51,8 @@ def test_more_users_keep_the_trials_of_earlier_ones() -> None:
 
 
 def test_people_lead_in_lead_mode() -> None:
-    made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
-    assert {trial.config.user.does for trial in planned(made)} == {"lead"}
+    design = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
+    assert {trial.config.user.does for trial in planned(design)} == {"lead"}
 
 
 def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"factors": {}}, "has no factors"),
         ({"factors": {"stiffness": []}}, "'stiffness' has no levels"),
@@ -88,14 +88,14 @@ def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
         ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
     ],
 )  # fmt: skip
-def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], says: str) -> None:
-    with pytest.raises(StudyError, match=says) as raised:
+def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
+    with pytest.raises(StudyError, match=message) as raised:
         planned(study(**values))
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"repetitions": 0}, "repetitions is "),
         ({"order": "random"}, "order is "),
@@ -106,31 +106,31 @@ def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], 
         ({"between": "map"}, "between is 'map'"),
     ],
 )
-def test_unknown_or_invalid_study_value_is_refused_by_name(values: dict[str, object], says: str) -> None:
-    with pytest.raises(ParameterError, match=says) as raised:
+def test_unknown_or_invalid_study_value_is_refused_by_name(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as raised:
         study(**values)
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("levels", "says"),
+    ("levels", "message"),
     [([1, 2, 1], "has level 1 twice"), (3, "'stiffness' is 3; expected a list of values, or a table of levels")],
 )
-def test_invalid_or_duplicate_levels_are_refused(levels: object, says: str) -> None:
-    with pytest.raises(StudyError, match=says):
+def test_invalid_or_duplicate_levels_are_refused(levels: object, message: str) -> None:
+    with pytest.raises(StudyError, match=message):
         study(factors={"stiffness": levels})
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"measures": ["speed"]}, "no measure 'speed'"),
         ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical"),
         ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
     ],
 )
-def test_unavailable_measure_is_refused(values: dict[str, object], says: str) -> None:
-    with pytest.raises(StudyError, match=says):
+def test_unavailable_measure_is_refused(values: dict[str, object], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
         Study(study(**values)).run("nowhere")
 
 

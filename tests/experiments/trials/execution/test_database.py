@@ -70,8 +70,13 @@ def test_foreign_database_is_refused_and_unchanged(tmp_path: Path, change: str) 
             plain.execute("PRAGMA user_version = 99")
             plain.close()
     before = path.read_bytes()
-    says = {"version": "of version 99", "study": "holds another study", "other": "something else", "none": "not a data"}
-    with pytest.raises(StudyError, match=says[change]):
+    messages = {
+        "version": "of version 99",
+        "study": "holds another study",
+        "other": "something else",
+        "none": "not a data",
+    }
+    with pytest.raises(StudyError, match=messages[change]):
         opened(path, "b" if change == "study" else "a")
     assert path.read_bytes()[:64] == before[:64]
     if change in ("version", "study"):
