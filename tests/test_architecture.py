@@ -1,4 +1,4 @@
-"""Imports go one way: no file, and no folder, is reached from what it imports; tests lie as what they test."""
+"""No import cycles among files and folders; the folders of tests mirror those of the packages."""
 
 import ast
 import graphlib

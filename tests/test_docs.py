@@ -1,4 +1,4 @@
-"""What the documents show works: Python runs, commands parse, links lead somewhere, the site builds."""
+"""Documentation works as shown: Python runs, commands parse, links exist, the site builds."""
 
 import re
 import shlex

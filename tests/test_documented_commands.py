@@ -1,4 +1,4 @@
-"""Every command that README, tutorials and how-to pages tell a reader to type is typed, in their order."""
+"""Commands of README, tutorials and how-to pages, run in their order."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What the ``hvf`` command says to bad input: one line, exit code 2, nothing lost."""
+"""The `hvf` command with bad input: one line on stderr, exit code 2, nothing lost."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Numbers beyond all bounds end in a line, not in a traceback of NumPy or a wait."""
+"""Excessive numbers are refused in one line, without a traceback or a long wait."""
 
 from pathlib import Path
 

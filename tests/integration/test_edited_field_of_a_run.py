@@ -1,4 +1,4 @@
-"""V + U of runs on the simulated Phantom: integrating it gives what the hand performed."""
+"""The edited field V + U of a run on the simulated Phantom: its integral curve is the performed motion."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Every example runs as it stands, and prints what it promises."""
+"""Every example script runs unchanged and prints its expected result."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A figure of another stature moves in proportion: on the floor, without skating, and so in its files."""
+"""A figure of another stature moves in proportion, and so do its files."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A law in plain Python: a tick cut in three is the compiled tick to the last bit."""
+"""A law in plain Python: a tick interrupted for it equals the compiled tick exactly."""
 
 import numpy as np
 import pytest

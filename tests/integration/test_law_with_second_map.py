@@ -1,4 +1,4 @@
-"""A law may read another haptic map than the one that the figure follows, with a figure and without one."""
+"""A law may read another haptic map than the one that the figure follows."""
 
 import numpy as np
 import pytest

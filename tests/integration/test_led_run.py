@@ -1,4 +1,4 @@
-"""The whole servo leads a figure along an S in five seconds and straight back: it retraces its path, feet stay put."""
+"""A figure led along an S and straight back: it retraces its path, and its feet do not slide."""
 
 import json
 from pathlib import Path

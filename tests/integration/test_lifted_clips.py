@@ -1,4 +1,4 @@
-"""Real clips lifted: h along each clip's curve is the clip, at every frame, alone and among others."""
+"""Lifted clips: h along each clip's curve equals the clip at every frame, alone and among others."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Feet of in-betweens of lifted clips stand where they stand, although the mixture changes on the way."""
+"""Feet of in-betweens of lifted clips do not slide, although the mixture changes on the way."""
 
 import numpy as np
 import pytest

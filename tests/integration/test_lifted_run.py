@@ -1,4 +1,4 @@
-"""From clips to a map file to runs on it: FOLLOW on one curve, and a hand that is pushed over where lifting says."""
+"""From clips to a map file to runs on it: FOLLOW on one curve, and pushes over at the found transitions."""
 
 import json
 from pathlib import Path

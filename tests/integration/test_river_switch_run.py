@@ -1,4 +1,4 @@
-"""A hand that is pushed lightly at a crossing changes over on the simulated Phantom, and the other clip plays."""
+"""A lightly pushed hand on the simulated Phantom switches rivers at a crossing, and the other clip plays."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Fields lead a robot arm through the same loop and device as they do the figure."""
+"""Fields drive a robot arm through the same loop and device as the figure."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""A run from the command line to its folder: what it writes, what it measures, and that it happens again."""
+"""A run from the command line to its folder: files, measures, and exact reproduction."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""A hand that pushes towards what the figure cannot do meets a wall; without walls it goes there."""
+"""A hand pushed towards poses beyond the joint limits meets a wall; without walls it reaches them."""
 
 import numpy as np
 import pytest

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from experiments.config.words import run_config
-from tests.live.browser import ARGUMENTS, CHROMIUM, Served, drag, new_tab, on_screen
+from tests.live.browser import ARGUMENTS, CHROMIUM, ServedPage, drag, new_tab, on_screen
 from tests.live.watcher import sent_and_drawn
 
-WITH, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
+WITH_PAGE, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
 REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more than 1000 blocks of 8 ms
 LIMIT = 1.10
 LAP = 16.0  # [s]: the ball goes slowly enough to be taken by a mouse that sees it a few pictures late
@@ -34,7 +34,7 @@ class Stretch(NamedTuple):
     pictures: float
 
 
-def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretch:
+def measured(served: ServedPage, seconds: float, doing: Callable[[], None]) -> Stretch:
     """What a stretch of time cost in which something is done."""
     begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
     costs: list[np.ndarray] = []
@@ -48,7 +48,7 @@ def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretc
     return Stretch(float(most), float(middle), pace, (served.page.pictures - pictures) / passed)
 
 
-def used(served: Served, browser: Any, took_hold: list[bool]) -> Stretch:
+def measured_with_page(served: ServedPage, browser: Any, took_hold: list[bool]) -> Stretch:
     """The same with a page that is dragged, and loaded anew; and of each drag whether it took hold of the stylus."""
     tab = new_tab(browser, served.address)
 
@@ -64,7 +64,7 @@ def used(served: Served, browser: Any, took_hold: list[bool]) -> Stretch:
         tab.get_by_role("button", name="Pause").wait_for()
 
     try:
-        return watched(served, WITH, doing)
+        return measured(served, WITH_PAGE, doing)
     finally:
         tab.close()
 
@@ -73,7 +73,7 @@ def main() -> int:
     """Measure, and tell whether the ratio is within `LIMIT`."""
     from playwright.sync_api import sync_playwright
 
-    served = Served(run_config(mode="follow", lap=LAP, seconds=86400.0), Path(tempfile.mkdtemp()))
+    served = ServedPage(run_config(mode="follow", lap=LAP, seconds=86400.0), Path(tempfile.mkdtemp()))
     stretches = int(sys.argv[1]) if len(sys.argv) > 1 else STRETCHES
     alone: list[Stretch] = []
     took_hold: list[bool] = []
@@ -84,8 +84,8 @@ def main() -> int:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
             for _ in range(stretches):
-                alone.append(watched(served, ALONE, lambda: time.sleep(0.25)))
-                with_page.append(used(served, browser, took_hold))
+                alone.append(measured(served, ALONE, lambda: time.sleep(0.25)))
+                with_page.append(measured_with_page(served, browser, took_hold))
                 for name, (most, middle, pace, pictures) in (("alone", alone[-1]), ("with the page", with_page[-1])):
                     print(
                         f"{name:14s} p99 {1e6 * most:6.0f} µs, median {1e6 * middle:5.0f} µs, pace {pace:.2f}, "

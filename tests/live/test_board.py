@@ -1,4 +1,4 @@
-"""A reader of a board never sees half of what was written."""
+"""The shared-memory board: a reader never sees a partial write."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""A run's page in a browser: the line in its plots goes with the replay, plots are zoomed, and it fits a phone."""
+"""The page of a run in a browser: plot cursor and replay, zoom, and the width of a phone."""
 
 import time
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from tests.live.browser import PATIENCE, chromium, kept
+from tests.live.browser import PATIENCE, chromium, save_screenshot
 
 __all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
@@ -48,7 +48,7 @@ def test_plot_cursor_follows_the_replay_and_plots_zoom(chromium: Any, report: Pa
     until_beyond(page, 0.2)  # it plays by itself
     until_beyond(page, seconds_shown(page))
     replay.locator("button").first.dispatch_event("click")  # it stands still: drawing it takes a processor
-    kept(page, "report")
+    save_screenshot(page, "report")
     plot = page.locator("canvas.plot").first
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
@@ -60,7 +60,7 @@ def test_plot_cursor_follows_the_replay_and_plots_zoom(chromium: Any, report: Pa
     page.mouse.wheel(0, -1000)
     page.mouse.move(right, y)
     assert 2.0 < seconds_shown(page) < 3.2  # the window is 0.22 as wide, about the middle
-    kept(page, "report-zoomed")
+    save_screenshot(page, "report-zoomed")
     page.get_by_role("button", name="all", exact=True).click()
     page.mouse.move(right, y)
     assert seconds_shown(page) == pytest.approx(whole, abs=0.02)
@@ -71,5 +71,5 @@ def test_run_page_fits_a_phone(chromium: Any, report: Path) -> None:
     phone, replay = opened(chromium, report, 390, 780)
     replay.locator("button").first.dispatch_event("click")
     assert phone.evaluate("document.documentElement.scrollWidth") <= 390
-    kept(phone, "report-phone")
+    save_screenshot(phone, "report-phone")
     phone.close()

@@ -1,4 +1,4 @@
-"""The animator's loop on the live page, by mouse and keyboard: bend, perform, look back, record and compare takes."""
+"""The animator's workflow in a browser: bend, perform, look back, record and compare takes."""
 
 import time
 from collections.abc import Iterator
@@ -16,29 +16,39 @@ from experiments.live.session.take_mix import FPS, TakeData
 from sim.recording.recording import Recording
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT
-from tests.live.browser import Served, beside, choose, chromium, drag, fill, kept, new_tab, on_screen
+from tests.live.browser import (
+    ServedPage,
+    choose,
+    chromium,
+    control_beside,
+    drag,
+    fill,
+    new_tab,
+    on_screen,
+    save_screenshot,
+)
 
 __all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 
 @pytest.fixture(scope="module")
-def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedPage]:
     config = run_config(mode="stretch-then-follow", figure="kinematic", seconds=3600.0)
-    it = Served(config, tmp_path_factory.mktemp("live"))
-    yield it
-    it.close()
+    page = ServedPage(config, tmp_path_factory.mktemp("live"))
+    yield page
+    page.close()
 
 
 @pytest.fixture(scope="module")
-def tab(chromium: Any, served: Served) -> Iterator[Any]:
+def tab(chromium: Any, served: ServedPage) -> Iterator[Any]:
     page = new_tab(chromium, served.address, height=720)
     yield page
     page.close()
 
 
 @pytest.fixture(autouse=True)
-def goes_on(served: Served) -> None:
+def resume(served: ServedPage) -> None:
     served.desk.let_go()
     served.desk.pause(False)
 
@@ -47,12 +57,12 @@ def button(tab: Any, name: str) -> Any:
     return tab.get_by_role("button", name=name, exact=True).first
 
 
-def drawn(actor: Actor) -> Array:
+def drawn_positions(actor: Actor) -> Array:
     """Where an actor's bodies are drawn [m], shape (n, 3)."""
     return np.array([frame.position for frame in actor._frames.values()])
 
 
-def places(served: Served, pose: Array, at: Array) -> Array:
+def body_positions(served: ServedPage, pose: Array, at: Array) -> Array:
     """Where the bodies of the figure are in a pose (75,) [m]."""
     stage = served.page.stage
     assert stage is not None
@@ -62,7 +72,7 @@ def places(served: Served, pose: Array, at: Array) -> Array:
     return data.xpos[list(stage._figure._frames)] + at
 
 
-def test_curve_is_bent_with_the_page_switch_and_performed(tab: Any, served: Served) -> None:
+def test_curve_is_bent_with_the_page_switch_and_performed(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     desk.pause(True)
     place = served.settled()["p"].copy()
@@ -77,12 +87,12 @@ def test_curve_is_bent_with_the_page_switch_and_performed(tab: Any, served: Serv
     served.assert_until(lambda: desk.now["performs"][0] > 0.0, "it is performed")
     high = float(desk.now["course"].reshape(-1, 3)[:, 2].max())
     served.assert_until(lambda: desk.now["p"][2] > 0.7 * high, "the stylus goes up where the curve was bent up")
-    kept(tab, "performed")
+    save_screenshot(tab, "performed")
     button(tab, "Bend it again").click()
     served.assert_until(lambda: desk.now["performs"][0] == 0.0, "it can be bent again")
 
 
-def test_keys_control_time_undo_and_switch(tab: Any, served: Served) -> None:
+def test_keys_control_time_undo_and_switch(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     tab.get_by_text("First steps").first.click()  # a key belongs to the page, not to a field
     for key, paused in ((" ", True), (" ", False), (" ", True)):
@@ -105,14 +115,14 @@ def test_keys_control_time_undo_and_switch(tab: Any, served: Served) -> None:
     served.assert_until(lambda: not desk.paused, "and time goes on")
 
 
-def test_pace_setting_slows_time(tab: Any, served: Served) -> None:
+def test_pace_setting_slows_time(tab: Any, served: ServedPage) -> None:
     choose(tab, "Pace", "1/10")
     served.assert_until(lambda: 0.0 < served.desk.now["pace"][0] < 0.12, "a tenth of real time")
     choose(tab, "Pace", "real time")
     served.assert_until(lambda: served.desk.now["pace"][0] > 0.12, "and faster again")
 
 
-def record(tab: Any, served: Served, name: str, seconds: float) -> None:
+def record(tab: Any, served: ServedPage, name: str, seconds: float) -> None:
     fill(tab, "Name", name)
     served.assert_until(lambda: served.page._takes._name.value == name, "the name has come")
     button(tab, "Record").click()
@@ -121,7 +131,7 @@ def record(tab: Any, served: Served, name: str, seconds: float) -> None:
     served.assert_until(lambda: name in served.desk.takes() and not served.desk.records, "it is kept")
 
 
-def test_takes_are_named_and_invalid_names_answered(tab: Any, served: Served) -> None:
+def test_takes_are_named_and_invalid_names_answered(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     button(tab, "Perform the bent curve").click()
     served.assert_until(lambda: desk.now["performs"][0] > 0.0, "it is performed")
@@ -144,7 +154,7 @@ def test_takes_are_named_and_invalid_names_answered(tab: Any, served: Served) ->
     assert not desk.records
 
 
-def test_two_takes_are_overlaid(tab: Any, served: Served) -> None:
+def test_two_takes_are_overlaid(tab: Any, served: ServedPage) -> None:
     takes = served.page._takes
     served.assert_until(lambda: "shy" in takes._list.options and "proud" in takes._list.options, "they are offered")
     choose(tab, "Take", "proud")
@@ -156,14 +166,14 @@ def test_two_takes_are_overlaid(tab: Any, served: Served) -> None:
     served.assert_until(lambda: takes.compares, "both are shown")
     for name in ("proud", "shy"):
         tab.get_by_text(f"{name}:").first.wait_for()
-    kept(tab, "two-takes")
+    save_screenshot(tab, "two-takes")
     pair = [TakeData.of(served.desk.take(name)) for name in ("proud", "shy")]
     ghosts = takes._ghosts
     assert ghosts is not None
     assert len(ghosts._paths) == 2
     for ghost, take in zip(ghosts._ghosts, pair, strict=True):
-        seen = drawn(ghost)
-        everywhere = [float(np.abs(places(served, pose, GHOST_AT) - seen).max()) for pose in take.poses]
+        seen = drawn_positions(ghost)
+        everywhere = [float(np.abs(body_positions(served, pose, GHOST_AT) - seen).max()) for pose in take.poses]
         assert min(everywhere) < 1e-6, take.name  # a frame of the take, and of no other
     t, first, second = takes._plot.data
     np.testing.assert_allclose(t[: len(pair[1].force)], np.arange(len(pair[1].force)) / FPS)
@@ -173,7 +183,7 @@ def test_two_takes_are_overlaid(tab: Any, served: Served) -> None:
     served.assert_until(lambda: not takes.compares, "the default animation is back")
 
 
-def test_events_between_pictures_are_handled(served: Served) -> None:
+def test_events_between_pictures_are_handled(served: ServedPage) -> None:
     page, takes = served.page, served.page._takes
     event = SimpleNamespace(client_id=page.driver.client, client=None)
 
@@ -187,14 +197,14 @@ def test_events_between_pictures_are_handled(served: Served) -> None:
     served.assert_until(lambda: not takes.compares, "the page is there, and shows the default animation")
 
 
-def test_timeline_is_scrubbed_to_the_past_and_back(tab: Any, served: Served) -> None:
+def test_timeline_is_scrubbed_to_the_past_and_back(tab: Any, served: ServedPage) -> None:
     desk, stage = served.desk, served.page.stage
     assert stage is not None
     tab.get_by_role("tab", name="Takes").click()
     begin = float(desk.now["t"][0])
     record(tab, served, "looked at", 2.5)
     tab.get_by_role("tab", name="Play").click()
-    box = beside(tab, "Look back [s]").get_by_role("slider").bounding_box()
+    box = control_beside(tab, "Look back [s]").get_by_role("slider").bounding_box()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
     tab.mouse.move(x, y)
     tab.mouse.down()
@@ -204,15 +214,15 @@ def test_timeline_is_scrubbed_to_the_past_and_back(tab: Any, served: Served) -> 
     tab.mouse.up()
     t = served.settled()["t"][0] - served.page._clock.seconds_ago
     served.assert_until(lambda: abs(stage._t - t) < 0.06, "the picture is of then")
-    kept(tab, "looked-back")
+    save_screenshot(tab, "looked-back")
     with Recording(desk.take("looked at") / "run.h5") as recording:
         times = recording.channel("frames", "t")[:]
         poses = recording.channel("frames", "reference")[:]
     assert begin <= stage._t <= begin + float(times[-1]) + 3.0
-    seen = drawn(stage._figure)
-    distances = np.array([float(np.abs(places(served, pose, np.zeros(3)) - seen).max()) for pose in poses[::4]])
+    seen = drawn_positions(stage._figure)
+    distances = np.array([float(np.abs(body_positions(served, pose, np.zeros(3)) - seen).max()) for pose in poses[::4]])
     assert distances.min() < 5e-3
-    now = float(np.abs(places(served, desk.now["reference"], np.zeros(3)) - seen).max())
+    now = float(np.abs(body_positions(served, desk.now["reference"], np.zeros(3)) - seen).max())
     assert now > 5.0 * distances.min()
     tab.mouse.move(x - 6.0, y)
     tab.mouse.down()
@@ -226,7 +236,7 @@ def test_timeline_is_scrubbed_to_the_past_and_back(tab: Any, served: Served) -> 
     served.assert_until(lambda: stage._t > before + 0.2, "and goes on")
 
 
-def test_run_continues_from_the_displayed_past(tab: Any, served: Served) -> None:
+def test_run_continues_from_the_displayed_past(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     tab.get_by_role("tab", name="Play").click()
     served.assert_until(lambda: float(desk.now["t"][0]) > 3.0, "there is something to look back to")
@@ -238,7 +248,7 @@ def test_run_continues_from_the_displayed_past(tab: Any, served: Served) -> None
     served.assert_until(lambda: not desk.paused and served.page._clock.seconds_ago == 0.0, "and goes on")
 
 
-def test_curves_are_plotted_live(tab: Any, served: Served) -> None:
+def test_curves_are_plotted_live(tab: Any, served: ServedPage) -> None:
     tab.get_by_text("Curves", exact=True).first.click()
     plots = tab.locator(".u-over")
     plots.first.wait_for()
@@ -246,12 +256,12 @@ def test_curves_are_plotted_live(tab: Any, served: Served) -> None:
     plots.first.scroll_into_view_if_needed()
     before = float(served.page._plots._force.data[0][-1])
     served.assert_until(lambda: float(served.page._plots._force.data[0][-1]) > before, "they go on")
-    kept(tab, "curves")
+    save_screenshot(tab, "curves")
     tab.get_by_text("Curves", exact=True).first.click()
 
 
 def test_second_browser_watches_and_takes_over_an_idle_driver(
-    chromium: Any, tab: Any, served: Served, monkeypatch: pytest.MonkeyPatch
+    chromium: Any, tab: Any, served: ServedPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     desk, who = served.desk, served.page.driver
     tab.get_by_role("tab", name="Play").click()

@@ -1,4 +1,4 @@
-"""The hand on a SpaceMouse begins where the stylus is, goes as the cap is pushed, and lets go when it rests."""
+"""The hand moved by a SpaceMouse: it starts at the stylus, follows the cap, and lets go at rest."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A dragged hand is the arm of every simulated hand, at a point that is told anew for each block."""
+"""The force of a dragged hand: spring and damper to a target that is set anew for each block."""
 
 import numpy as np
 import pytest

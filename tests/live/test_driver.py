@@ -1,4 +1,4 @@
-"""Several watch, one drives."""
+"""Several browsers watch, one drives."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The verdict beside a slider is the certificate's."""
+"""The verdict beside a gain's slider equals the certificate."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a slider shows is its gain, and a number that is none of its is refused with its bounds."""
+"""The gains panel: sliders show the gains, and numbers out of range are refused with their bounds."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -25,9 +25,11 @@ class Gui:
         return Folder()
 
     def add_slider(self, label: str, least: float, most: float, step: float, value: float, hint: str) -> Any:
-        made = SimpleNamespace(min=least, max=most, value=value, on_update=lambda call: setattr(made, "moved", call))
-        self.sliders[label] = made
-        return made
+        slider = SimpleNamespace(
+            min=least, max=most, value=value, on_update=lambda call: setattr(slider, "moved", call)
+        )
+        self.sliders[label] = slider
+        return slider
 
 
 class Folder:
@@ -46,7 +48,7 @@ class Desk:
         self.config = with_gain(self.config, name, value)
 
 
-def made(**words: object) -> tuple[GainsPanel, Any, Any]:
+def make_panel(**words: object) -> tuple[GainsPanel, Any, Any]:
     gui, desk = Gui(), Desk(mode="follow", **words)
     panel = GainsPanel(gui, desk, lambda does: does)  # pyright: ignore[reportArgumentType]
     panel.rebuild()
@@ -61,7 +63,7 @@ def type_value(slider: Any, value: float) -> None:
 def test_number_beyond_slider_is_refused_and_the_gain_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    panel, desk, slider = made()
+    panel, desk, slider = make_panel()
     type_value(slider, 400.0)
     with pytest.raises(ParameterError, match="k_r is 20000; expected 10 to 12000 N/m"):
         type_value(slider, 20000.0)
@@ -74,7 +76,7 @@ def test_number_beyond_slider_is_refused_and_the_gain_restored(
 
 
 def test_slider_keeps_pending_value_and_follows_undo() -> None:
-    panel, desk, slider = made()
+    panel, desk, slider = make_panel()
     slider.value = 500.0
     panel.write()
     assert slider.value == 500.0
@@ -86,5 +88,5 @@ def test_slider_keeps_pending_value_and_follows_undo() -> None:
 
 
 def test_slider_range_includes_a_gain_from_the_command_line() -> None:
-    _, desk, slider = made(stiffness=20000.0)
+    _, desk, slider = make_panel(stiffness=20000.0)
     assert slider.value == slider.max == desk.config.mode.stiffness == 20000.0

@@ -1,4 +1,4 @@
-"""Messages of the live page: none twice, and none after what it is about was done again."""
+"""Messages of the live page: none twice, and none that is out of date."""
 
 import threading
 from types import SimpleNamespace
@@ -15,34 +15,39 @@ from sim.errors import SimError
 
 def page() -> Any:
     """A page without server and processes."""
-    it: Any = Page.__new__(Page)
-    it.driver, it._messages, it._lock, it._lines = Driver(), [], threading.RLock(), SimpleNamespace(content="")
-    return it
+    shown: Any = Page.__new__(Page)
+    shown.driver, shown._messages, shown._lock, shown._lines = (
+        Driver(),
+        [],
+        threading.RLock(),
+        SimpleNamespace(content=""),
+    )
+    return shown
 
 
 def test_repeated_message_is_shown_once_and_last() -> None:
-    it = page()
+    shown = page()
     for line in ("Nothing is left to undo.", "another", "Nothing is left to undo."):
-        it.say(line)
-    assert it._messages == ["another", "Nothing is left to undo."]
-    assert it._lines.content.count("Nothing") == 1
+        shown.say(line)
+    assert shown._messages == ["another", "Nothing is left to undo."]
+    assert shown._lines.content.count("Nothing") == 1
 
 
 def test_message_disappears_once_its_field_is_valid_again() -> None:
-    it, wrong = page(), [True]
+    shown, wrong = page(), [True]
 
     def set_value(event: Any) -> None:
         if wrong[0]:
             raise SimError("stiffness is -5")
 
-    field, event = it.acts(set_value), SimpleNamespace(client_id=1, client=None)
-    it.say("before")
+    field, event = shown.acts(set_value), SimpleNamespace(client_id=1, client=None)
+    shown.say("before")
     field(event)
-    it.say("after")
-    assert it._messages == ["before", "stiffness is -5", "after"]
+    shown.say("after")
+    assert shown._messages == ["before", "stiffness is -5", "after"]
     wrong[0] = False
     field(event)
-    assert it._messages == ["before", "after"]
+    assert shown._messages == ["before", "after"]
 
 
 @pytest.mark.parametrize(("paused", "holds"), [(True, True), (True, False), (False, True)])

@@ -1,4 +1,4 @@
-"""Pages that open from disk fit a phone: nothing is wider than its screen but what scrolls by itself."""
+"""Static pages fit a phone: nothing is wider than its screen but what scrolls by itself."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Regions of a take are taken over from another one where that is at the same phase of the curve."""
+"""Mixing of takes: a region is taken from another take at equal phase of the curve."""
 
 import numpy as np
 import pytest

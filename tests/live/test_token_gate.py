@@ -1,4 +1,4 @@
-"""Who has no token does not come in, and no other web page uses this one."""
+"""The token gate: requests without the token, or from other web pages, are refused."""
 
 import http.client
 import socket

@@ -1,4 +1,4 @@
-"""A take of which the page was closed ends by itself."""
+"""A take that no browser watches any more ends by itself."""
 
 from typing import Any
 
@@ -10,9 +10,9 @@ from experiments.live.session.desk import UNWATCHED, Desk
 
 
 def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    it: Any = Desk.__new__(Desk)
+    bare_desk: Any = Desk.__new__(Desk)
     messages, stops, now = list[str](), list[float](), [100.0]
-    it._say, it.stop, it._watch_time, it.now = (
+    bare_desk._say, bare_desk.stop, bare_desk._watch_time, bare_desk.now = (
         messages.append,
         lambda: stops.append(now[0]),
         0.0,
@@ -21,13 +21,13 @@ def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(desk.time, "monotonic", lambda: now[0])
     for browsers, seconds in ((1, 1.0), (0, UNWATCHED - 1.0), (1, 1.0), (0, UNWATCHED - 1.0)):
         now[0] += seconds
-        it.watched(browsers)
+        bare_desk.watched(browsers)
     assert not stops
     now[0] += 2.0
-    it.watched(0)
-    it.watched(0)
+    bare_desk.watched(0)
+    bare_desk.watched(0)
     assert len(stops) == len(messages) == 1
-    it.now["recording"][:] = 0.0
+    bare_desk.now["recording"][:] = 0.0
     now[0] += 2.0 * UNWATCHED
-    it.watched(0)
+    bare_desk.watched(0)
     assert len(stops) == 1

@@ -20,13 +20,13 @@ from websockets.typing import Origin, Subprotocol
 
 from experiments.live.page import Page
 
-COMING = 2.0  # [s] in which a browser is told what there is
+CONNECTING = 2.0  # [s] in which a browser is told what there is
 HEADER = 16  # bytes: lengths of what is packed, unpacked and packed
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 MOVES = "/phantom/"  # it moves in every picture
 
 
-def watching(port: int, seconds: float, stalled: bool = False) -> "subprocess.Popen[str]":
+def start_watcher(port: int, seconds: float, stalled: bool = False) -> "subprocess.Popen[str]":
     """Begin to watch a page."""
     command = [sys.executable, "-m", "tests.live.watcher", str(port), str(seconds), *["stalled"] * stalled]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -34,7 +34,7 @@ def watching(port: int, seconds: float, stalled: bool = False) -> "subprocess.Po
 
 def sent_and_drawn(page: Page, seconds: float) -> tuple[float, float]:
     """Pictures a second that a watcher gets of a page of this process, and that the page draws meanwhile."""
-    watcher = watching(page.port, COMING + seconds)
+    watcher = start_watcher(page.port, CONNECTING + seconds)
     drawn: list[tuple[float, int]] = []
     while watcher.poll() is None:
         drawn.append((time.perf_counter(), page.pictures))

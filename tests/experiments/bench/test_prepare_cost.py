@@ -1,4 +1,4 @@
-"""What `hvf bench` prepares: clips with the faults of captures, which preparation removes."""
+"""Clips degraded for `hvf bench`: they have the faults of captures, and preparation removes them."""
 
 import numpy as np
 import pytest

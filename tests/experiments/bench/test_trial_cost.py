@@ -1,4 +1,4 @@
-"""What `hvf bench` says of studies, in small: that its rows are measured, not how fast this machine is."""
+"""Cost of studies in `hvf bench`, on small studies: values are measured, the speed of this machine is not judged."""
 
 import pytest
 from rich.console import Console

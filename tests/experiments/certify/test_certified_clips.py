@@ -1,4 +1,4 @@
-"""Flights of a figure of another stature are judged as it flies: gravity does not shrink with it."""
+"""Ballistic verdicts on the clips of a run: of a figure of another stature, and of the animation as it was played."""
 
 import re
 from types import SimpleNamespace

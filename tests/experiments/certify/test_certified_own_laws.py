@@ -1,4 +1,4 @@
-"""Certificates of laws of one's own: of every case of a law, never of one that shakes, and with a true reason."""
+"""Certificates of a user's own laws: all cases are covered, no oscillating law is certified, and reasons are true."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.state import HandState
 
 CURVE = hvf.circle(radius=0.0477, lap=4.0)
-ON_CURVE = np.hstack([CURVE.point(np.linspace(0.0, 3.9, 40)), CURVE.velocity(np.linspace(0.0, 3.9, 40))])
+CURVE_STATES = np.hstack([CURVE.point(np.linspace(0.0, 3.9, 40)), CURVE.velocity(np.linspace(0.0, 3.9, 40))])
 
 
 def simulation(law):
@@ -41,11 +41,11 @@ def numpy_rail(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if 0.04 < r < 0.06 else (0.0, 0.0, 0.0)
 
 
-def cut(hand, k=2e4):
+def saturated(hand, k=2e4):
     return 0.0, 0.0, max(-5.0, min(5.0, -k * float(hand.p[2])))
 
 
-def swallowing(hand, k=2e4):
+def catching_errors(hand, k=2e4):
     try:
         z = float(hand.p[2])
     except Exception:
@@ -53,15 +53,15 @@ def swallowing(hand, k=2e4):
     return 0.0, 0.0, -k * z
 
 
-def of_floats(hand, k=2e4):
+def checking_type(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if isinstance(hand.p[2], float) else (0.0, 0.0, 0.0)
 
 
-def beside(hand, k=2e4):
+def zero_on_curve(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if abs(hand.p[2]) > 1e-4 else (0.0, 0.0, 0.0)
 
 
-def hidden(hand, k=2e4):
+def steep_off_curve(hand, k=2e4):
     """Without stiffness on the curve, with all of it a few hundredths of a millimetre off."""
     return 0.0, 0.0, -k * hand.p[2] * (1.0 - np.exp(-((hand.p[2] / 1e-5) ** 2)))
 
@@ -70,7 +70,7 @@ def relay(hand, c=1.0):
     return 0.0, 0.0, (-c if hand.p[2] > 0.0 else c)
 
 
-def dry(hand, c=0.5):
+def dry_friction(hand, c=0.5):
     return 0.0, 0.0, -c * np.sign(hand.v[2])
 
 
@@ -92,14 +92,28 @@ def step(hand):
     return (0.1 if hand.p[0] > 0 else 0.0), 0, 0
 
 
-def flip(hand, k=900.0):
+def switching_spring(hand, k=900.0):
     return (0, 0, -k * hand.p[2]) if hand.p[2] * hand.v[2] > 0 else (0, 0, 0.25 * k * hand.p[2])
 
 
 # What shakes is never certified.
 
 
-@pytest.mark.parametrize("function", [rail, cut, swallowing, of_floats, numpy_rail, beside, hidden, relay, dry, damped])
+@pytest.mark.parametrize(
+    "function",
+    [
+        rail,
+        saturated,
+        catching_errors,
+        checking_type,
+        numpy_rail,
+        zero_on_curve,
+        steep_off_curve,
+        relay,
+        dry_friction,
+        damped,
+    ],
+)
 def test_law_that_oscillates_in_simulation_is_not_certified(function):
     assert "It oscillates" in str(simulation(hvf.law(function)).run(1.0))
     assert stability(function).verdict != "certified"
@@ -120,7 +134,7 @@ def test_law_that_converts_to_float_is_refuted_by_linearisation_or_unknown(compi
 
 def test_symbolic_law_that_differs_from_executed_law_is_rejected():
     with pytest.raises(ControllerError, match="another force in a run than on symbols, as for a hand at p = "):
-        certified_cases(hvf.law(of_floats), CURVE)
+        certified_cases(hvf.law(checking_type), CURVE)
     with pytest.raises(ControllerError, match="numbers that are not finite"):
         certified_cases(hvf.law(lambda hand: (math.nan, 0, 0)), CURVE)
     state = [0.0]
@@ -151,11 +165,11 @@ def test_states_with_saturated_force_are_excluded_from_linearisation():
     """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
     sim = simulation(plane)
-    cut, in_part = (
+    saturated, in_part = (
         dataclasses.replace(sim, field=field)
         for field in (sim.field.limited(8.0), hvf.Follow(CURVE, k_r=300.0, b_d=8.0).limited(0.5) + plane)
     )
-    free, less, part = (hvf.certify(variant, NO_HANDS).stability for variant in (sim, cut, in_part))
+    free, less, part = (hvf.certify(variant, NO_HANDS).stability for variant in (sim, saturated, in_part))
     whole, judged = (int(re.findall(r"grows at (\d+) states", verdict.reason)[0]) for verdict in (free, less))
     assert less.verdict == "certified"
     assert judged < whole
@@ -185,24 +199,24 @@ def test_floor_verdict_is_that_of_its_stiffest_case():
 
 @pytest.mark.slow
 def test_stable_cases_with_uncertified_switching_are_unknown():
-    found = hvf.certify(simulation(hvf.law(flip))).stability
+    found = hvf.certify(simulation(hvf.law(switching_spring))).stability
     assert found.verdict == "unknown"
     assert "switching between them is not certified" in found.reason
 
 
 def test_case_slopes_bound_the_force_around_the_curve():
-    kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, beside: 2, numpy_rail: 2}
+    kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, zero_on_curve: 2, numpy_rail: 2}
     for function, count in kinds.items():
         cases = cases_of(hvf.law(function))
         if not count:
             with pytest.raises(ControllerError, match="no stiffness and damping"):
-                slopes_of(cases, ON_CURVE)
+                slopes_of(cases, CURVE_STATES)
             continue
-        assert len(slopes_of(cases, ON_CURVE)) == count
-    soft, stiff = sorted(slopes_of(cases_of(hvf.law(floor)), ON_CURVE), key=lambda slope: np.abs(slope).max())
+        assert len(slopes_of(cases, CURVE_STATES)) == count
+    soft, stiff = sorted(slopes_of(cases_of(hvf.law(floor)), CURVE_STATES), key=lambda slope: np.abs(slope).max())
     rng = np.random.default_rng(1)
     for off in rng.normal(scale=(3e-3,) * 3 + (0.05,) * 3, size=(200, 6)):
-        hand = ON_CURVE[0] + off
+        hand = CURVE_STATES[0] + off
         force = hvf.law(floor).wrench(HandState.at(hand[:3], hand[3:])).force[2]
         ends = sorted((float(soft[2] @ off), float(stiff[2] @ off)))
         assert ends[0] - 1e-12 <= force <= ends[1] + 1e-12
@@ -230,7 +244,7 @@ def test_force_without_derivative_on_the_curve_is_unknown():
 
 
 def test_all_feasible_branches_become_cases_up_to_a_limit():
-    assert len(cases_of(hvf.law(dry)).cases) == 3
+    assert len(cases_of(hvf.law(dry_friction)).cases) == 3
     assert len(cases_of(hvf.law(floor)).cases) == 3
     with pytest.raises(ControllerError, match="more than 16 cases"):
         cases_of(hvf.law(lambda hand: np.clip(-300.0 * hand.p, -1.0, 1.0)))

@@ -94,7 +94,7 @@ def of_time(hand, k=1e6):
 
 
 @hvf.law
-def of_turn(hand, k=10.0):
+def of_orientation(hand, k=10.0):
     return k * hand.q[1] * hand.p[0], k * hand.w[2], 0.0
 
 
@@ -112,7 +112,7 @@ def with_moment(hand, k=100.0):
     ("law", "message"),
     [
         (of_time, "depends on the time of the hand"),
-        (of_turn, "depends on the orientation and the angular velocity of the hand"),
+        (of_orientation, "depends on the orientation and the angular velocity of the hand"),
         (of_switch, "depends on the switch of the hand"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`certify` writes what it finds, finds it again by its hash, and `--verify` notices every change of an input."""
+"""`hvf certify`: files written, reuse of a certificate with equal inputs, and `--verify` for every changed input."""
 
 import json
 import subprocess

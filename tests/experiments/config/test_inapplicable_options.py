@@ -1,4 +1,4 @@
-"""What has no meaning beside the chosen figure or rivers is refused, its default too, and is in no file."""
+"""Options that do not apply to the chosen figure or rivers are refused, even at their default, and not written out."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""Configurations: every number has an interval, every option its place; JSON and words say the same as the parts."""
+"""Configurations: every number is bounded, every option has its place, and JSON and words round-trip."""
 
 import json
 from dataclasses import fields, is_dataclass, replace
@@ -69,7 +69,7 @@ def _limits(cls: Any, name: str) -> dict[str, Any]:
 NUMBERS = [(cls, name) for cls in PARTS for name in _numbers(cls)]
 
 
-def of(cls: type, **values: object) -> Any:
+def make_part(cls: type, **values: object) -> Any:
     return cls(**NEEDED.get(cls, {}), **values)
 
 
@@ -119,12 +119,12 @@ def test_number_outside_its_interval_is_refused_by_name(cls: type, name: str) ->
     wrong += [0] * ("gt" in limits or limits["ge"] > 0) + [inf] * (limits.get("allow_inf_nan") is False)
     for value in wrong:
         with pytest.raises(ParameterError, match=rf"^{name} is {value:g}; expected ") as error:
-            of(cls, **{name: value})
+            make_part(cls, **{name: value})
         assert in_options(error.value).startswith(f"{flag} is {value:g}; expected ")
     if limits.get("allow_inf_nan"):
-        assert getattr(of(cls, **{name: inf}), name) == inf
+        assert getattr(make_part(cls, **{name: inf}), name) == inf
     if "ge" in limits:
-        assert getattr(of(cls, **{name: limits["ge"]}), name) == limits["ge"]
+        assert getattr(make_part(cls, **{name: limits["ge"]}), name) == limits["ge"]
 
 
 def test_message_says_what_is_expected() -> None:
@@ -201,7 +201,7 @@ def test_lead_mode_and_led_map_require_each_other() -> None:
             make()
 
 
-def _every_config() -> list[RunConfig]:
+def _configs_of_all_kinds() -> list[RunConfig]:
     user = User(does="push", pushes=PUSHES, turns=TURNS, grabs=GRABS)
     maps = (
         Cylindrical(), Cylindrical(clips=("walk",), around=Circle(lap=2.5, radius=0.05), reach=0.02, expressive=True),
@@ -234,7 +234,7 @@ def _every_config() -> list[RunConfig]:
     return configs
 
 
-@pytest.mark.parametrize("config", _every_config(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
+@pytest.mark.parametrize("config", _configs_of_all_kinds(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
 def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> None:
     assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_json(RunConfig, to_json(config), "config.json") == config
@@ -244,7 +244,7 @@ def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> 
 
 
 def test_round_trip_cases_cover_every_mode_and_map() -> None:
-    configs = _every_config()
+    configs = _configs_of_all_kinds()
     assert {type(config.mode) for config in configs} == set(MODES)
     assert {type(config.map) for config in configs} == {*MAPS, Led}
 

@@ -1,4 +1,4 @@
-"""A person in a configuration: by name on the command line, whole in the file, refused in one line."""
+"""A person in a configuration: by name on the command line, written out in the file, invalid ones refused."""
 
 from dataclasses import replace
 from pathlib import Path

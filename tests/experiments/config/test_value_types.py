@@ -1,4 +1,4 @@
-"""Values of another kind: a number is a number, a switch is on or off, and a name is text, wherever they come from."""
+"""Types of configuration values: numbers, switches and names, from Python, words and files."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""What the command says of itself: the next step, how long it takes, how to go on after Ctrl-C."""
+"""Ctrl-C during a command: what was computed is kept, and stderr says how to continue."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Compilation before a run: what it needs is known before it is wired, and only what is missing is compiled."""
+"""Compilation before a run: its units are known before wiring, and only missing ones are compiled."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A run begins soon: it imports nothing that it does not need, and compiles nothing in its own process."""
+"""Start of a run: it imports nothing that it does not need, and compiles nothing in its own process."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ import experiments.cli, experiments.runs.run
 print(*(name for name in {HEAVY} if name in sys.modules))
 """
 
-_EVALUATES = """
+_EVALUATE_LAW = """
 import hvf
 import numpy as np
 field = hvf.Follow(hvf.circle(radius=0.0477, lap=4.0), k_r=300.0, b_d=8.0)
@@ -49,7 +49,7 @@ def test_compilation_listener_reports_compiled_functions() -> None:
 
 def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
     """As a certificate does with the program of a run."""
-    for completed in (process(TELLS + _EVALUATES), process(TELLS + _EVALUATES)):
+    for completed in (process(TELLS + _EVALUATE_LAW), process(TELLS + _EVALUATE_LAW)):
         assert float(completed.stdout) > 0.0
     assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(completed)).split())
 

@@ -1,4 +1,4 @@
-"""glTF and BVH of the figure in Blender: joints where they are here, and back from there without a loss."""
+"""glTF and BVH of the figure in Blender: joint positions agree, and BVH round-trips without loss."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Device files: what the program writes is read again, and what no device can be is refused by name."""
+"""Device files: written files are read back, and implausible values are refused by name."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Fields in files: they come back to the last bit, and a file that is none is refused."""
+"""Field files: exact round trip, and refusal of other files."""
 
 import numpy as np
 import pytest

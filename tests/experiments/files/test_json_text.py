@@ -1,4 +1,4 @@
-"""What is printed for other programs is JSON, whatever was measured."""
+"""JSON output is strict JSON for any measured value."""
 
 import json
 

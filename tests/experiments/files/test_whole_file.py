@@ -1,4 +1,4 @@
-"""A file that is being written is not seen, and what interrupts it leaves what was there."""
+"""Atomic writing of files: an unfinished file is never visible, and an interrupt keeps the old content."""
 
 import errno
 from pathlib import Path

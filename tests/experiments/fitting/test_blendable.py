@@ -1,4 +1,4 @@
-"""What cannot be blended, or is off its pace, is said before a run, on every map."""
+"""Remarks before a run on clips that cannot be blended or are off their pace, for every kind of map."""
 
 from dataclasses import replace
 from pathlib import Path

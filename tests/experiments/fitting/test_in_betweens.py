@@ -1,4 +1,4 @@
-"""Blends of the embedded clips: feet that stand do not slide nor sink, and the floor can give what they ask for."""
+"""Blends of the embedded clips: standing feet neither slide nor sink, and the floor can provide the needed forces."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ def map_of(clips):
     return wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
 
 
-def slower(values):
+def slow_params(values):
     return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
@@ -76,7 +76,7 @@ def test_similar_clips_are_blended_including_legs(clips):
     assert map_of(clips).upper == ()
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slow_params((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
 def test_in_between_feet_neither_slide_nor_sink(clips):
     for r, z in DENSE_MIXTURES:
         places = soles(laps(map_of(clips), r, z, count=1.5))
@@ -85,7 +85,7 @@ def test_in_between_feet_neither_slide_nor_sink(clips):
 
 
 @pytest.mark.parametrize(
-    "clips", [("walk", "angry", "cheer"), *slower([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
+    "clips", [("walk", "angry", "cheer"), *slow_params([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
 )
 def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
     h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map

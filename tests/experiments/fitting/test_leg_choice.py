@@ -1,4 +1,4 @@
-"""Whose legs carry the arms of others is decided by the physical figure, and what none of them bears is said."""
+"""The choice of the clip whose legs carry the arms of the others, by trials of the physical figure."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from models.mocap.library import embedded
 R, Z, LAP = (0.0227, 0.0727), (-0.025, 0.025), 4.4
 LEGS = figure_legs(figure_model())
 NAMES = ("run", "walk", "cheer", "angry")
-STANDS = np.inf
+NEVER = np.inf
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def set_verdicts(
 
 
 def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, NEVER), (3, 1.0): Verdict(0.01, NEVER)}
     trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
     best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (1, 1.0, ())
@@ -50,7 +50,7 @@ def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch
 def test_legs_with_least_residual_are_chosen_if_none_bear_well(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, NEVER), (3, 1.0): Verdict(0.08, NEVER)}
     trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
     best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (3, 1.0, ())
@@ -60,7 +60,7 @@ def test_legs_with_least_residual_are_chosen_if_none_bear_well(
 def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    set_verdicts(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
+    set_verdicts(monkeypatch, {(1, 1.0): Verdict(0.2, NEVER), (2, 0.25): Verdict(0.08, NEVER)}, {0, 1, 2, 3})
     best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (2, 0.25, ())
 
@@ -68,10 +68,10 @@ def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
 def test_sliding_legs_are_chosen_only_as_a_last_resort(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
+    verdicts = {(0, 1.0): Verdict(0.01, NEVER), (1, 0.0): Verdict(0.06, NEVER)}
     set_verdicts(monkeypatch, verdicts, {1, 2, 3})
     assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 1
-    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.01, STANDS)}, {1, 2, 3})
+    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.01, NEVER)}, {1, 2, 3})
     assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
@@ -82,7 +82,7 @@ def test_unbearable_map_is_reported_with_the_best_legs(
     best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
     assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
-    set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, STANDS)}, set())
+    set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, NEVER)}, set())
     assert carried(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
         "the physical figure lacks 14 % of weight with the legs of walk"
     )

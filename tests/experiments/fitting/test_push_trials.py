@@ -1,4 +1,4 @@
-"""A lifted map whose hand is pushed off its curve: how much of it the physical figure follows, and what is said."""
+"""Trials of a lifted map with a hand pushed off its curve: what the physical figure follows, and the remarks."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -48,26 +48,26 @@ def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lift
 
 
 FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
-WHOLE = "pushed off its curve to those beside it, the physical figure {} with the whole map"
+WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure {} with the whole map"
 
 
 @pytest.mark.parametrize(
     ("verdicts", "legs", "share", "expected"),
     [
         ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
-        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE.format("falls at 3.0 s"),)),
+        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
         (
             {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
-            1, 0.5, (WHOLE.format("lacks 20 % of weight"),),
+            1, 0.5, (WHOLE_MAP_REMARK.format("lacks 20 % of weight"),),
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.09, np.inf), 0.5: Verdict(0.08, np.inf), 0.25: Verdict(0.1, np.inf),
              0.0: Verdict(0.1, np.inf)},
-            1, 0.5, (WHOLE.format("falls at 3.0 s"),),
+            1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),),
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
-            1, 0.5, (WHOLE.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
+            1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
         ),
     ],
 )  # fmt: skip

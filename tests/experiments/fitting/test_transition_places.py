@@ -1,4 +1,4 @@
-"""How far a push over to another curve of a lifted map carries the figure, and that it is said before the run."""
+"""Distance by which a transition of a lifted map moves the figure over the floor, and the remark before the run."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the keys of who stands beside a device do: Enter arms, and lets go; nothing that was typed before counts."""
+"""Keys of the operator beside a device: Enter arms and disarms; keys typed earlier are ignored."""
 
 import errno
 import os

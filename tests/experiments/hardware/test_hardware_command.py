@@ -1,4 +1,4 @@
-"""`hvf hardware`: what a person, and a program, is told where nothing is connected."""
+"""`hvf hardware` with no device connected: messages for people, and JSON for programs."""
 
 import errno
 import json

@@ -1,4 +1,4 @@
-"""The folder of a hardware run, and its summary: one run at a time, and no more than what is known of it."""
+"""The folder and summary of a hardware run: one run at a time, and unknown values are marked as unknown."""
 
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""What a person meets who runs a device: permits, one line where something is wrong, a folder with what happened."""
+"""`hvf hardware run`, calibrate and identify: permits, refusals in one line, device files, and recordings."""
 
 import json
 import re

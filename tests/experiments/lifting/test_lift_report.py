@@ -1,4 +1,4 @@
-"""What `hvf lift` says of a map."""
+"""The report of `hvf lift`."""
 
 from controllers.haptic_map.lifting.room import Room
 from experiments.lifting.lift import lift_clips

@@ -1,4 +1,4 @@
-"""How maps are measured: on maps whose separation, conditioning and smoothness are known in closed form."""
+"""Measures of map quality on maps whose separation, conditioning and smoothness are known in closed form."""
 
 from types import SimpleNamespace
 

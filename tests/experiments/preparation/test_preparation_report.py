@@ -1,4 +1,4 @@
-"""What `hvf prepare` tells of a clip: its flights, as certificates define them, and what is not in the file."""
+"""The report of `hvf prepare`: flights as certificates define them, and what was added to the file's motion."""
 
 import numpy as np
 import pytest

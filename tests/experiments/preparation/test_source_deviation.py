@@ -1,4 +1,4 @@
-"""How far a motion is from its file, on motions that are, and are made not to be, as the file has them."""
+"""Deviation of a motion from its file, for faithful motions and for ones altered by a known amount."""
 
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Films: from any kind of run, whole or not at all, with nobody seen below the floor."""
+"""Films: of every kind of run, written completely or not at all, with bodies drawn above the floor."""
 
 import json
 import os
@@ -133,7 +133,7 @@ def test_travelling_figure_stays_in_the_picture(tmp_path: Path, backend: str) ->
         frames.close()
 
 
-def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
+def rendered(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
     """A frame below its words, as numbers."""
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show=show, ghost=ghost, width=320, height=240, fps=10.0), backend)
@@ -145,9 +145,9 @@ def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
 def test_ghost_and_force_arrow_are_drawn_only_if_present(tmp_path: Path, backend: str) -> None:
     run, rest = write_run(tmp_path / "run", RunSpec()), write_run(tmp_path / "rest", RunSpec(force=0.0))
     for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):
-        red, _, blue = np.moveaxis(drawn(run, "stage", ghost, backend), 2, 0)
+        red, _, blue = np.moveaxis(rendered(run, "stage", ghost, backend), 2, 0)
         assert least <= np.count_nonzero((blue > red + 40) & (red > 90)) <= most, ghost
-    difference = drawn(run, "workspace", "none", backend) - drawn(rest, "workspace", "none", backend)
+    difference = rendered(run, "workspace", "none", backend) - rendered(rest, "workspace", "none", backend)
     changed = np.abs(difference).max(axis=2) > 20
     assert 30 < np.count_nonzero(changed) < 3000
     assert np.count_nonzero(changed & (difference[..., 1] > difference[..., 0])) > 0.8 * np.count_nonzero(

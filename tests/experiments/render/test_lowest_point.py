@@ -1,4 +1,4 @@
-"""The lowest point of what is seen of a body, against the vertices of fine meshes of its geoms."""
+"""The lowest visible point of a body, against the vertices of fine meshes of its geoms."""
 
 import mujoco
 import numpy as np

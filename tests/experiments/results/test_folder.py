@@ -1,4 +1,4 @@
-"""The folder of a run: what is not of a run stays as it is."""
+"""The folder of a run: foreign files are kept, and concurrent runs refused."""
 
 import fcntl
 import os

@@ -1,4 +1,4 @@
-"""Arguments of `hvf` that are of another kind: refused where they are given, by name and with what would be right."""
+"""Arguments of `hvf` functions with a wrong type or value are refused at the call, by name."""
 
 import re
 from dataclasses import replace

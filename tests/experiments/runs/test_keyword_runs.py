@@ -1,4 +1,4 @@
-"""Runs in words, captures, and lifted maps from Python: the same as on the command line."""
+"""`hvf.run`, `hvf.load`, `hvf.prepare` and lifted maps from Python: the same results as on the command line."""
 
 from pathlib import Path
 from typing import Any

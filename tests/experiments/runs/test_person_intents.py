@@ -1,4 +1,4 @@
-"""Every intent, run to its end by a person in the whole loop: what was meant is looked for in what was done."""
+"""Every intent, carried out by a simulated person in the whole loop: the motion shows what was intended."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The public face: parts that are put together from Python, numbers that are swept, fields that are certified."""
+"""The public interface `hvf`: names, refused parts, own maps and laws, runs and their results."""
 
 import pickle
 import subprocess

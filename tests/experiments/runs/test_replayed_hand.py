@@ -1,4 +1,4 @@
-"""A recorded hand in place of a device: it moves as it was recorded, and what it cannot do is refused by name."""
+"""A recorded hand in place of a device: it moves as recorded, and incompatible options are refused by name."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""How long a run is has no effect on what happens in it, and it is as long however it is made."""
+"""The length of a run affects nothing before its end, and is the same recorded and in memory."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a prompt shows of a simulation and its parts: short, without addresses, clips and functions by name."""
+"""`repr` of a simulation and its parts: short, without addresses, clips and functions by name."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""FOLLOW's flow beside its curve: what a push across the curve does to the pace of a hand on the simulated Phantom."""
+"""FOLLOW's flow off the curve: how a push across the curve changes the pace of a hand on the simulated Phantom."""
 
 from pathlib import Path
 from typing import Literal

@@ -1,4 +1,4 @@
-"""FOLLOW over copies of one clip on a map costs the physical figure little more than the clip alone."""
+"""FOLLOW over copies of one clip on a map costs the physical figure little more than tracking the clip."""
 
 from functools import cache
 from pathlib import Path

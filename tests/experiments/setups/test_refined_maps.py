@@ -1,4 +1,4 @@
-"""What a refined map says before a run."""
+"""Remarks of a refined map before a run."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Certified rivers in random simulations: nothing diverges, and the experiment notices a river that does."""
+"""Certified rivers in random simulations: nothing diverges, and a river stiffer than certified is detected."""
 
 import numpy as np
 import pytest

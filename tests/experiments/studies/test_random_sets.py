@@ -1,4 +1,4 @@
-"""A random set of captures through the study's own functions: the figure stands and feet stay in place."""
+"""A random set of captures, by the functions of the study: the figure stands and feet stay in place."""
 
 from pathlib import Path
 

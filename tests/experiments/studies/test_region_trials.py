@@ -1,4 +1,4 @@
-"""Simulations from the edge of a certified region: none leaves it, and all end in the ball."""
+"""Simulations from the boundary of a certified region: none leaves it, and all end in the ball."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What of two courses that differ is another path, and what another time."""
+"""Separation of the difference of two trajectories into path and timing."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is certified of turns, starts and stops against a mass on a foot in MuJoCo: each test could refute it."""
+"""Verdicts on turns, starts and stops, against a mass on a foot in MuJoCo."""
 
 import numpy as np
 import pytest

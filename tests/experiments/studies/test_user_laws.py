@@ -1,4 +1,4 @@
-"""People against published laws: each number within its published interval, for panels that nothing was tuned on."""
+"""Simulated people against published laws: values within the published intervals, on panels not used for tuning."""
 
 from collections.abc import Sequence
 from pathlib import Path

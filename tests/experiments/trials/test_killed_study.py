@@ -1,4 +1,4 @@
-"""Real processes: Dask's workers and scheduler, and drivers, killed at random moments."""
+"""Studies as real processes: workers, scheduler and drivers killed at random moments."""
 
 import socket
 import subprocess

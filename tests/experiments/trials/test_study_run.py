@@ -1,3 +1,5 @@
+"""Studies run in this process: tables, resumption, failures, and refused settings."""
+
 import json
 import math
 from pathlib import Path
@@ -19,7 +21,7 @@ pandas = pytest.importorskip("pandas")
 pytest.importorskip("statsmodels")
 
 
-def small(**values: object) -> Study:
+def small_study(**values: object) -> Study:
     defaults: dict[str, object] = {
         "name": "small", "seconds": 0.5, "run": {"figure": "none"}, "factors": {"stiffness": [100, 300]},
         "users": {"number": 3}, "cost": "effort", "measures": ["tracking_error", "effort", "sparc"],
@@ -29,13 +31,13 @@ def small(**values: object) -> Study:
 
 @pytest.mark.slow
 def test_study_table_is_independent_of_threads_and_resumption(tmp_path: Path) -> None:
-    one = small().run(tmp_path / "one", threads=1)
-    small().with_users(number=2).run(tmp_path / "grown", threads=2)
-    grown = small().run(tmp_path / "grown", threads=2)
+    one = small_study().run(tmp_path / "one", threads=1)
+    small_study().with_users(number=2).run(tmp_path / "grown", threads=2)
+    grown = small_study().run(tmp_path / "grown", threads=2)
     assert (one.ran, grown.ran, one.failed) == (6, 2, 0)
     tables = [(tmp_path / name / "trials.csv").read_bytes() for name in ("one", "grown")]
     assert tables[0] == tables[1]
-    assert small().run(tmp_path / "one").ran == 0
+    assert small_study().run(tmp_path / "one").ran == 0
     assert pandas.read_parquet(tmp_path / "one" / "trials.parquet").equals(one.table)
     assert one.table["user"].value_counts().to_dict() == {0: 2, 1: 2, 2: 2}
     page = (tmp_path / "one" / REPORT).read_text(encoding="utf-8")
@@ -46,11 +48,11 @@ def test_study_table_is_independent_of_threads_and_resumption(tmp_path: Path) ->
 
 
 def test_folder_with_another_study_is_refused(tmp_path: Path) -> None:
-    changed, whole = small(factors={"stiffness": [100, 400]}), small()
+    changed, whole = small_study(factors={"stiffness": [100, 400]}), small_study()
     Database(tmp_path / DATABASE, whole._identity(), "small", "").close()
     with pytest.raises(StudyError, match="holds another study"):
         changed.run(tmp_path, threads=1)
-    assert small(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
+    assert small_study(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
 
 
 @pytest.mark.parametrize(
@@ -60,19 +62,19 @@ def test_folder_with_another_study_is_refused(tmp_path: Path) -> None:
 def test_fewer_users_or_repetitions_than_stored_are_refused(
     tmp_path: Path, fewer: dict[str, object], message: str
 ) -> None:
-    whole = small(repetitions=2)
+    whole = small_study(repetitions=2)
     trial = whole.trials[0]
     with Database(tmp_path / DATABASE, whole._identity(), "small", "") as database:
         database.add(Row(trial.key, "failed", "", {}, 0.0, "", ""), {"user": 2, "repetition": 1})
     with pytest.raises(StudyError, match=message):
-        small(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
+        small_study(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, "study.lock"}
 
 
 def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
     # A curve that the Phantom does not reach is known only when the run is wired up.
     factors = {"around": {"near": {"radius": 0.0477}, "far": {"radius": 0.4}}}
-    study = small(factors=factors, users={"number": 2})
+    study = small_study(factors=factors, users={"number": 2})
     trials = study.trials
     rows = [perform(Task(trial.key, to_json(trial.config)), Shelf()) for trial in trials]
     states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
@@ -82,7 +84,7 @@ def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
 
 def test_measures_of_tracing_and_exaggerating_tasks() -> None:
     task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
-    study = small(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
+    study = small_study(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
     rows = {t.meeting.condition.levels["task"]: perform(Task(t.key, to_json(t.config))) for t in study.trials}
     assert {row.state for row in rows.values()} == {"done"}
     for task, nothing, something in (
@@ -94,7 +96,7 @@ def test_measures_of_tracing_and_exaggerating_tasks() -> None:
 
 
 def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
-    trial = small().trials[0]
+    trial = small_study().trials[0]
 
     def full(*_: object) -> Row:
         raise OSError(28, "No space left on device")
@@ -105,7 +107,7 @@ def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_shared_maps_do_not_change_the_measures() -> None:
-    trials = small().trials[:3]
+    trials = small_study().trials[:3]
     shelf = Shelf()
     shared = [perform(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
     alone = [perform(Task(t.key, to_json(t.config)), Shelf()).measures for t in trials]
@@ -114,7 +116,7 @@ def test_shared_maps_do_not_change_the_measures() -> None:
 
 def test_recordings_are_stored_at_the_given_url(tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
-    trial = small().trials[0]
+    trial = small_study().trials[0]
     (tmp_path / "kept").mkdir()
     row = perform(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
     with Recording(tmp_path / "kept" / f"{trial.key}.h5") as recording:
@@ -126,13 +128,13 @@ def test_recordings_are_stored_at_the_given_url(tmp_path: Path) -> None:
 def test_invalid_recordings_url_is_refused_before_the_first_trial(tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
     with pytest.raises(StudyError, match=r"recordings = 'nosuch://x'.*a folder, or a URL"):
-        small(recordings="nosuch://x").run(tmp_path / "out")
+        small_study(recordings="nosuch://x").run(tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_condition_measure_is_refused_as_ease(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="ease = 'margin_used' is of a condition"):
-        small(ease="margin_used", measures=[]).run(tmp_path / "out")
+        small_study(ease="margin_used", measures=[]).run(tmp_path / "out")
 
 
 def test_trial_key_covers_the_smoothness_code() -> None:
@@ -151,5 +153,5 @@ def test_contradictory_executors_are_refused_without_output(
     tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, message: str
 ) -> None:
     with pytest.raises(ParameterError, match=message):
-        small().run(tmp_path / "out", threads, workers, cluster)
+        small_study().run(tmp_path / "out", threads, workers, cluster)
     assert not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""What is said of tuned values where too few users judge them."""
+"""The sentence on tuned values where too few users judge them."""
 
 from math import nan
 

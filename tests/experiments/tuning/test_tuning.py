@@ -1,3 +1,5 @@
+"""Tuning of gains: search, constraint by certificates, storage, and the result."""
+
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +71,7 @@ def test_refuted_candidates_are_never_simulated(tmp_path: Path) -> None:
 def test_resumed_search_equals_an_uninterrupted_one(tmp_path: Path, sampler: str) -> None:
     whole = searched(tuning(), tmp_path / "whole", sampler)
     searched(tuning(candidates=4), tmp_path / "stopped", sampler)
-    _begin_one_and_die(tmp_path / "stopped", sampler)
+    _leave_an_unfinished_trial(tmp_path / "stopped", sampler)
     assert searched(tuning(), tmp_path / "stopped", sampler) == whole
 
 
@@ -139,7 +141,7 @@ def test_pruned_candidate_has_no_objectives() -> None:
     assert (found.state, found.objectives) == ("given up", None)
 
 
-def _begin_one_and_die(folder: Path, sampler: str) -> None:
+def _leave_an_unfinished_trial(folder: Path, sampler: str) -> None:
     import optuna
 
     optuna.load_study(study_name=f"identity-{sampler}", storage=storage_of(folder / "journal")).ask()

@@ -1,4 +1,4 @@
-"""The summary of a field that leads along no curve: nothing is measured from one."""
+"""Summary of a run whose field has no curve: distances from a curve are absent."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is measured of a led run, on motions whose answer is known; and what of a configuration is refused."""
+"""Measures of a led run on motions with known answers, and refused configurations of the lead mode."""
 
 from pathlib import Path
 

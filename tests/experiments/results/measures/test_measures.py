@@ -1,4 +1,4 @@
-"""The measures of a run against the same measures taken at once, and against what is put into a recording by hand."""
+"""Measures of a run on a synthetic recording with known values, for any block size."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A run whose force shakes says so; tremor, pushes and noise are no oscillation."""
+"""Detection of oscillating forces; tremor, pushes and noise do not count."""
 
 import json
 from types import SimpleNamespace

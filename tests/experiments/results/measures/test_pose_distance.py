@@ -1,3 +1,5 @@
+"""Distances between poses: geodesic, and as seen by segment positions."""
+
 import mujoco
 import numpy as np
 import pytest

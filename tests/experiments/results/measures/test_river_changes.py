@@ -1,4 +1,4 @@
-"""Changes of river in a recording: told when the trace changes, neither earlier nor twice."""
+"""Switches between rivers in a recording: each is found once, at its first tick."""
 
 from pathlib import Path
 

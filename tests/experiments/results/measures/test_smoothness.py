@@ -1,3 +1,5 @@
+"""Smoothness of movements: spectral arc length and dimensionless jerk."""
+
 import numpy as np
 import pytest
 from scipy import signal

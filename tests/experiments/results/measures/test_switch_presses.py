@@ -1,4 +1,4 @@
-"""What a recording tells of each press of the switch, against what the field of the same run keeps in its memory."""
+"""Presses of the stylus switch in a recording, against the memory of the field of the same run."""
 
 from collections.abc import Sequence
 from dataclasses import replace

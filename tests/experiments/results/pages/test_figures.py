@@ -1,4 +1,4 @@
-"""The figures show what was recorded, in the units they name."""
+"""Figures of a run show the recorded values in the stated units."""
 
 import itertools
 import os

@@ -1,4 +1,4 @@
-"""The picture of a led run: what is in it, in the units that it names, and nothing on top of it."""
+"""The figure of a led run: contents, units, and no overlapping text."""
 
 import matplotlib as mpl
 import numpy as np

@@ -1,4 +1,4 @@
-"""Plots of a run's page: their numbers are the recording's, no peak is lost, and a line is where the replay is."""
+"""Plots of a run's page: recorded values with all peaks, and a cursor that follows the replay."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The report is one file that says what happened and asks for nothing else."""
+"""The report of a run is one self-contained file."""
 
 from html.parser import HTMLParser
 

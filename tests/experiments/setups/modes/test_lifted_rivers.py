@@ -1,4 +1,4 @@
-"""Rivers of a map from a file lie side by side: their gains, and the push that takes a hand from one to the next."""
+"""Rivers of a lifted map: default gains, admissible speeds, and the push from one curve to the next."""
 
 import numpy as np
 import pytest

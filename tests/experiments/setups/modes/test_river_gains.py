@@ -1,4 +1,4 @@
-"""Rivers have gains of their own, with which the default hand that pushes goes over from one river into another."""
+"""Default gains of rivers, with which the default push moves the hand from one river into another."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def parts_with(mode: str = "rivers", user: str = "push", **words: object) -> Par
     return parts_of(resolved(run_config(mode, "composite", user, seconds=SECONDS, **words)), MAPS)
 
 
-def rivers_of_a_hand(parts: Parts) -> np.ndarray:
+def river_at_each_tick(parts: Parts) -> np.ndarray:
     """Which river has the default hand, a mass with friction, at each tick from the beginning of the level river on."""
     assert isinstance(parts.field, HigherOrder)
     program, arm = parts.field.program(), parts.user.compiled()
@@ -77,14 +77,14 @@ def test_default_flow_of_follow_depends_on_the_map() -> None:
 
 
 def test_default_push_moves_the_hand_into_another_river() -> None:
-    rivers = rivers_of_a_hand(parts_with())
+    rivers = river_at_each_tick(parts_with())
     assert np.all(rivers[:1900] == 0.0)
     assert np.all(rivers[2600:] > 0.0)
     assert np.sum(rivers < 0.0) < 20
 
 
 def test_hand_stays_in_its_river_without_push_or_with_stiff_gains() -> None:
-    assert np.all(rivers_of_a_hand(parts_with(user="relaxed")) == 0.0)
+    assert np.all(river_at_each_tick(parts_with(user="relaxed")) == 0.0)
     alone = FollowMode()
     stiff = parts_with(stiffness=alone.stiffness, damping=alone.damping)
-    assert not np.all(rivers_of_a_hand(stiff)[2600:] > 0.0)
+    assert not np.all(river_at_each_tick(stiff)[2600:] > 0.0)

@@ -1,4 +1,4 @@
-"""Fast and slow rivers hold a hand in spite of noisy encoders; pushes that fit change over, without chatter."""
+"""Fast and slow rivers hold a hand despite encoder noise; default pushes switch rivers without chatter."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from sim.loop.loop import Loop
 RADIUS = 0.0477
 
 
-def rivers_of_a_hand(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
+def river_at_each_tick(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
     """River that has the hand of the simulated Phantom, at each tick; -1 for none."""
     words = {"map": "rivers", "figure": "none", "clips": ("walk",), "lap": lap, "seed": 3, **more}
     session = wire(run_config(mode="rivers", user=user, seconds=seconds, **words))
@@ -25,18 +25,18 @@ def rivers_of_a_hand(lap: float, user: str, seconds: float, **more: str) -> np.n
 
 
 def test_relaxed_hand_stays_on_a_slow_river() -> None:
-    np.testing.assert_array_equal(rivers_of_a_hand(14.0, "relaxed", 4.0), 0.0)
+    np.testing.assert_array_equal(river_at_each_tick(14.0, "relaxed", 4.0), 0.0)
 
 
 @pytest.mark.parametrize("lap", [1.5, 4.0, 9.0, 12.5])
 def test_default_push_switches_rivers_without_chatter_at_any_speed(lap: float) -> None:
-    rivers = rivers_of_a_hand(lap, "push", lap)
+    rivers = river_at_each_tick(lap, "push", lap)
     changes = rivers[1:][np.diff(rivers) != 0.0].tolist()
     assert changes in ([1.0], [1.0, 2.0])
 
 
 def test_changing_person_switches_to_the_nearest_river() -> None:
-    rivers = rivers_of_a_hand(4.0, "change", 8.0, person="median")
+    rivers = river_at_each_tick(4.0, "change", 8.0, person="median")
     assert rivers[0] == 0.0
     assert rivers[-1] == 1.0
     assert np.mean(rivers < 0.0) < 0.02

@@ -1,4 +1,4 @@
-"""Clips of a run: anybody's motion file is prepared once, kept by its content, and taken as captured only if asked."""
+"""Clips of a run: a motion file is prepared once, cached by its content, and taken unprepared only on request."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The figure's gaze and lean: which way it looks, that no joint leaves its range, that the feet stay."""
+"""The figure's gaze and lean: direction, joint ranges, and unmoved feet."""
 
 import mujoco
 import numpy as np

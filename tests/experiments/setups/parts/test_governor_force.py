@@ -1,4 +1,4 @@
-"""Governor and gate on the simulated Phantom: who is too slow in mid-flight meets a force, and is not taken."""
+"""Governor and gate on the simulated Phantom: a hand too slow for a flight meets a force, and is not admitted."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The simulated hand of a run: what it is said to do, or not to do."""
+"""Remarks on the actions of a simulated hand."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Which feet of a capture stand: swings and flights last for some time, and in a flight no foot rests."""
+"""Stances of a capture: least durations of swings and flights, and feet that sink or lift briefly."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Curves that make up for what the device costs: how much it is, and what speed they ask for."""
+"""Curves that compensate friction and inertia of the device: forces along the curve, and the resulting speed."""
 
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""Statistics of a study: effects, intervals, corrections, and the sentences on them."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""Designs of studies: orders, groups, trial keys, and refused designs."""
+
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""The database of a study's trials."""
+
 import sqlite3
 from pathlib import Path
 
