@@ -13,7 +13,7 @@ PACKAGES = ("models", "controllers", "sim", "experiments")
 
 @cache
 def imports() -> dict[str, set[str]]:
-    """Files of the packages by path, and what each imports of them, also within functions."""
+    """Imports of each file of the packages from other ones, also those within functions."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")] + [ROOT / "hvf.py"]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
     graph: dict[str, set[str]] = {}
@@ -31,7 +31,7 @@ def imports() -> dict[str, set[str]]:
 
 
 def by_folder(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    """Rooms: a room is the folder that directly holds a file, and a folder within it is another."""
+    """Imports between rooms: the folders that directly contain files."""
     rooms: dict[str, set[str]] = {}
     for file, found in graph.items():
         rooms.setdefault(str(Path(file).parent), set()).update(str(Path(other).parent) for other in found)

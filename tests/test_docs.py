@@ -23,8 +23,8 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "models").rglob("README.md"))]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-EXPECTED_OUTPUT = {  # what the blocks of a page print, where a sentence of the page says so
-    "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # of the law's cases
+EXPECTED_OUTPUT = {  # output that a page promises for its blocks
+    "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # on the cases of the law
     "docs/tutorials/your-own-study.md": ["48 trials"],
     "docs/tutorials/your-own-law.md": [
         "k = 100 N/m: pushed down by 6.2 mm",
@@ -63,11 +63,11 @@ def test_python_blocks_of_page_run_in_order(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shutil.copy(ROOT / "models/mocap/clips/walk.bvh", "mine.bvh")  # what a page calls the reader's own
+    shutil.copy(ROOT / "models/mocap/clips/walk.bvh", "mine.bvh")  # stands for a reader's own file
     typed = ModuleType("typed")
     monkeypatch.setitem(sys.modules, "typed", typed)  # where kernels of a page are looked up
     for block in blocks(page, "python"):
-        exec(compile(block, f"<{name(page)}>", "exec"), typed.__dict__)  # no file, as typed: its lines are no Python
+        exec(compile(block, f"<{name(page)}>", "exec"), typed.__dict__)  # not a file, as in an interactive session
     plt.close("all")
     stdout = capsys.readouterr().out
     for sentence in EXPECTED_OUTPUT.get(name(page), []):
@@ -99,11 +99,11 @@ def _parses(arguments: list[str], line: str) -> None:
     command = parsed(arguments)
     assert callable(command), line
     options = getattr(command, "options", None)
-    if options is not None and options.config is None:  # the file would be a run's that there has not been
+    if options is not None and options.config is None:  # files of earlier runs do not exist here
         assert config_of_options(options), line
 
 
-TOML = {  # how the files that pages show are read
+TOML = {  # how TOML shown on a page is read
     "docs/how-to/rigs.md": lambda path: tomllib.loads(path.read_text(encoding="utf-8")),  # an excerpt, as it says
     "docs/how-to/tuning.md": read_tuning,
     "docs/how-to/user-studies.md": Study.load,

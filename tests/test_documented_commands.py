@@ -15,13 +15,13 @@ from experiments import commands as hvf_commands
 from experiments.studies.row_spread import README, stated_residuals
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
-FALLING = ["hvf run --clips backflip --governor"]  # pages say so beside them
-PREREQUISITES = {  # what a page takes for granted: another page's result
+FALLING = ["hvf run --clips backflip --governor"]  # as their pages say
+PREREQUISITES = {  # results of other pages that a page needs
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
     "docs/how-to/devices.md": ["hvf run --out runs/mine"],
 }
-# Not here; served until stopped (tests/live); a rig of the reader's with names of its own (test_role_file).
+# Need another machine or device; run until stopped (see tests/live); need the reader's own rig (see test_role_file).
 NOT_RUN_HERE = ["--cluster tcp://head", "--device NAME", "hvf live ", "--roles roles.toml"]
 PROVIDED_FILES = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
@@ -34,15 +34,15 @@ NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [[
 EXPLANATIONS = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
 SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried (`row_spread`)
-CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # what a machine that pauses is told
+CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # output on a machine that pauses
 MISSED = re.compile(r"(\d+) ticks, (\d+) deadlines missed")
-MAX_MISSED_SHARE = 0.05  # of the deadlines at most missed: with more, nothing is learnt of a device
-TRIES = 12  # where a host takes processors away for milliseconds, devices rightly let go
-HOUR = 3600.0  # [s] that a command may take at most: user studies and tunings do on a busy machine
+MAX_MISSED_SHARE = 0.05  # of the deadlines: with more missed, a run on a device is not judged
+TRIES = 12  # a host that pauses for milliseconds makes devices stop, as they should
+HOUR = 3600.0  # [s] timeout; user studies and tunings take long on a busy machine
 
 
 def lines(page: Path) -> list[str]:
-    """Each once; a command's mere name in a sentence is none."""
+    """Commands of a page, each once; the mere name of a command does not count."""
     if page in COMMAND_PAGES:
         found = [line for line in commands(page) if line.startswith("hvf ") and line.split()[1:] not in NAMES]
     else:
@@ -52,7 +52,7 @@ def lines(page: Path) -> list[str]:
 
 
 def typed(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """A line, in a folder."""
+    """Run a command in a folder."""
     return subprocess.run(
         [sys.executable, "-m", "experiments.cli", *arguments],
         cwd=folder, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
@@ -61,7 +61,7 @@ def typed(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str
 
 
 def in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.CompletedProcess[str], bool]:
-    """A line, typed again where it runs against the clock and this machine paused; whether it was kept at last."""
+    """Run a command, again if it runs against the clock and this machine paused; whether it was in time at last."""
     completed = typed(arguments, folder)
     for tried in range(TRIES):
         ticks, missed = map(int, (MISSED.findall(completed.stdout) or [(1, 0)])[0])
@@ -89,11 +89,11 @@ def test_commands_of_page_give_the_stated_results(page: Path, tmp_path: Path) ->
     residuals, late = stated_residuals(page.read_text(encoding="utf-8")), []
     for line in PREREQUISITES.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
-        shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none
+        shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the default folder of a run
         completed, on_time = in_time(line, arguments, tmp_path)
         if not on_time or (
             completed.returncode and any(out in line for out in late)
-        ):  # it, or what is made of its recording
+        ):  # this command, or one that needs its recording
             late.append(arguments[arguments.index("--out") + 1] if "--out" in arguments else line)
             continue
         assert completed.returncode == 0, f"{line}\n{completed.stderr}"

@@ -185,7 +185,7 @@ def test_closed_standard_stream_affects_neither_result_nor_exit_code(closed: str
 
 
 def test_interrupt_during_imports_is_one_line() -> None:
-    """Also where what is being imported would turn the exception into one of its own, as MuJoCo does."""
+    """Also if the module being imported converts the exception, as MuJoCo does."""
     code = "import os, signal, experiments.console.startup\n"
     code += "try: os.kill(os.getpid(), signal.SIGINT)\nexcept BaseException: raise ImportError('initialization failed')"
     completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)

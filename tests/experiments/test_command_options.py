@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def _options_below(parser: ArgumentParser, name: str) -> Iterator[tuple[str, Action]]:
-    """Every option of every command, as the parser has it."""
+    """Options of a parser and its subcommands, with the name of their command."""
     for action in parser._actions:
         if hasattr(action, "_name_parser_map"):
             for sub, below in action.choices.items():  # pyright: ignore
@@ -52,14 +52,14 @@ def test_no_switch_has_a_double_negation() -> None:
     switches = [string for _, action in OPTIONS for string in action.option_strings]
     assert not [string for string in switches if string.startswith("--no-no-")]
     assert "--no-hand" in switches
-    assert "--no-dead-man" in switches  # of what is on by default
+    assert "--no-dead-man" in switches  # negation of a switch that is on by default
 
 
 def test_every_command_has_its_file_and_json_output() -> None:
     files = {path.stem for path in (ROOT / "experiments" / "commands").glob("*.py")} - {"__init__"}
     assert files == set(commands.NAMES)
     with_json = {command for command, action in OPTIONS if "--json" in action.option_strings}
-    without_json = {"live", "picture", "render", "figures", "bench"}  # draw, or are watched
+    without_json = {"live", "picture", "render", "figures", "bench"}  # their result is a picture, page or table
     hardware = {f"hardware {name}" for name in ("list", "doctor", "run", "calibrate", "identify")}
     for name in (set(commands.NAMES) | hardware) - without_json - {"hardware"}:
         assert f"hvf {name}" in with_json
@@ -121,4 +121,4 @@ def test_random_command_line_runs_or_is_refused_in_one_line(
             assert captured.err.count("\n") == 1, f"{line}\n{captured.err}"
         accepted += code == 0
         shutil.rmtree(tmp_path / "runs", ignore_errors=True)
-    assert accepted >= 0.05 * lines  # some do: 3 of 60 with seed 1, 7 or more with the others
+    assert accepted >= 0.05 * lines  # 3 of 60 with seed 1, 7 or more with the others

@@ -18,7 +18,7 @@ def test_rivers_of_lifted_map_are_certified_with_their_switching(tmp_path, capsy
     assert {"energy", "region", "switching", "ballistic", "turns"} < set(certificate)
     switching = certificate["switching"]
     assert switching["verdict"] in ("certified", "refuted", "unknown")
-    # A hand that is lost was the river's before.
+    # The counterexample is a hand that the river loses after the start.
     assert (switching["verdict"] == "refuted") == bool(switching["counterexample"])
     assert switching["counterexample"].get("time", 1.0) > 0.0
     capsys.readouterr()

@@ -32,10 +32,10 @@ def assert_led_back(summary: dict[str, Any]) -> None:
     assert lead["retrace_cm"] < 1.0
     assert lead["retrace_deg"] < 1.0
     assert lead["physical_retrace_cm"] < 1.0
-    # As captures are calibrated: SNU's run 2.5°, the others 2° at most.
+    # SNU's run: 2.5°; the others: 2° at most.
     assert lead["physical_retrace_deg"] < 3.0
     assert lead["slide_cm"] < 3.0
-    # Of CMU 02_03 2.80 to 2.99 cm, by the seed; of DeepMimic's run 3.4 cm, 3.69 with Nehalem's kernels.
+    # CMU 02_03: 2.80 to 2.99 cm by the seed; DeepMimic's run: 3.4 cm, 3.69 with Nehalem's kernels.
     assert lead["physical_slide_cm"] < 4.5
 
 

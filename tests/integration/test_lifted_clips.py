@@ -26,7 +26,7 @@ MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
 
 
 def lifted(clips):
-    """Clips on a lattice of curves that wander; closed where they close, all at an uneven pace."""
+    """Clips on a lattice of wavy curves, closed if the clip closes, all at a varying pace."""
     m, side = len(clips), int(np.ceil(np.sqrt(len(clips))))
     lap, k = np.arange(64)[:, None] * TURN / 64, np.arange(m)
     r, z = 0.036 + 0.012 * (k % side), -0.012 + 0.012 * (k // side)

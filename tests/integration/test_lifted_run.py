@@ -38,7 +38,7 @@ def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
 ) -> None:
     out = tmp_path / "follow"
-    # With this seed a runner whose feet did not bear a little over the floor would fall.
+    # With this seed a runner falls unless feet bear slightly above the floor.
     command = ["run", "--map", str(map_file), "--curve", curve, "--seconds", "10", "--seed", "2", "--out", str(out)]
     assert main(command) == 0
     summary = json.loads((out / "summary.json").read_text())
@@ -58,14 +58,14 @@ def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: 
         summary = run(config, tmp_path / "bent", True, 0.0)
         assert summary.stretch is not None
         assert summary.stretch.edits == 3
-        # It fell as soon as it was performed: at full speed from the middle of a step.
+        # The performance begins at full speed in the middle of a step.
         assert summary.figure.fell_at is None
         assert summary.performance is not None
         furthest.append(summary.performance.figure.root_error_max_cm)
         residuals.append(summary.performance.figure.residual_force_rms)
-    # 0.10 to 0.15 by three kernels and nine seeds; a figure that hangs on its help takes 1.
+    # 0.10 to 0.15 over three kernels and nine seeds; a figure carried by the residual has 1.
     assert np.median(residuals) < 0.4
-    # 1.0 to 1.6 cm, or 3.3 where a lift ends in another optimum: kernels of OpenBLAS decide that.
+    # 1.0 to 1.6 cm, or 3.3 if lifting ends in another optimum, depending on the kernels of OpenBLAS.
     assert np.median(furthest) < 5.0
 
 
@@ -94,7 +94,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
         frames, weight = recording.channel("frames", "t")[:], recording.array("body_weight")
     at = p[np.searchsorted(t, change.t)]
     assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
-    # The hand has let go and stays with the other river, and the figure with its clip: five seconds and more.
+    # For at least five seconds the hand stays in the other river, and the figure with its clip.
     assert distance[-2000:].max() < 1e-3
     assert config.seconds - change.t > 5.0
     assert summary.figure.fell_at is None
@@ -102,7 +102,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     assert summary.figure.root_error_max_cm < 12.0
     assert summary.figure.residual_in_flight_max == 0.0
     assert summary.figure.residual_force_rms < 0.18
-    # The change itself takes help, walking and running hardly any.
+    # The switch itself needs residual force, walking and running hardly any.
     force = np.linalg.norm(residual[:, :3], axis=1) / weight
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
     assert np.sqrt(np.mean(force[away] ** 2)) < 0.08

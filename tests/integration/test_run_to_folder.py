@@ -44,7 +44,7 @@ def test_deviation_follows_the_push(folder: Path) -> None:
 
 
 def test_animation_differs_only_where_pushed(folder: Path) -> None:
-    """Frame by frame: the two files are in step, so a difference is the hand's doing."""
+    """Both files have the same times, so that differences come from the hand."""
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["animation"]["pushed_deg"] > 5.0
     assert summary["animation"]["unpushed_deg"] < 1.0
@@ -68,7 +68,7 @@ def test_physical_figure_follows_without_warnings(folder: Path) -> None:
 
 
 def test_peak_memory_is_below_1_gb(tmp_path: Path) -> None:
-    """In a process of its own: the largest memory that a process ever took does not fall again."""
+    """In a separate process, for the peak memory of a process never decreases."""
     command = [sys.executable, "-m", "experiments.cli", "run", "--seconds", "2", "--out", str(tmp_path / "run")]
     subprocess.run(command, check=True, capture_output=True)
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0

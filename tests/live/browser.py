@@ -29,12 +29,12 @@ ARGUMENTS = [
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 WIDTH, HEIGHT = 900, 520
 SCREENSHOT_FOLDER = os.environ.get("HVF_SCREENSHOTS", "")
-"""Folder in which pictures of the page are kept for who looks; none if it is empty."""
+"""Folder for screenshots; none are saved if it is empty."""
 
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """The browser; skips where there is none."""
+    """The browser; skips if there is none."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="needs Playwright for Python")
     if CHROMIUM is None:
         pytest.skip("needs Debian's chromium")
@@ -54,7 +54,7 @@ def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT
 
 
 def save_screenshot(tab: Any, name: str) -> None:
-    """Keep a picture of the page, where the environment names a folder."""
+    """Save a screenshot of the page, if the environment names a folder."""
     if SCREENSHOT_FOLDER:
         tab.screenshot(path=Path(SCREENSHOT_FOLDER) / f"{name}.png")
 
@@ -66,7 +66,7 @@ def choose(tab: Any, label: str, option: str) -> None:
 
 
 def control_beside(tab: Any, label: str) -> Any:
-    """What is to be filled in, or moved, beside a label."""
+    """The input control beside a label."""
     return tab.get_by_text(label, exact=True).first.locator("xpath=ancestor::*[.//input][1]")
 
 
@@ -81,7 +81,7 @@ def fill(tab: Any, label: str, value: str) -> None:
 def drag(
     tab: Any, where: Callable[[], tuple[float, float]], by: tuple[float, float], patience: float = PATIENCE
 ) -> Iterator[None]:
-    """The left button pressed over what can be dragged somewhere and moved by so many pixels, then let go."""
+    """Drag the object at a position by so many pixels; the button is released at the end of the context."""
     x, y = _hover_draggable(tab, where, patience)
     tab.mouse.down()
     _wait_for_frame(tab)
@@ -95,11 +95,11 @@ def drag(
 
 
 def _hover_draggable(tab: Any, where: Callable[[], tuple[float, float]], patience: float) -> tuple[float, float]:
-    """Move the mouse to a place until its cursor says that something there can be dragged; where that was."""
+    """Move the mouse to a position until the cursor shows a draggable object; that position."""
     end, k = time.monotonic() + patience, 0
     while True:
         x, y = where()
-        tab.mouse.move(x + k % 2, y)  # it is looked for where the mouse moves
+        tab.mouse.move(x + k % 2, y)  # the page looks for objects only when the mouse moves
         _wait_for_frame(tab)
         if tab.evaluate("[...document.querySelectorAll('canvas')].some(one => one.style.cursor === 'pointer')"):
             return x + k % 2, y
@@ -108,7 +108,7 @@ def _hover_draggable(tab: Any, where: Callable[[], tuple[float, float]], patienc
 
 
 def _wait_for_frame(tab: Any) -> None:
-    """Wait until the browser has drawn another picture."""
+    """Wait until the browser has drawn another frame."""
     tab.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
@@ -141,7 +141,7 @@ class ServedPage:
             time.sleep(step)
 
     def settled(self) -> dict[str, np.ndarray]:
-        """What is shown once time stands still."""
+        """The displayed state once the simulated time has stopped."""
         self.assert_until(lambda: self.desk.paused, "time is stopped")
         seen = [math.nan]
 
@@ -159,7 +159,7 @@ class ServedPage:
 
 
 def on_screen(p_H: np.ndarray, height: int = HEIGHT) -> tuple[float, float]:
-    """Where a point of the hand frame is seen in a tab that is so high, in pixels."""
+    """Pixel position of a point of the hand frame in a tab of some height."""
     camera = camera_of(VIEWS["both"], WIDTH, height)
     forward = camera.look_at - camera.position
     forward /= np.linalg.norm(forward)

@@ -22,7 +22,7 @@ from tests.live.watcher import sent_and_drawn
 WITH_PAGE, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
 REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more than 1000 blocks of 8 ms
 LIMIT = 1.10
-LAP = 16.0  # [s]: the ball goes slowly enough to be taken by a mouse that sees it a few pictures late
+LAP = 16.0  # [s]: slow enough for a mouse to catch the stylus a few frames late
 
 
 class Stretch(NamedTuple):
@@ -35,7 +35,7 @@ class Stretch(NamedTuple):
 
 
 def measured(served: ServedPage, seconds: float, doing: Callable[[], None]) -> Stretch:
-    """What a stretch of time cost in which something is done."""
+    """Costs of a stretch of time during which an action is repeated."""
     begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
     costs: list[np.ndarray] = []
     while time.monotonic() - begin < seconds or not costs:
@@ -49,7 +49,7 @@ def measured(served: ServedPage, seconds: float, doing: Callable[[], None]) -> S
 
 
 def measured_with_page(served: ServedPage, browser: Any, took_hold: list[bool]) -> Stretch:
-    """The same with a page that is dragged, and loaded anew; and of each drag whether it took hold of the stylus."""
+    """The same with a page that is dragged and reloaded; `took_hold` records which drags caught the stylus."""
     tab = new_tab(browser, served.address)
 
     def doing() -> None:

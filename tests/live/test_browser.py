@@ -43,7 +43,7 @@ def tab(chromium: Any, served: ServedPage) -> Iterator[Any]:
 
 @pytest.fixture(autouse=True)
 def resume(served: ServedPage) -> Iterator[None]:
-    """Nobody holds the stylus and time goes on, whatever a test has left."""
+    """Release the stylus and resume time, whatever the previous test left."""
     served.desk.let_go()
     served.desk.pause(False)
     yield
@@ -221,7 +221,7 @@ def test_upload_beyond_the_size_limit_is_answered_in_the_page(tab: Any, served: 
 
 @pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
 def test_capture_is_uploaded_prepared_and_driven(tab: Any, served: ServedPage) -> None:
-    served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
+    served.desk.pause(True)  # without a graphics card, drawing competes with preparation
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
     served.assert_until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)

@@ -31,7 +31,7 @@ def opened(browser: Any, report: Path, width: int, height: int) -> tuple[Any, An
 
 
 def seconds_shown(page: Any) -> float:
-    """Time that the first plot tells its values of [s]; -1 before there is one."""
+    """Time of the values shown by the first plot [s]; -1 before there are any."""
     text = page.locator(".over-time output").first.text_content()
     return float(text.split(" s:")[0]) if text else -1.0
 
@@ -47,7 +47,7 @@ def test_plot_cursor_follows_the_replay_and_plots_zoom(chromium: Any, report: Pa
     page, replay = opened(chromium, report, 700, 800)
     until_beyond(page, 0.2)  # it plays by itself
     until_beyond(page, seconds_shown(page))
-    replay.locator("button").first.dispatch_event("click")  # it stands still: drawing it takes a processor
+    replay.locator("button").first.dispatch_event("click")  # paused, for drawing it takes a processor
     save_screenshot(page, "report")
     plot = page.locator("canvas.plot").first
     plot.scroll_into_view_if_needed()

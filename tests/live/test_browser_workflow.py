@@ -142,7 +142,7 @@ def test_takes_are_named_and_invalid_names_answered(tab: Any, served: ServedPage
     with drag(tab, lambda: on_screen(place, height=720), (0, -40)):
         served.assert_until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
-        desk.record("proud")  # the mouse has the hand
+        desk.record("proud")  # by the desk, for the mouse holds the hand
         served.assert_until(lambda: bool(desk.now["recording"][0] > 2.0), "it is recorded")
         desk.stop()
     served.assert_until(lambda: desk.takes() == ("proud", "shy") and not desk.records, "both are kept")

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.processes
 
 
 class LoggingDesk(Desk):
-    """A desk that keeps what it says."""
+    """A desk that stores its messages."""
 
     def __init__(self, folder: Path):
         self.said: list[str] = []
@@ -43,7 +43,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoggingDesk]:
     logging_desk.until(lambda: logging_desk.now["recording"][0] > 0.8, "a take is under way")
     logging_desk.close()
     assert not logging_desk.engine.alive
-    assert load(logging_desk.take("under way") / "edited.bvh").clip.duration > 0.7  # the end of the page keeps it
+    assert load(logging_desk.take("under way") / "edited.bvh").clip.duration > 0.7  # closing the page saves it
 
 
 def time_of(desk: LoggingDesk) -> float:
@@ -91,7 +91,7 @@ def test_gain_changes_and_undo_update_the_verdict(desk: LoggingDesk) -> None:
         desk.set_gain("seek", seek)
     desk.until(lambda: desk.verdict[0].verdict == "refuted", "the verdict turns red")
     assert "11000" in desk.verdict[0].reason
-    desk.undo()  # one way of a slider is one thing to undo
+    desk.undo()  # one movement of a slider is one undo step
     assert desk.config is not None
     assert desk.config.mode.seek == 150.0
     desk.until(lambda: desk.verdict[0].verdict == "certified", "and green again")

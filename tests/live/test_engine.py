@@ -90,7 +90,7 @@ def test_bent_curve_is_performed_only_on_request():
     run(engine, 0.8)
     start = engine.stylus.copy()
     run(engine, 0.8)
-    assert np.linalg.norm(engine.stylus - start) < 2e-3  # it is sought, nothing leads along it
+    assert np.linalg.norm(engine.stylus - start) < 2e-3  # the hand is pulled to the curve, not along it
     engine.perform(True)
     run(engine, 2.0)
     assert engine.performs
@@ -106,7 +106,7 @@ def test_bent_curve_is_performed_only_on_request():
 def test_changed_gains_equal_those_of_a_fresh_run(mode):
     engine = make_engine(mode)
     for gain, value in gains_of(engine.config).items():
-        # What paces a curve that can be bent: of the test below.
+        # Gains that time a bendable curve are left to the next test.
         if mode != "stretch-then-follow" or gain.name not in ("damping", "stiffness"):
             engine.set_gains(with_gain(engine.config, gain.name, 1.25 * value))
     other = make_engine(mode, **{gain.name: value for gain, value in gains_of(engine.config).items()})

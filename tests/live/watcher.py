@@ -20,7 +20,7 @@ from websockets.typing import Origin, Subprotocol
 
 from experiments.live.page import Page
 
-CONNECTING = 2.0  # [s] in which a browser is told what there is
+CONNECTING = 2.0  # [s] for the initial messages of the page
 HEADER = 16  # bytes: lengths of what is packed, unpacked and packed
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 MOVES = "/phantom/"  # it moves in every picture
@@ -62,7 +62,7 @@ def pictures(port: int, seconds: float) -> list[float]:
 
 
 def stall(port: int, seconds: float) -> None:
-    """Come, and read nothing: what is sent fills the buffers between."""
+    """Connect and read nothing, so that the buffers fill up."""
     with socket.create_connection(("127.0.0.1", port)) as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         key = base64.b64encode(bytes(16)).decode()

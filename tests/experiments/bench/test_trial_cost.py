@@ -10,7 +10,7 @@ QUIET = Console(quiet=True)
 
 def test_study_overhead_is_positive_and_below_its_trials() -> None:
     more, seconds = overhead(1, 1.0, QUIET)
-    assert 0.0 < more < 1.0  # of trials a fifth as long as those of the bench, whose bound is 0.05
+    assert 0.0 < more < 1.0  # trials a fifth as long as in `hvf bench`, where the bound is 0.05
     assert seconds > 0.0
 
 

@@ -62,7 +62,7 @@ def zero_on_curve(hand, k=2e4):
 
 
 def steep_off_curve(hand, k=2e4):
-    """Without stiffness on the curve, with all of it a few hundredths of a millimetre off."""
+    """No stiffness on the curve, full stiffness a few hundredths of a millimetre off it."""
     return 0.0, 0.0, -k * hand.p[2] * (1.0 - np.exp(-((hand.p[2] / 1e-5) ** 2)))
 
 
@@ -96,7 +96,7 @@ def switching_spring(hand, k=900.0):
     return (0, 0, -k * hand.p[2]) if hand.p[2] * hand.v[2] > 0 else (0, 0, 0.25 * k * hand.p[2])
 
 
-# What shakes is never certified.
+# Laws that oscillate are never certified.
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_law_that_converts_to_float_is_refuted_by_linearisation_or_unknown(compi
     assert "mm off the curve at phase" in found.reason
     assert "makes a plain number" in found.reason
     assert "np.hypot" in found.reason
-    # Seen only; a soft one is stable at all states, of which nothing follows.
+    # Linearisation at sampled states can refute but not certify: the same law with a soft spring is unknown.
     soft = hvf.certify(simulation(hvf.law(rail)(k=100.0)), NO_HANDS).stability
     assert soft.verdict == "unknown"
     assert "makes a plain number" in soft.reason
@@ -147,7 +147,7 @@ def test_symbolic_law_that_differs_from_executed_law_is_rejected():
         certified_cases(hvf.law(filtered), CURVE)
 
 
-# A jump is no slope.
+# Discontinuous forces.
 
 
 def test_small_force_step_is_unknown_not_refuted():
@@ -157,12 +157,12 @@ def test_small_force_step_is_unknown_not_refuted():
     assert "its force jumps, bends or is no number" in found.reason
 
 
-# Every case of a law.
+# Piecewise laws: every case counts.
 
 
 @pytest.mark.slow
 def test_states_with_saturated_force_are_excluded_from_linearisation():
-    """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
+    """A plane of 8 kN/m reaches the limit of 8 N at 1 mm: beyond, the loop has no stiffness or damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
     sim = simulation(plane)
     saturated, in_part = (
@@ -173,7 +173,7 @@ def test_states_with_saturated_force_are_excluded_from_linearisation():
     whole, judged = (int(re.findall(r"grows at (\d+) states", verdict.reason)[0]) for verdict in (free, less))
     assert less.verdict == "certified"
     assert judged < whole
-    # Where a part of the field alone is cut, the plane acts without the damping of the river.
+    # Where only a part of the field is limited, the plane acts without the damping of FOLLOW.
     assert part.verdict == "refuted"
 
 
@@ -261,7 +261,7 @@ def _endless(hand):
     return x, 0, 0
 
 
-# A law that is none.
+# Invalid laws.
 
 
 def _boom(hand):
@@ -269,7 +269,7 @@ def _boom(hand):
 
 
 def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
-    """CasADi prints six digits of a number: by its text this law would be one smooth expression."""
+    """CasADi prints six digits of a number: compared as text, the cases of this law would be one smooth expression."""
 
     def notched(hand, k=1e6):
         if hand.p[2] > 0.12345671:
@@ -301,7 +301,7 @@ def test_reasons_contain_no_library_paths():
         assert ".cpp" not in stability(function).reason
 
 
-@pytest.mark.parametrize("delay", [1, 1000])  # less and more than the hands at which a law is looked at
+@pytest.mark.parametrize("delay", [1, 1000])  # fewer and more calls than there are sampled hand states
 def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
     queue = [0.0] * delay
 

@@ -67,7 +67,7 @@ def test_certificate_covers_the_composed_field() -> None:
     stiff = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + level(k=60000.0)))
     assert (alone.stability.verdict, composed.stability.verdict) == ("certified", "certified")
     assert any("8 N" in assumed for assumed in composed.stability.assumptions)
-    # Sixty newtons for a millimetre are far above what the loop bears, though FOLLOW's own gain is low.
+    # 60 N/mm are far above the critical stiffness of the loop, though FOLLOW's own gain is low.
     assert stiff.stability.verdict == "refuted"
     assert len({c.inputs_hash for c in (alone, composed, stiff)}) == 3
 

@@ -30,7 +30,7 @@ TRIAL_CURVE = Trajectory.circle(0.0477, LAP)
 DEVICE = phantom_device()
 
 
-# Encoders that round would show accelerations in the path that nothing has.
+# Without encoder rounding, which would add spurious accelerations to the path.
 WITH_FRICTION = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
 
 
@@ -55,7 +55,7 @@ def test_command_refutes_a_run_that_oscillates(tmp_path):
 
 @dataclass(frozen=True)
 class LawTrial(Trial):
-    """A trial with a law of its own."""
+    """A trial with any law."""
 
     law: Law
 
@@ -119,7 +119,7 @@ def test_trials_oscillate_exactly_where_refuted(name):
     verdict, example = found.verdict, found.counterexample
     rng, oscillating = np.random.default_rng(20), 0
     for _ in range(20):
-        # Refuted is a place, the counterexample's; certified is every place.
+        # A refutation is for the phase of its counterexample, a certificate for every phase.
         phase, across = rng.uniform(0.0, LAP), np.array([0.0, 0.0, 1.0])
         phase = float(example["phase"]) * LAP / 4.0 if example else phase
         trial = LawTrial(TRIAL_CURVE, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
@@ -128,7 +128,7 @@ def test_trials_oscillate_exactly_where_refuted(name):
         state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.05, size=3)
         state[6:9], state[9:12] = state[:3], state[3:6]
         path = simulate(trial, 300.0, 400, WITH_FRICTION, state)
-        # Acceleration of the last fifth: a hand that is carried or rests has little of it.
+        # Acceleration in the last fifth: small for a hand that is led or at rest.
         fast = np.linalg.norm(np.diff(path[-80:], 2, axis=0), axis=1) / 1e-6
         oscillating += len(path) < 400 or float(np.median(fast)) > 5.0
     assert verdict in ("certified", "refuted")

@@ -53,13 +53,13 @@ def _kinds(hint: object) -> set[object]:
 
 
 def _numbers(cls: type) -> dict[str, object]:
-    """Names and types of what is a number in a part."""
+    """Names and type hints of the numeric fields of a part."""
     hints = get_type_hints(cls)
     return {name: hint for name, hint in hints.items() if _kinds(hint) & {int, float}}
 
 
 def _limits(cls: Any, name: str) -> dict[str, Any]:
-    """What bounds a number of a part."""
+    """Bounds of a numeric field of a part."""
     found: dict[str, Any] = {}
     for bound in cls.__pydantic_fields__[name].metadata:
         found |= {key: getattr(bound, key) for key in ("ge", "gt", "lt", "allow_inf_nan") if hasattr(bound, key)}
@@ -96,7 +96,7 @@ def test_every_number_of_a_configuration_has_bounds() -> None:
 
 
 def test_parts_list_covers_the_whole_run_configuration() -> None:
-    """What is in a configuration, however deep, is one of the parts above."""
+    """Every dataclass nested in a configuration is one of the parts above."""
     found, waiting = set[type](), [RunConfig]
     while waiting:
         cls = waiting.pop()
@@ -293,7 +293,7 @@ def test_run_options_equal_words_and_keep_given_zeros() -> None:
         "clips": ("walk", "cheer"), "wall_margin": 0.05,
     }  # fmt: skip
     assert _options(**given) == run_config(**given)
-    # Zeros are numbers like others.
+    # Zeros are kept.
     zeros: dict[str, Any] = {"stiffness": 0.0, "damping": 0.0, "seed": 0, "blend": 0.0, "orientation_stiffness": 0.0}
     config = _options(**zeros)
     assert config == run_config(**zeros)
@@ -312,7 +312,7 @@ def test_options_override_a_configuration_file(tmp_path) -> None:
     assert _options(config=path, stiffness=0.0, seed=0) == replace(
         config, mode=replace(config.mode, stiffness=0.0), seed=0
     )
-    # Another mode or map begins with its own defaults, the rest stays.
+    # Another mode or map has its own defaults, the rest is kept.
     assert _options(config=path, mode="bunny") == replace(config, mode=Bunny())
     assert _options(config=path, map="cylindrical") == replace(config, map=Cylindrical())
     assert _options(config=path, map="some.npz") == replace(config, map=MapFile(file="some.npz"))

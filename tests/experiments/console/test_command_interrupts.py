@@ -18,12 +18,12 @@ from sim.recording.recording import Recording
 
 
 def _default_interrupt() -> None:
-    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+    """Undo the ignored SIGINT that a child of a background shell inherits."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: float) -> str:
-    """Run a command, press Ctrl-C so long [s] after it is ready, and return what it says on stderr."""
+    """stderr of a command that gets SIGINT `wait` seconds after it is ready."""
     process = subprocess.Popen(
         [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
         start_new_session=True, preexec_fn=_default_interrupt,

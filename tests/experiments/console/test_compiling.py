@@ -21,7 +21,7 @@ TOYS = Path(__file__).parents[2] / "sim" / "compilation"
 
 
 class _UnitsAnnounced(Exception):
-    """Stops a wiring when it has said what it needs."""
+    """Ends wiring once it has announced its units."""
 
 
 def _names(units: tuple[Unit, ...]) -> list[str]:
@@ -38,7 +38,7 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TOYS), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.syspath_prepend(str(TOYS))
     unit_function.cache_clear()
-    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # compiled for another folder
+    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # as imported for another cache folder
     import toy_kernels  # pyright: ignore[reportMissingImports]
 
     vector = types.Array(types.float64, 1, "C")

@@ -48,7 +48,7 @@ def test_compilation_listener_reports_compiled_functions() -> None:
 
 
 def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
-    """As a certificate does with the program of a run."""
+    """As certification does with the program of a run."""
     for completed in (process(TELLS + _EVALUATE_LAW), process(TELLS + _EVALUATE_LAW)):
         assert float(completed.stdout) > 0.0
     assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(completed)).split())

@@ -21,7 +21,7 @@ from models.mocap.readers.own_bvh import write_bvh
 pytest.importorskip("pygltflib")
 
 FRAMES = 40
-BLENDER = os.environ.get("BLENDER_PYTHON", sys.executable)  # a Python of its own: bpy wants an older NumPy
+BLENDER = os.environ.get("BLENDER_PYTHON", sys.executable)  # a separate Python, for bpy needs an older NumPy
 
 
 def joints_of(clip: Clip) -> Array:

@@ -14,7 +14,7 @@ INPUTS = (np.arange(5.0), np.array([2], dtype=np.uint8))
 
 @pytest.fixture
 def cached(tmp_path):
-    """Calls `kept_array` and tells how often the array had to be found."""
+    """Calls `kept_array` and counts how often the array was computed."""
 
     class Keeper:
         folder, found = tmp_path / "cache", 0

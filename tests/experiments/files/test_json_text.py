@@ -16,7 +16,7 @@ from sim.recording.recording import Recording
 
 
 def strictly(text: str) -> object:
-    """The value, by a reader that takes nothing that JSON has not."""
+    """The value, by a parser that refuses NaN and Infinity."""
 
     def refuse(constant: str) -> None:
         raise ValueError(constant)

@@ -93,7 +93,7 @@ def test_damaged_map_file_is_refused_by_name(tmp_path):
         flipped = bytearray(data)
         flipped[at : at + 64] = rng.bytes(64)
         damaged.write_bytes(bytes(flipped))
-        # Padding of the archive may be anything; what is read is whole, or is refused.
+        # Damage in the padding of the archive is harmless: the map is either read completely or refused.
         try:
             again = load_map(damaged)
         except SimError:

@@ -42,7 +42,7 @@ def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
 def test_lap_is_timed_by_the_first_grounded_clip() -> None:
     run, walk, cheer = embedded("run"), embedded("walk"), embedded("cheer")
     assert [grounded(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
-    # At this lap the cheer is off its pace, so nothing but arms is blended, and each goes at its own.
+    # At this lap the cheer is off its pace, so only arms are blended, and each clip keeps its own pace.
     parts = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
     assert parts.haptic_map.legs_of == 1
     assert not any("run at" in remark or "walk at" in remark for remark in parts.remarks)

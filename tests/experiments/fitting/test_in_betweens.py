@@ -37,7 +37,7 @@ def slow_params(values):
 
 
 def laps(h_map, r, z, rows=ROWS, count=1.0):
-    """Poses of a hand that goes round evenly, at a place of the half plane in units of the reach."""
+    """Poses for a hand on a circle at constant speed, at (r, z) in units of the reach."""
     angles = 2 * np.pi * (np.arange(int(rows * count)) + 0.5) / rows
     reach = CONFIG.map.reach
     radius = CONFIG.map.around.radius + r * reach
@@ -59,7 +59,7 @@ def soles(poses):
 
 
 def slide(places):
-    """Largest way over the floor of a sphere while it touches, from where it came down [m]."""
+    """Largest distance over the floor of a sphere in contact from its touch-down [m]."""
     worst, start = 0.0, [None] * places.shape[1]
     for frame in places:
         for k, place in enumerate(frame):
@@ -95,7 +95,7 @@ def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
         np.testing.assert_allclose(feet, places[0], atol=1e-9)
 
 
-# The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
+# The walk's legs carry the arms of the other three: a mean of all at its pace would lack up to 0.14, 0.04 on average.
 @pytest.mark.parametrize(("clips", "max_share", "mean_share"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
 def test_floor_can_provide_the_forces_of_in_betweens(clips, max_share, mean_share):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []

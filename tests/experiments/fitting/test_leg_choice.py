@@ -27,7 +27,7 @@ def maps() -> list[Cylindrical]:
 def set_verdicts(
     monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int]
 ) -> list[object]:
-    """Verdicts by whose legs they are and the share of others' arms, and whose legs are sound; what was asked for."""
+    """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials."""
     trials: list[object] = []
 
     def verdict(haptic_map: Cylindrical, lap: float, parallel: bool) -> Verdict:

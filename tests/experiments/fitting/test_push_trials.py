@@ -21,7 +21,7 @@ from models.mocap.motion.clip import pose_difference
 
 @pytest.fixture(scope="module")
 def lifted() -> Lifted:
-    # So narrow that a push reaches the other curve's clip.
+    # Narrow, so that a push reaches the clip of the other curve.
     return lift_clips(("squat_dance", "cheer"), Room((0.04, 0.06), (-0.01, 0.01))).haptic_map
 
 

@@ -18,7 +18,7 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 
-DISTANCE = 1.5  # [m] to which the cheering figure goes and from which it comes back in a lap
+DISTANCE = 1.5  # [m] by which the cheering figure moves away and back in a lap
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_distance_between_places_is_measured_and_large_ones_are_reported(wanderi
     angles = np.arange(0.0, 2.0 * np.pi, 0.2)
     distances = np.array([places_apart(haptic_map, MapTransition(0, 1, angle, 0.1, 0.1)) for angle in angles])
     assert distances.min() < 0.15
-    # A lap's mean place is that of the other: it goes from half its way on one side to half on the other.
+    # Mean places over a lap coincide: the cheer moves half of the distance to either side of it.
     assert distances.max() == pytest.approx(DISTANCE / 2.0, abs=0.1)
     near, far = (MapTransition(0, 1, float(angles[k]), 0.1, 0.1) for k in (distances.argmin(), distances.argmax()))
     assert carried_over(haptic_map, near)[1] == ()

@@ -23,7 +23,7 @@ def test_repaired_flight_conserves_angular_momentum_and_falls_freely(pace):
     assert after.certificate.verdicts["ballistic"].verdict == "certified"
     fit = after.flights[0].fit
     momentum = after.motion.angular[fit.start + 2 : fit.end - 1]
-    assert np.ptp(momentum, axis=0).max() < 0.3  # kg m²/s; one jump left with +8.4 to −7.6
+    assert np.ptp(momentum, axis=0).max() < 0.3  # kg m²/s
     assert fit.misfit < 5e-3
     assert np.rad2deg(fit.drift) < 2.0
 
@@ -63,7 +63,7 @@ def test_jump_at_wrong_pace_is_repaired(pace):
     after = repaired.after
     assert after.certificate.verdicts["ballistic"].verdict == "certified"
     assert max(flight.fit.gravity for flight in after.flights) == pytest.approx(9.81, abs=0.1)
-    # Feet that stood do not go deeper into the floor than they did.
+    # Standing feet are not pushed deeper into the floor.
     assert contacts(repaired.clip).clearance.min() > contacts(wrong).clearance.min() - 5e-3
     assert np.linalg.norm(repaired.clip.velocities()[:, 6:].reshape(-1, 17, 3), axis=2).max() < 30.0
 
@@ -84,7 +84,7 @@ def test_infeasible_backflip_falls_with_g_after_repair(tmp_path):
     assert max(flight.fit.gravity for flight in after.flights) == pytest.approx(9.81, abs=0.1)
     assert {flight.verdict for flight in after.flights} == {"certified"}
     assert max(np.rad2deg(flight.fit.drift) for flight in after.flights) < 3.0
-    # What remains is that its soles hover, which no flight mends.
+    # Its soles still hover, which repair of flights does not change.
     judged = after.certificate.verdicts["ballistic"]
     assert judged.verdict == "unknown"
     assert "from where it stands" in judged.reason

@@ -21,7 +21,7 @@ Script = dict[int, Callable[["ScriptedRun"], object]]
 
 
 class ScriptedRun:
-    """A run without processes: what is asked for happens at once; the script has what else happens, by poll."""
+    """A run without processes: requests take effect at once, and a script has further events by poll number."""
 
     def __init__(self, script: Script):
         self.script, self.looks, self.asked = script, 0, list[int]()
@@ -45,7 +45,7 @@ class ScriptedRun:
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
-    """A terminal in place of this one; types into it."""
+    """A pseudo-terminal as stdin; the function types into it."""
     ours, theirs = os.openpty()
     with open(theirs, encoding="utf-8") as terminal:
         monkeypatch.setattr(sys, "stdin", terminal)
@@ -65,7 +65,7 @@ def _fills_the_disk(stand: ScriptedRun) -> None:
 
 
 def requests_of(script: Script, arm: bool = False) -> list[int]:
-    """What is asked of a run that the script ends with Ctrl-C, if with nothing else."""
+    """Requests to a run that ends with Ctrl-C, unless the script ends it before."""
     stand = ScriptedRun(script | {30: _interrupt})
     attend(stand, 60.0, SimpleNamespace(arm=arm, dead_man=True), Console(quiet=True))  # type: ignore[arg-type]
     return stand.asked

@@ -36,7 +36,7 @@ def record(out: Path, ticks: int) -> None:
 
 
 def interrupted_run(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
-    """A run that Ctrl-C ends once it has made its recording, or before, with so many ticks."""
+    """A run that Ctrl-C ends, with a recording of so many ticks; None: before it has one."""
     with run_folder(options(out, overwrite)):
         if ticks is not None:
             record(out, ticks)

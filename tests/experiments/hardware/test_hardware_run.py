@@ -178,7 +178,7 @@ def test_identify_and_calibrate_keep_each_others_results(tmp_path: Path) -> None
     save_device(identified, tmp_path / "other.json")
     other = RunConfig(device=Phantom(device_file=str(tmp_path / "other.json")))
     of, of_other = (certificate_inputs(c, 0.0, HandRange(), 1.0)["device"] for c in (config, other))
-    assert of == of_other  # where the zero is changes no verdict
+    assert of == of_other  # the encoder offset changes no verdict
 
 
 @pytest.mark.parametrize(
@@ -295,7 +295,7 @@ def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsy
     out = tmp_path / "run"
     arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",
                  "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
-    for _ in range(3):  # a machine that is too busy for the device is no failure of ours
+    for _ in range(3):  # retried, for a busy machine misses deadlines
         code = main([*arguments, "--overwrite"])
         stdout = capsys.readouterr().out
         if "no new reading" not in stdout:

@@ -18,7 +18,7 @@ STANDING = Clip(np.tile(rest_pose(), (60, 1)), 60.0, "standing")
 
 
 class KnownMap:
-    """A map whose figure stands still, and whose derivative is what a function of the stylus position says."""
+    """A map of one constant pose, whose derivative is a given function of the stylus position."""
 
     def __init__(self, derivative):
         self.derivative, self.seen = derivative, []
@@ -73,7 +73,7 @@ def test_joint_weights_match_the_mass_matrix():
 def test_separation_is_the_least_distance_at_equal_angles():
     angles = TURN * np.arange(SAMPLES) / SAMPLES
     fixed = np.tile([0.05, 0.0], (SAMPLES, 1))
-    # Nearest at 90°, where the other is at (0.062, 0.005); at other angles it comes as near as 12 mm to no avail.
+    # Nearest at 90°, where the other is at (0.062, 0.005); smaller distances between different angles do not count.
     other = np.stack([0.072 - 0.01 * np.sin(angles), 0.005 * np.ones(SAMPLES)], axis=1)
     quality = measured(layout(lambda p: rows(np.eye(3), np.zeros((3, 3))), np.stack([fixed, other], axis=1)))
     assert quality.separation == pytest.approx(np.hypot(0.012, 0.005), rel=1e-9)
@@ -141,7 +141,7 @@ def test_lap_times_of_open_clip_cross_the_gap_at_constant_rate():
 
 
 def moved(**changes):
-    """A figure in rest that is changed, frame by frame: `x`, `z` of the root, `knee` bent."""
+    """Measures of a figure at rest with changes per frame: `x` and `z` of the root, bent `knee`."""
     poses = np.tile(rest_pose(), (60, 1))
     poses[:, 0] += changes.get("x", 0.0)
     poses[:, 2] += changes.get("z", 0.0)
@@ -155,9 +155,9 @@ def test_motion_faults_are_measured_quantitatively():
     still, s = measure_motion(STANDING), np.linspace(0.0, 1.0, 60)
     np.testing.assert_allclose(still, 0.0, atol=1e-3)
     assert moved(x=0.04 * s).slide == pytest.approx(0.04, abs=1e-9)
-    # Out and back: how far it was, not how far it went.
+    # Out and back: the largest distance counts, not the path length.
     assert moved(x=0.04 * np.sin(TURN * s)).slide == pytest.approx(0.04, rel=1e-2)
-    # What moves above the floor does not slide.
+    # A foot above the floor does not slide.
     assert moved(x=0.04 * s, z=0.0045).slide == 0.0
     assert moved(z=-0.01).penetration == pytest.approx(still.penetration + 0.01, abs=1e-9)
     limit = joint_range()[JOINTS.index("left_knee"), 1, 1]

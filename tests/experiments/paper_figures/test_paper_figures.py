@@ -23,12 +23,12 @@ def test_outline_of_figure_at_rest_has_its_height_and_arm_span(azimuth: float) -
     low, high = corners.min(axis=0), corners.max(axis=0)
     assert low[1] == pytest.approx(0.0, abs=2e-3)
     assert high[1] == pytest.approx(1.75, abs=0.03)
-    # Along the arms nothing of their span of 1.8 m is seen, across them all of it.
+    # Seen along the arms their span of 1.8 m vanishes, seen across them all of it is visible.
     assert high[0] - low[0] == pytest.approx(max(0.3, 1.82 * abs(np.cos(azimuth))), abs=0.2)
 
 
 def test_farther_bodies_are_drawn_first() -> None:
-    outlines = Silhouettes().outlines(rest_pose(), 0.5 * np.pi)  # looking to the left: the left arm is further off
+    outlines = Silhouettes().outlines(rest_pose(), 0.5 * np.pi)  # looking to the left: the left arm is farther away
     order = [outline.body for outline in outlines]
     assert order.index("left_hand") < order.index("right_hand")
 
@@ -53,7 +53,7 @@ def test_all_eight_figures_are_written_as_pdf_and_png(tmp_path: Path, monkeypatc
     except NoGraphics as error:
         pytest.skip(str(error))
     monkeypatch.setattr("experiments.paper_figures.draw.DPI", 60)
-    # Faster: nobody looks at the pages of these runs, and their figures are only shown.
+    # Faster: no report pages, and kinematic figures.
     monkeypatch.setattr("experiments.results.pages.report_of.write_report", lambda *_: None)
     kinematic = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
     monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: kinematic)
@@ -63,7 +63,7 @@ def test_all_eight_figures_are_written_as_pdf_and_png(tmp_path: Path, monkeypatc
         assert file.stat().st_size > 8_000
         pdf = file.with_suffix(".pdf").read_bytes()
         assert pdf.startswith(b"%PDF")
-        # Vectors: only the rendered figure has a picture in it.
+        # Vector graphics: only the rendered figure contains a raster image.
         assert (b"/Subtype /Image" in pdf) == (file.stem == "figure-7")
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert len(re.findall(r"<figure ", page)) == 8

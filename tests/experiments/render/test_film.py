@@ -45,7 +45,7 @@ def backend() -> str:
 
 @dataclass
 class RunSpec:
-    """What a run of a second did: how deep its figure was under the floor, and how far it went."""
+    """A synthetic run of one second: depth of its figure below the floor, distance travelled, force."""
 
     kind: str = "physical"
     depth: float = 0.0
@@ -134,7 +134,7 @@ def test_travelling_figure_stays_in_the_picture(tmp_path: Path, backend: str) ->
 
 
 def rendered(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
-    """A frame below its words, as numbers."""
+    """A frame without its caption, as integers."""
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show=show, ghost=ghost, width=320, height=240, fps=10.0), backend)
         picture = frames.frame(3)[60:].astype(np.int64)
@@ -203,11 +203,11 @@ def test_interrupted_film_keeps_the_old_file(frames: int, tmp_path: Path, capfd:
         stopped()
     assert film.read_bytes() == b"the old one"
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
-    assert capfd.readouterr() == ("", "")  # not a word of ffmpeg's
+    assert capfd.readouterr() == ("", "")  # no output of ffmpeg
 
 
 def _default_interrupt() -> None:
-    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+    """Undo the ignored SIGINT that a child of a background shell inherits."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -30,7 +30,7 @@ def _draw(out: Path, picture: Path, **environment: str) -> subprocess.CompletedP
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", [None, "glfw", "bogus"])
 def test_picture_is_drawn_without_display_for_any_mujoco_gl(backend: str | None, run: Path, tmp_path: Path) -> None:
-    picture = tmp_path / "x.png"  # an existing one is left as it is
+    picture = tmp_path / "x.png"  # a new file, for existing ones are not replaced
     completed = _draw(run, picture) if backend is None else _draw(run, picture, MUJOCO_GL=backend)
     assert "Traceback" not in completed.stderr
     if completed.returncode == 2:  # a machine without EGL and OSMesa

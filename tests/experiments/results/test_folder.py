@@ -51,10 +51,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_concurrent_run_into_one_folder_is_refused(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     descriptor = os.open(run, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)  # as a run of another process has it
+        fcntl.flock(descriptor, fcntl.LOCK_EX)  # as a run in another process would
         command = ["run", "--figure", "none", "--seconds", "1", "--out", str(run), "--overwrite"]
         assert "another run is being written into it" in refused(command, capsys)
         assert (run / "run.h5").exists()
     finally:
-        os.close(descriptor)  # as a process that crashes lets go of it
+        os.close(descriptor)  # as at the end of a process that crashes
     assert main(command) == 0

@@ -16,4 +16,4 @@ sim = hvf.Simulation(
 run = sim.run(20.0)                        # in memory; record="runs/mine" for a folder
 run.summary.path.deviation_rms; run.ticks["force"]; run.to_bvh("edited.bvh"); run.report(); run.frame()   # frame(): pandas, if installed
 for r in hvf.sweep(sim, {"field.k_r": [100, 200, 400, 800]}, threads=2): ...
-print(hvf.certify(sim).stability)          # of this very field, one's own law included
+print(hvf.certify(sim).stability)          # of this field, with the own law

@@ -133,7 +133,7 @@ def test_curve_beyond_the_workspace_is_refused_as_on_the_command_line(
 
 
 def test_energy_tank_with_another_period_than_the_clock_is_refused():
-    """It would be refilled at each tick for the time of its own: with twice the power at half the period."""
+    """At half the period it would be refilled with twice the power."""
     tank = hvf.EnergyTank(1e-3, power=0.5, capacity=1.0)
     curve = hvf.circle(0.0477, 4.0)
     parts = {"field": hvf.Follow(curve, 300.0, 8.0), "haptic_map": hvf.Cylindrical(hvf.clips("walk"), around=curve)}

@@ -15,7 +15,7 @@ from sim.users.intents.intent import PersonIntent
 
 RADIUS, LAP = 0.0477, 4.0
 CURVE = hvf.circle(radius=RADIUS, lap=LAP)
-STRONG, LIGHT = (150.0, 8.0), (20.0, 2.0)  # k_r [N/m] and b_d [N s/m] of a river that leads, and of one that yields
+STRONG, LIGHT = (150.0, 8.0), (20.0, 2.0)  # k_r [N/m] and b_d [N s/m] of strong and of light guidance
 
 
 def channels_of(
@@ -47,11 +47,11 @@ def angle_gone(found: dict[str, np.ndarray], start: float, end: float) -> float:
 
 
 def test_relaxed_hand_is_led_along_the_curve() -> None:
-    """The river's damper (8 N s/m) takes along what a slack arm still resists with, some 7 N s/m."""
+    """The damper of FOLLOW (8 N s/m) moves a slack arm of about 7 N s/m."""
     found = channels_of(hvf.intents.Relax(), 5.0, STRONG)
     assert angle_gone(found, 1.0, 5.0) > 0.4
     assert np.median(within(found, "distance", 1.0, 5.0)) < 4e-3
-    assert np.sum(within(found, "force", 1.0, 5.0) * within(found, "v", 1.0, 5.0)) > 0.0  # the river carries her
+    assert np.sum(within(found, "force", 1.0, 5.0) * within(found, "v", 1.0, 5.0)) > 0.0  # positive work
 
 
 def test_tracing_person_follows_the_curve_unguided() -> None:
@@ -90,7 +90,7 @@ def test_resisting_person_stops_and_continues() -> None:
 def test_lost_person_leaves_the_curve_and_returns() -> None:
     found = [channels_of(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0, seed=seed) for seed in (3, 4, 5)]
     assert min(np.max(within(one, "distance", 1.5, 3.5)) for one in found) > 8e-3
-    # One person comes back to within 0.9 to 2.9 mm, as the seed has it; eight were tried.
+    # 0.9 to 2.9 mm by the seed; eight were tried.
     assert np.median([np.median(within(one, "distance", 5.5, 7.0)) for one in found]) < 4e-3
 
 
@@ -132,7 +132,7 @@ def test_bending_person_holds_and_drags_the_tube(tmp_path: Path) -> None:
         held = [press.dragged_mm for press in editing.presses if press.what == "held"]
         assert held
         dragged.append(max(held))
-    # One person drags by 8 to 35 mm, as the seed has it.
+    # 8 to 35 mm by the seed.
     assert np.median(dragged) > 5.0
 
 
@@ -141,4 +141,4 @@ def test_leading_person_moves_the_figure_along_a_path(tmp_path: Path) -> None:
     lead = summary_of(tmp_path, mode="lead", person="median", figure="kinematic", seconds=8.0).lead
     assert lead is not None
     assert lead.length_m > 2.0
-    assert lead.slide_cm < 3.0  # as of any led figure
+    assert lead.slide_cm < 3.0  # the bound for every led figure

@@ -84,7 +84,7 @@ def test_folder_in_use_is_refused_and_unchanged(tmp_path: Path) -> None:
 
 
 class Shrinking(hvf.HapticMap):
-    """A map whose poses lose their joints after some calls."""
+    """A map whose poses have the wrong size after some calls."""
 
     def __init__(self) -> None:
         self.asked = 0

@@ -21,7 +21,7 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from tests.experiments.runs.test_public_interface import CURVE, simulation
 
-SECONDS = 1.5  # longer than a hand that is let go of takes to settle
+SECONDS = 1.5  # longer than the settling time of a released hand
 HAND = ("t", "p", "quaternion", "v", "omega", "switch")
 DEVICE_ALONE = hvf.Figure(kind="none")
 

@@ -15,7 +15,7 @@ FILES = ("snu/walk.bvh", "xia/strutting_01_000.bvh", "cmu_amc/02_01.amc", "xia/d
 
 @pytest.fixture
 def captures(monkeypatch):
-    """The folder, and a study that takes 6 s a run: a lap, and most of the second one, in which the hand pushes."""
+    """The folder; runs are shortened to 6 s, a lap and most of the second one, in which the hand pushes."""
     if not MOCAP.is_dir():
         pytest.skip("no motion capture at ../shared/mocap")
     monkeypatch.setattr(random_sets, "SECONDS", 6.0)

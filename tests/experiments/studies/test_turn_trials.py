@@ -32,5 +32,5 @@ def test_only_friction_limits_the_followed_motion():
     assert slippery.slid > 0.1
     assert rough.slid < 5e-3
     assert rough.miss < 0.05 * slippery.miss
-    # What slips is pushed by what friction gives, however the motors pull.
+    # A slipping foot is pushed by the friction force only, whatever the motors do.
     assert slippery.miss == pytest.approx(0.5 * (14.0 - 0.75 * 9.81) * 0.2**2, rel=0.1)

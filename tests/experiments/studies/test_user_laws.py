@@ -14,7 +14,7 @@ PANELS = (1001, 1002, 1003)
 """Seeds of populations; numbers of people were chosen on those of seeds 1 to 6, 101, 201 and 202."""
 PEOPLE = 6
 HARDLY_VARY = ("power-law", "tremor", "step-response", "grip", "practice", "endurance")
-"""Laws of which one panel of three tells as much as three of six, that take four times as long."""
+"""Laws with so little variance that one panel of three people suffices."""
 
 
 def assert_published(panels: Sequence[Sequence[Law]]) -> None:

@@ -42,7 +42,7 @@ def tuning(**values: object) -> TuneConfig:
 
 @pytest.fixture
 def certificates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A boundary at 5000 N/m in the place of CasADi's, which takes seconds a candidate."""
+    """A stability boundary at 5000 N/m, in place of certification, which takes seconds per candidate."""
 
     def verdict(config) -> Stability:
         margin = 5000.0 / config.mode.stiffness - 1.0

@@ -70,7 +70,7 @@ def test_retrace_compares_with_the_nearest_place_and_heading() -> None:
     assert turn is not None
     assert distance < 0.01
     assert turn < 0.1
-    # Behind where it began there is no way to compare with.
+    # Behind the start there is no outward path to compare with.
     measure.add(np.array([-0.1]), poses_along(np.array([-0.1])), float(forth[-1]))
     assert measure.result() == (distance, turn)
 
@@ -170,7 +170,7 @@ def test_clip_that_flies_once_prepared_is_led_as_captured(monkeypatch: pytest.Mo
 
 def test_clip_with_long_leaps_is_led_by_grounded_steps() -> None:
     run = embedded("run")
-    # Each flight goes 1 m further: a root so low that both feet reached the floor would lie on it.
+    # Each flight is 1 m longer: a root low enough for both feet to reach the floor would lie on it.
     flies = ~contacts(run).planted.any(axis=1)
     far, flights = run.poses.copy(), np.count_nonzero(flies[1:] & ~flies[:-1])
     far[:, 0] += np.cumsum(flies) * flights / flies.sum()

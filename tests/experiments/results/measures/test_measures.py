@@ -35,7 +35,7 @@ def recording_of(path: Path, down: np.ndarray) -> Recording:
     flight = np.zeros(m)
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
-    residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # in the air, where it should stand
+    residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # without contact, where it should stand
     ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user, "force": -user}
     ticks |= {"river": np.full(N, -1.0), "tank": 0.1 - 0.02 * t}
     ticks["tank_scale"] = np.where((t >= 3.0) & (t < 3.1), 0.5, 1.0)
@@ -104,7 +104,7 @@ def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) 
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
-    # A push of half a second is no shaking.
+    # A push of half a second is not an oscillation.
     assert (summary.oscillation.since, summary.oscillation.share) == (None, 0.0)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
     assert len(summary.lines()) == 9
@@ -115,7 +115,7 @@ def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) 
 
 @pytest.mark.parametrize("block", [1, 7, 113, 205])
 def test_measures_do_not_depend_on_block_size(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where a block ends in the middle of a push."""
+    """Including blocks that end in the middle of a push."""
     whole = summary_of(tmp_path / "whole.h5")
     monkeypatch.setattr(measures, "BLOCK_FRAMES", block)
     pieces = summary_of(tmp_path / "pieces.h5")
@@ -138,7 +138,7 @@ def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
             for span in ((0.0, 1.7003), (1.7003, 2.2), (2.2, np.inf))
         ]
     paths = [path for path, *_ in parts]
-    # A part begins with the first frame after its time, and its first tick has no step.
+    # A span begins with the first frame after its start, and its first tick has no step.
     assert [path.laps for path in paths] == pytest.approx([1.709 / 1.5, 0.489 / 1.5, 1.799 / 1.5])
     assert [len(path.pushes) for path in paths] == [0, 1, 1]
     assert paths[1].pushes[0].start == pytest.approx(2.0, abs=0.01)

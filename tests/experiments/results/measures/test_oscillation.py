@@ -39,7 +39,7 @@ def test_oscillating_loop_is_reported_with_frequency_and_growth():
         np.outer(2.0 * np.sin(2.0 * np.pi * 10.0 * T), AXIS),  # tremor
         np.outer(np.where(T % 1.0 < 0.5, 3.0, 0.0), AXIS),  # pushes that come and go at once
         np.random.default_rng(1).normal(scale=0.05, size=(len(T), 3)),  # rounded encoders
-        np.outer(4.0 * np.sin(2.0 * np.pi * 2.0 * T), AXIS),  # work
+        np.outer(4.0 * np.sin(2.0 * np.pi * 2.0 * T), AXIS),  # slow motion of the hand
     ],
 )
 def test_tremor_pushes_and_noise_are_not_oscillation(force):
@@ -49,7 +49,7 @@ def test_tremor_pushes_and_noise_are_not_oscillation(force):
 
 
 def test_force_from_encoder_rounding_is_not_oscillation():
-    """A stylus at rest whose reading flickers by one step: a damper makes a force of it, nothing moves."""
+    """A stylus at rest whose encoder flickers by one count: the damper turns it into force, nothing moves."""
     step = 1.2e-4 * 0.2  # [m] of an encoder's count at the tip
     reading = step * (np.random.default_rng(5).uniform(size=(len(T), 3)) - 0.5)
     force = 0.6 * np.random.default_rng(6).choice([-1.0, 1.0], size=len(T))

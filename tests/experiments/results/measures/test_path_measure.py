@@ -7,7 +7,7 @@ from experiments.results.measures.run_measures import PathMeasure
 
 
 class PathRecording:
-    """What `PathMeasure` takes of a recording."""
+    """The arrays of a recording that `PathMeasure` reads."""
 
     def __init__(self, clip_seconds: float):
         self._arrays = {"curve_span": np.array([0.0, 4.0]), "curve_closed": 0.0, "clip_seconds": clip_seconds}

@@ -9,7 +9,7 @@ from experiments.results.measures.changes import RiverChange, river_changes
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
-# The fifth and the last but one have the hand for too short a time.
+# The fifth and the last but one interval are too short to count.
 RIVER = np.repeat([-1.0, 0.0, -1.0, 0.0, 2.0, 1.0, -1.0, 2.0, 0.0, 1.0], [30, 50, 40, 60, 20, 70, 20, 80, 39, 90])
 
 

@@ -32,7 +32,7 @@ def test_smoothness_is_invariant_to_amplitude_and_duration(measure) -> None:
 
 
 def test_sparc_of_one_reach_is_published_value_and_falls_with_submovements() -> None:
-    # Balasubramanian et al. 2015: some −1.4 for a single minimum-jerk movement, less with each one that is added.
+    # Balasubramanian et al. 2015: about −1.4 for a single minimum-jerk movement, less with each added one.
     values = [spectral_arc_length(np.concatenate([reach(0.5)] * n), RATE) for n in (1, 2, 4, 8)]
     assert values[0] == pytest.approx(-1.4, abs=0.1)
     assert values == sorted(values, reverse=True)

@@ -31,7 +31,7 @@ from sim.users.hand.arm import Arm, hand_force
 MASS, PERIOD = 0.15, 1e-3
 CURVE = Trajectory.circle(0.0477, 4.0)
 EPSILON = 0.008
-# On cheer nobody flies: of clips that do, a hand that holds them is told.
+# A clip without flights, which would add remarks on holding them.
 MAPS = map_parts(run_config(map="composite", clips=("cheer",)), figure_model())
 CHANNELS = {"t": (), "p": (3,), "user": (3,), "switch": (), "phase": (), "nearest": (3,), "distance": ()}
 
@@ -52,7 +52,7 @@ def recorded(path: Path, grabs: Sequence[Grab], seconds: float) -> tuple[Stretch
     ticks = {name: np.zeros((n, *shape)) for name, shape in CHANNELS.items()}
     for k in range(n):
         hand[0], hand[HAND_SWITCH] = k * PERIOD, arm.switch[0]
-        # As encoders round: a hand that rests is at the same place for many ticks.
+        # Rounded as by encoders: a resting hand has the same position for many ticks.
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = np.round(p, 5), v
         memory[TRACE_DISTANCE] = np.inf
         stretchy_wrench(params, 0, 0, memory, TRACE_SIZE, hand, wrench)
@@ -101,7 +101,7 @@ def test_presses_without_effect_are_reported_as_nothing(tmp_path: Path) -> None:
     grabs = [
         Grab(0.2, still, 0.15, 0.0),  # nothing to undo
         Grab(1.0, still, 0.7, 0.0),  # nor to redo
-        Grab(2.0, away, 0.5, 0.4, (0.0477 + 0.02, 0.0, 0.0), 1.0),  # a probe that meets no tube, and rests
+        Grab(2.0, away, 0.5, 0.4, (0.0477 + 0.02, 0.0, 0.0), 1.0),  # a press away from the tube that carries nothing
         Grab(4.5, away, 0.5, 0.1, (0.0477, 0.0, 0.0), 1.0),
     ]
     field, memory, recording = recorded(tmp_path / "run.h5", grabs, 6.5)
@@ -123,7 +123,7 @@ def test_press_cut_off_by_the_end_of_the_run_is_reported(tmp_path: Path) -> None
 @pytest.mark.parametrize("mode", ["stretch", "stretch-then-follow"])
 @pytest.mark.parametrize("seconds", [8.0, 20.0, 30.0])
 def test_pushes_begin_only_once_the_curve_is_bent(mode: str, seconds: float) -> None:
-    """A push during the tour would carry the click that undoes, and a held point faster than a body goes."""
+    """A push during the edits would drag the undo click, and move a held point faster than a body can."""
     grabs = stretch_grabs(CURVE, EPSILON)
     parts = parts_with(mode, "push", seconds=seconds, grabs=grabs)
     starts = [push.at for push in parts.user.pushes]

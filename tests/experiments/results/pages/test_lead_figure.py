@@ -15,7 +15,7 @@ TURNED, SECONDS = 4.0, 9.0
 
 @pytest.fixture
 def figure(tmp_path):
-    """A figure that goes 4 m along x in as many seconds and back; a stylus in front of it, at a hundredth."""
+    """A figure that moves 4 m along x in 4 s and back; a stylus in front of it, at a scale of 1:100."""
     t, rows = np.arange(0.0, SECONDS, 1e-3), np.arange(0.0, SECONDS, 1e-2)
     s = np.minimum(t, np.maximum(2.0 * TURNED - t, 0.0))
     poses = np.tile(rest_pose(), (len(rows), 1))

@@ -16,7 +16,7 @@ N = 20_000
 
 def section(tmp_path: Path) -> str:
     force, distance = np.zeros((N, 3)), np.linspace(0.0, 0.01, N)
-    force[12_345, 2] = -7.0  # a jolt of one tick
+    force[12_345, 2] = -7.0  # a peak of one tick
     groups = {"ticks": Group(1000.0, {"t": (), "force": (3,), "user": (3,), "distance": ()})}
     with Recorder(tmp_path / "run.h5", {}, 1, groups, {"distance_from": "</script>"}) as recorder:
         rows = {"t": np.arange(N) / 1000.0, "force": force, "user": np.zeros((N, 3)), "distance": distance}

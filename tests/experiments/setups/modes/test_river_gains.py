@@ -19,7 +19,7 @@ from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.hand.arm import hand_force
 
-MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s] of what the hand moves, about the Phantom's
+MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s]; mass and friction are about the Phantom's
 CURVE = Trajectory.circle(0.0477, 4.0)
 SECONDS = 4.0
 MAPS = map_parts(run_config(map="composite", clips=("cheer",)), figure_model())
@@ -30,7 +30,7 @@ def parts_with(mode: str = "rivers", user: str = "push", **words: object) -> Par
 
 
 def river_at_each_tick(parts: Parts) -> np.ndarray:
-    """Which river has the default hand, a mass with friction, at each tick from the beginning of the level river on."""
+    """River of the default hand, a mass with friction, at each tick; it starts on the level river."""
     assert isinstance(parts.field, HigherOrder)
     program, arm = parts.field.program(), parts.user.compiled()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)

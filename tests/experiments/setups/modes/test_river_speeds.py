@@ -16,7 +16,7 @@ RADIUS = 0.0477
 
 
 def river_at_each_tick(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
-    """River that has the hand of the simulated Phantom, at each tick; -1 for none."""
+    """River of the hand on the simulated Phantom at each tick; -1 for none."""
     words = {"map": "rivers", "figure": "none", "clips": ("walk",), "lap": lap, "seed": 3, **more}
     session = wire(run_config(mode="rivers", user=user, seconds=seconds, **words))
     log = TrialLog(session.servo, session.world)

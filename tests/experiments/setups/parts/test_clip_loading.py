@@ -23,7 +23,7 @@ def foreign(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
-    """Files that were prepared, by a stand-in that takes no time."""
+    """Files that were prepared, by a fast replacement of the preparation."""
     found: list[Path] = []
 
     class Made:

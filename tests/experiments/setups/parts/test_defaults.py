@@ -6,7 +6,7 @@ from experiments.cli import main, parsed
 
 
 def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> None:
-    """Pushes and grabs of a hand that none were given for; a run of that file has them again."""
+    """Default pushes are written out, so that a run of the file repeats them."""
     from experiments.config.run_config import load_config
     from experiments.setups.parts.defaults import resolved
 

@@ -60,7 +60,7 @@ def test_governor_speeds_follow_the_animation_of_the_run():
     session = wire(config)
     assert isinstance(session.field, Governed)
     maps, governor = session.parts.maps, session.field.governor
-    # At the clips' own pace, neither at that of a lap nor at that which the field leads at to make up for friction.
+    # At the clips' own pace, not at that of the lap or of the friction-compensated curve.
     pace, shares = maps.curve.length / maps.lap_seconds, np.linspace(0.0, 1.0, len(governor.speeds))
     assert maps.lap_seconds != pytest.approx(config.map.around.lap, rel=0.1)
     assert session.curve.duration < 0.95 * config.map.around.lap
@@ -68,7 +68,7 @@ def test_governor_speeds_follow_the_animation_of_the_run():
     flying = governor.speeds[:, 0] > 0.0
     np.testing.assert_allclose(governor.speeds[flying], np.tile(pace * np.array(flight.admissible), (flying.sum(), 1)),
                                rtol=5e-3)  # fmt: skip
-    # And where the clip flies: each of its flights over the lap begins at the stylus' place at that time.
+    # Each flight of the lap begins at the position of the stylus at that time.
     begins = session.curve.point(session.curve.start + session.curve.duration * shares[1:][np.diff(flying * 1) > 0])
     clip = embedded("backflip")
     laps = np.arange(round(maps.lap_seconds / clip.duration))

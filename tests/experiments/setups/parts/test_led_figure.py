@@ -11,7 +11,7 @@ FEET = {"left": np.arange(4), "right": np.arange(4, 8)}
 
 
 def marks(*rests: tuple[str, float, float, float]) -> Contacts:
-    """Contacts of a lap of a second: a foot that rests from a time to another at a height, and is 0.2 m high else."""
+    """Contacts of a lap of 1 s from (foot, start, end, height) of rests; otherwise feet are 0.2 m high."""
     heights, resting = np.full((FRAMES, 10), 0.2), np.zeros((FRAMES, 10), dtype=bool)
     t = np.arange(FRAMES) / FPS
     for foot, start, end, height in rests:
@@ -43,7 +43,7 @@ def test_hops_and_runs_have_flights_and_brief_gaps_have_none() -> None:
     runs = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.4, 0.9, 0.0)), FPS)
     assert not runs[30:40].any()
     assert not runs[90:].any()
-    # Nobody flies from foot to foot for 30 ms.
+    # A gap of 30 ms between the feet is not a flight.
     walks = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.33, 1.0, 0.0)), FPS)
     assert walks.any(axis=1).all()
     np.testing.assert_array_equal(np.flatnonzero(walks[:, 0]), np.arange(33))

@@ -47,7 +47,7 @@ def test_inertial_force_along_curve_matches_kinetic_energy():
 
 
 def _turn_rate(lap: float) -> float:
-    """Of a hand that FOLLOW leads round a circle of 32 mm, over the lap's own, from the third second on."""
+    """Turn rate of a hand led by FOLLOW round a circle of 32 mm, relative to the lap's, after 3 s."""
     session = wire(run_config(radius=0.032, reach=0.01, lap=lap, seconds=5.0, figure="none"))
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(5.0)
@@ -73,7 +73,7 @@ def test_paced_speed_is_curve_speed_plus_device_losses():
     along, bending = inertia_along(CURVE, middles)
     cost = friction_along(CURVE, middles) + along
     np.testing.assert_allclose(paced_speed, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
-    # The more a field drags and the stiffer it is, the less the device matters; without a spring no bend is kept.
+    # Device losses matter less with more drag and stiffness; without a spring bends are not compensated.
     assert found.duration < paced(CURVE, 80.0, 300.0).duration < paced(CURVE, 80.0, 3000.0).duration < CURVE.duration
     assert paced(CURVE, 80.0, 0.0).duration > paced(CURVE, 80.0, 3000.0).duration
 

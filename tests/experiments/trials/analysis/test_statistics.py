@@ -178,7 +178,7 @@ def test_interaction_is_found_only_where_present() -> None:
 
 
 def test_failed_condition_does_not_bias_the_other_level() -> None:
-    # Map b is 5 mm worse; where its trials with the river failed, its trials without it say nothing of the river.
+    # Map b is 5 mm worse; users whose trials of it with the river failed must not bias the effect of the river.
     table = frame(0.0)
     table["tracking_error"] += 5.0 * (table["map"] == "b")
     lost = (table["user"] < 8) & (table["map"] == "b") & (table["guidance"] == "river")

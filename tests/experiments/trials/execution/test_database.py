@@ -50,7 +50,7 @@ def test_full_disk_is_reported_and_keeps_the_rows(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as database:
         database.add(row("first"), {})
         pages = database._db.execute("PRAGMA page_count").fetchone()[0]
-        database._db.execute(f"PRAGMA max_page_count = {pages + 2}")  # SQLite's own refusal of a page that is not there
+        database._db.execute(f"PRAGMA max_page_count = {pages + 2}")  # SQLite refuses further pages, as on a full disk
         with pytest.raises(StudyError, match="the disk is full; every trial so far is kept"):
             database.add(row("large"), {"padding": "x" * 40_000})
     with opened(tmp_path / "s.sqlite") as again:
