@@ -63,7 +63,7 @@ def test_added_import_that_closes_a_cycle_is_detected(view, file: str, imported:
         tuple(graphlib.TopologicalSorter(view(graph | {file: graph[file] | {imported}})).static_order())
 
 
-def test_test_folders_mirror_package_folders() -> None:
+def test_folders_of_tests_mirror_the_packages() -> None:
     test_folders = {
         path.parent.relative_to(ROOT / "tests")
         for package in PACKAGES

@@ -38,7 +38,7 @@ CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  #
 MISSED = re.compile(r"(\d+) ticks, (\d+) deadlines missed")
 MAX_MISSED_SHARE = 0.05  # of the deadlines: with more missed, a run on a device is not judged
 TRIES = 12  # a host that pauses for milliseconds makes devices stop, as they should
-HOUR = 3600.0  # [s] timeout; user studies and tunings take long on a busy machine
+TIMEOUT = 3600.0  # [s] timeout; user studies and tunings take long on a busy machine
 
 
 def lines(page: Path) -> list[str]:
@@ -47,28 +47,28 @@ def lines(page: Path) -> list[str]:
         found = [line for line in commands(page) if line.startswith("hvf ") and line.split()[1:] not in NAMES]
     else:
         found = [line for block in blocks(page, "") for line in block.splitlines() if line.startswith("hvf ")]
-    typed = dict.fromkeys(shlex.join(shlex.split(line, comments=True)) for line in found)
-    return [line for line in typed if not any(words in line for words in NOT_RUN_HERE)]
+    normalised = dict.fromkeys(shlex.join(shlex.split(line, comments=True)) for line in found)
+    return [line for line in normalised if not any(words in line for words in NOT_RUN_HERE)]
 
 
-def typed(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+def run_command(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a command in a folder."""
     return subprocess.run(
         [sys.executable, "-m", "experiments.cli", *arguments],
         cwd=folder, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
-        capture_output=True, text=True, timeout=HOUR, check=False,
+        capture_output=True, text=True, timeout=TIMEOUT, check=False,
     )  # fmt: skip
 
 
-def in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.CompletedProcess[str], bool]:
+def run_in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.CompletedProcess[str], bool]:
     """Run a command, again if it runs against the clock and this machine paused; whether it was in time at last."""
-    completed = typed(arguments, folder)
+    completed = run_command(arguments, folder)
     for tried in range(TRIES):
         ticks, missed = map(int, (MISSED.findall(completed.stdout) or [(1, 0)])[0])
         paused = missed > MAX_MISSED_SHARE * ticks or any(words in completed.stdout for words in PAUSED)
         if not line.startswith(CLOCKED) or not paused:
             return completed, True
-        completed = typed([*arguments, "--overwrite"], folder) if tried + 1 < TRIES else completed
+        completed = run_command([*arguments, "--overwrite"], folder) if tried + 1 < TRIES else completed
     return completed, False
 
 
@@ -90,10 +90,9 @@ def test_commands_of_page_give_the_stated_results(page: Path, tmp_path: Path) ->
     for line in PREREQUISITES.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
         shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the default folder of a run
-        completed, on_time = in_time(line, arguments, tmp_path)
-        if not on_time or (
-            completed.returncode and any(out in line for out in late)
-        ):  # this command, or one that needs its recording
+        completed, on_time = run_in_time(line, arguments, tmp_path)
+        needs_late_recording = any(out in line for out in late)
+        if not on_time or (completed.returncode and needs_late_recording):
             late.append(arguments[arguments.index("--out") + 1] if "--out" in arguments else line)
             continue
         assert completed.returncode == 0, f"{line}\n{completed.stderr}"

@@ -44,7 +44,7 @@ class ScriptedRun:
 
 
 @pytest.fixture
-def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
+def type_keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
     """A pseudo-terminal as stdin; the function types into it."""
     ours, theirs = os.openpty()
     with open(theirs, encoding="utf-8") as terminal:
@@ -53,7 +53,7 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]
     os.close(ours)
 
 
-def test_end_of_recording_is_reported_once_with_its_reason(keys, capsys) -> None:
+def test_end_of_recording_is_reported_once_with_its_reason(type_keys, capsys) -> None:
     stand, console = ScriptedRun({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
     stdout = capsys.readouterr().out
@@ -76,27 +76,30 @@ def _interrupt(stand: ScriptedRun) -> None:
 
 
 @pytest.mark.slow
-def test_enter_toggles_arming(keys) -> None:
-    assert requests_of({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
-    assert requests_of({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
-    assert requests_of({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
+def test_enter_toggles_arming(type_keys) -> None:
+    assert requests_of({3: lambda _: type_keys(b"\n")}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: lambda _: type_keys(b"\n")}) == [ARM, DISARM, DISARM]
+    assert (
+        requests_of({3: lambda _: type_keys(b"\n"), 6: lambda _: type_keys(b"\n"), 9: lambda _: type_keys(b"\n")})[2]
+        == ARM
+    )
 
 
-def test_keys_typed_before_the_prompt_are_ignored(keys) -> None:
-    keys(b"\n\n")
+def test_keys_typed_before_the_prompt_are_ignored(type_keys) -> None:
+    type_keys(b"\n\n")
     assert requests_of({}) == [DISARM]
 
 
-def test_enter_typed_before_a_fault_does_not_clear_it(keys) -> None:
+def test_enter_typed_before_a_fault_does_not_clear_it(type_keys) -> None:
     def typed_and_fails(stand: ScriptedRun) -> None:
-        keys(b"\n")
+        type_keys(b"\n")
         stand.fails()
 
-    assert requests_of({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
 
 
-def test_enter_after_a_fault_clears_it(keys) -> None:
-    assert requests_of({3: lambda _: keys(b"\n"), 6: ScriptedRun.fails, 9: lambda _: keys(b"\n")}) == [
+def test_enter_after_a_fault_clears_it(type_keys) -> None:
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: ScriptedRun.fails, 9: lambda _: type_keys(b"\n")}) == [
         ARM,
         CLEAR,
         ARM,
@@ -104,13 +107,13 @@ def test_enter_after_a_fault_clears_it(keys) -> None:
     ]
 
 
-def test_end_of_input_ends_the_run_without_arming(keys) -> None:
-    stand = ScriptedRun({3: lambda _: keys(b"\x04")})
+def test_end_of_input_ends_the_run_without_arming(type_keys) -> None:
+    stand = ScriptedRun({3: lambda _: type_keys(b"\x04")})
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
     assert stand.asked == [DISARM]
     assert stand.looks < 10
 
 
-def test_unattended_run_ends_at_a_fault(keys) -> None:
-    keys(b"\n")
+def test_unattended_run_ends_at_a_fault(type_keys) -> None:
+    type_keys(b"\n")
     assert requests_of({4: ScriptedRun.fails}, arm=True) == [ARM]

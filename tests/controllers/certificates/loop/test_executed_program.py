@@ -23,20 +23,24 @@ def test_executed_radius_matches_symbolic_loop():
     stable = looked_at(
         Follow(CIRCLE, 300.0, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4
     )
-    shaking = looked_at(Follow(CIRCLE, 2e4, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4)
-    assert stable.radius < 1.0 < shaking.radius
-    # The differences are the derivatives: on the curve the radius is the symbolic one.
+    oscillating = looked_at(
+        Follow(CIRCLE, 2e4, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4
+    )
+    assert stable.radius < 1.0 < oscillating.radius
+    # On the curve, finite differences give the radius of the symbolic loop.
     exact = SampledLoop(river(k_r=2e4).still_at(river().phases(4)), Sampling(1e-3)).radius(2e4, 8.0).max()
-    assert shaking.radius >= exact - 1e-3
+    assert oscillating.radius >= exact - 1e-3
 
 
 def test_time_dependent_law_is_evaluated_in_the_first_lap():
-    """And not at the times of the curve that is slowed down for the plant: there this law is as stiff as a wall."""
+    """Not at the times of the slowed-down curve, where this law would be as stiff as a wall."""
 
     @hvf.law
-    def later(hand, k=0.01):
+    def growing_with_time(hand, k=0.01):
         return 0.0, 0.0, -k * hand.t
 
-    seen = looked_at((Follow(CIRCLE, 300.0, 8.0, 0.25) + later).program(), river(), 0.02, [HandImpedance()], n=4)
-    assert seen.radius < 1.0
-    assert seen.strongest < 10.0
+    linearised = looked_at(
+        (Follow(CIRCLE, 300.0, 8.0, 0.25) + growing_with_time).program(), river(), 0.02, [HandImpedance()], n=4
+    )
+    assert linearised.radius < 1.0
+    assert linearised.strongest < 10.0
