@@ -41,7 +41,7 @@ test-python:
 
 # The live page in a browser: what it costs the servo while it is dragged and reloaded (four minutes).
 live-load: $(READY)
-	$(BIN)/python -m tests.live.undisturbed
+	$(BIN)/python -m tests.live.live_load
 
 lint: $(READY)
 	$(BIN)/ruff check .

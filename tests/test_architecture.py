@@ -1,4 +1,4 @@
-"""Imports go one way: no file, and no folder, is reached from what it imports; tests lie as what they test."""
+"""No import cycles among files and folders; the folders of tests mirror those of the packages."""
 
 import ast
 import graphlib
@@ -13,7 +13,7 @@ PACKAGES = ("models", "controllers", "sim", "experiments")
 
 @cache
 def imports() -> dict[str, set[str]]:
-    """Files of the packages by path, and what each imports of them, also within functions."""
+    """Imports of each file of the packages from other ones, also those within functions."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")] + [ROOT / "hvf.py"]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
     graph: dict[str, set[str]] = {}
@@ -31,7 +31,7 @@ def imports() -> dict[str, set[str]]:
 
 
 def by_folder(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    """Rooms: a room is the folder that directly holds a file, and a folder within it is another."""
+    """Imports between rooms: the folders that directly contain files."""
     rooms: dict[str, set[str]] = {}
     for file, found in graph.items():
         rooms.setdefault(str(Path(file).parent), set()).update(str(Path(other).parent) for other in found)
@@ -39,7 +39,7 @@ def by_folder(graph: dict[str, set[str]]) -> dict[str, set[str]]:
 
 
 @pytest.mark.parametrize("view", [lambda graph: graph, by_folder], ids=["files", "folders"])
-def test_no_circle_of_imports(view) -> None:
+def test_no_import_cycles(view) -> None:
     graph = view(imports())
     assert len(graph) > 20
     try:
@@ -56,19 +56,19 @@ def test_no_circle_of_imports(view) -> None:
         (by_folder, "models/mocap/motion/ranges.py", "models/mocap/library.py"),
     ],
 )
-def test_a_circle_would_be_found(view, file: str, imported: str) -> None:
+def test_added_import_that_closes_a_cycle_is_detected(view, file: str, imported: str) -> None:
     graph = imports()
     assert {file, imported} <= graph.keys()
     with pytest.raises(graphlib.CycleError):
         tuple(graphlib.TopologicalSorter(view(graph | {file: graph[file] | {imported}})).static_order())
 
 
-def test_folders_of_tests_are_those_of_the_packages() -> None:
-    held = {
+def test_folders_of_tests_mirror_the_packages() -> None:
+    test_folders = {
         path.parent.relative_to(ROOT / "tests")
         for package in PACKAGES
         for path in (ROOT / "tests" / package).rglob("*.py")
     }
-    kept = {path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
-    assert len(held) > 20
-    assert not held - kept, "folders of tests without a folder of that name in the packages"
+    package_folders = {path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    assert len(test_folders) > 20
+    assert not test_folders - package_folders, "folders of tests without a folder of that name in the packages"

@@ -1,4 +1,4 @@
-"""What the documents show works: Python runs, commands parse, links lead somewhere, the site builds."""
+"""Documentation works as shown: Python runs, commands parse, links exist, the site builds."""
 
 import re
 import shlex
@@ -23,8 +23,8 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "models").rglob("README.md"))]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-SAID = {  # what the blocks of a page print, where a sentence of the page says so
-    "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # of the law's cases
+EXPECTED_OUTPUT = {  # output that a page promises for its blocks
+    "README.md": ["{'field.k_r': 400}", "so is any switching between them"],  # on the cases of the law
     "docs/tutorials/your-own-study.md": ["48 trials"],
     "docs/tutorials/your-own-law.md": [
         "k = 100 N/m: pushed down by 6.2 mm",
@@ -59,27 +59,27 @@ def pages_with(*languages: str) -> list[Path]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("python"), ids=name)
-def test_the_python_of_a_page_runs_from_top_to_bottom(
+def test_python_blocks_of_page_run_in_order(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shutil.copy(ROOT / "models/mocap/clips/walk.bvh", "mine.bvh")  # what a page calls the reader's own
+    shutil.copy(ROOT / "models/mocap/clips/walk.bvh", "mine.bvh")  # stands for a reader's own file
     typed = ModuleType("typed")
     monkeypatch.setitem(sys.modules, "typed", typed)  # where kernels of a page are looked up
     for block in blocks(page, "python"):
-        exec(compile(block, f"<{name(page)}>", "exec"), typed.__dict__)  # no file, as typed: its lines are no Python
+        exec(compile(block, f"<{name(page)}>", "exec"), typed.__dict__)  # not a file, as in an interactive session
     plt.close("all")
-    said = capsys.readouterr().out
-    for sentence in SAID.get(name(page), []):
-        assert sentence in said
-    assert " fell at " not in said
-    told = "".join(blocks(page, "python")) + "mine.bvh"
+    stdout = capsys.readouterr().out
+    for sentence in EXPECTED_OUTPUT.get(name(page), []):
+        assert sentence in stdout
+    assert " fell at " not in stdout
+    named = "".join(blocks(page, "python")) + "mine.bvh"
     left = [path.name for path in tmp_path.iterdir() if path.suffix != ".png"]
-    assert not [name for name in left if name not in told]  # a run in memory leaves nothing
+    assert not [name for name in left if name not in named]  # a run in memory leaves nothing
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=name)
-def test_every_command_of_a_page_is_one_that_there_is(page: Path) -> None:
+def test_commands_on_page_parse(page: Path) -> None:
     for line in commands(page):
         program, *arguments = shlex.split(line, comments=True)
         if program == "hvf":
@@ -99,11 +99,11 @@ def _parses(arguments: list[str], line: str) -> None:
     command = parsed(arguments)
     assert callable(command), line
     options = getattr(command, "options", None)
-    if options is not None and options.config is None:  # the file would be a run's that there has not been
+    if options is not None and options.config is None:  # files of earlier runs do not exist here
         assert config_of_options(options), line
 
 
-TOML = {  # how the files that pages show are read
+TOML = {  # how TOML shown on a page is read
     "docs/how-to/rigs.md": lambda path: tomllib.loads(path.read_text(encoding="utf-8")),  # an excerpt, as it says
     "docs/how-to/tuning.md": read_tuning,
     "docs/how-to/user-studies.md": Study.load,
@@ -112,7 +112,7 @@ TOML = {  # how the files that pages show are read
 
 
 @pytest.mark.parametrize("page", pages_with("toml"), ids=name)
-def test_the_toml_of_a_page_is_read_as_it_stands(page: Path, tmp_path: Path) -> None:
+def test_toml_blocks_of_page_load(page: Path, tmp_path: Path) -> None:
     for block in blocks(page, "toml"):
         file = tmp_path / "shown.toml"
         file.write_text(block, encoding="utf-8")
@@ -121,13 +121,13 @@ def test_the_toml_of_a_page_is_read_as_it_stands(page: Path, tmp_path: Path) -> 
             assert read.trials
 
 
-def test_the_reference_lists_every_command() -> None:
+def test_command_reference_lists_every_command() -> None:
     listed = re.findall(r"^\| `hvf (\w+)`", (DOCS / "reference" / "command-line.md").read_text(encoding="utf-8"), re.M)
     assert sorted(listed) == sorted(NAMES)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
-def test_links_and_pictures_of_a_page_are_there(page: Path) -> None:
+def test_links_and_pictures_of_page_exist(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", FENCE.sub("", page.read_text(encoding="utf-8"))):
         if not target.startswith("http"):
             moved = [name(other) for other in PAGES if other.name == Path(target).name]
@@ -137,7 +137,7 @@ def test_links_and_pictures_of_a_page_are_there(page: Path) -> None:
 SOURCE = re.compile(r"`((?:controllers|experiments|models|sim|tests|examples|docs)/[\w/.-]+)(?::(\w+))?`")
 
 
-def test_files_and_functions_that_pages_name_are_there() -> None:
+def test_source_paths_and_names_in_pages_exist() -> None:
     for page in PAGES:
         for path, defined in SOURCE.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
             assert (ROOT / path).exists(), f"{name(page)}: {path}"
@@ -149,7 +149,7 @@ def test_files_and_functions_that_pages_name_are_there() -> None:
 
 
 @pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+def test_site_builds_without_warnings(tmp_path: Path) -> None:
     built = subprocess.run(
         [sys.executable, "-m", "sphinx", "--builder", "html", "--fail-on-warning", "--keep-going", "--quiet",
          str(DOCS), str(tmp_path / "site")],
@@ -161,6 +161,11 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert not re.findall(r"<(?:script|link)[^>]+(?:src|href)=\"https?://", page)
 
 
-def test_the_licence_is_the_one_that_the_project_names() -> None:
+def test_licence_file_matches_pyproject() -> None:
     assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert 'license = "Apache-2.0"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("row", ["rubber-from", "bunny-attraction", "k_s", "damping b is added", "convolution"])
+def test_paper_page_lists_deviation_from_paper(row):
+    assert row in (DOCS / "explanation" / "paper.md").read_text(encoding="utf-8")

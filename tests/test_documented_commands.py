@@ -1,4 +1,4 @@
-"""Every command that README, tutorials and how-to pages tell a reader to type is typed, in their order."""
+"""Commands of README, tutorials and how-to pages, run in their order."""
 
 import json
 import os
@@ -15,64 +15,64 @@ from experiments import commands as hvf_commands
 from experiments.studies.row_spread import README, stated_residuals
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
-FALLS = ["hvf run --clips backflip --governor"]  # pages say so beside them
-EARLIER = {  # what a page takes for granted: another page's result
+FALLING = ["hvf run --clips backflip --governor"]  # as their pages say
+PREREQUISITES = {  # results of other pages that a page needs
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
     "docs/how-to/devices.md": ["hvf run --out runs/mine"],
 }
-# Not here; served until stopped (tests/live); a rig of the reader's with names of its own (test_role_file).
-ELSEWHERE = ["--cluster tcp://head", "--device NAME", "hvf live ", "--roles roles.toml"]
-GIVEN = {
+# Need another machine or device; run until stopped (see tests/live); need the reader's own rig (see test_role_file).
+NOT_RUN_HERE = ["--cluster tcp://head", "--device NAME", "hvf live ", "--roles roles.toml"]
+PROVIDED_FILES = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
     "back.bvh": "models/mocap/clips/walk.bvh",
     "hidden.json": "examples/hidden.json",
     "own_device.py": "examples/own_device.py",
 }
-TYPED = [page for page in PAGES if page == ROOT / "README.md" or page.parent.name in ("tutorials", "how-to")]
+COMMAND_PAGES = [page for page in PAGES if page == ROOT / "README.md" or page.parent.name in ("tutorials", "how-to")]
 NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [["COMMAND", "--help"]]
-SHOWN = [page for page in PAGES if page.parent == DOCS / "explanation"]
+EXPLANATIONS = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
 SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried (`row_spread`)
-CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # what a machine that pauses is told
+CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # output on a machine that pauses
 MISSED = re.compile(r"(\d+) ticks, (\d+) deadlines missed")
-KEPT = 0.05  # of the deadlines at most missed: with more, nothing is learnt of a device
-TRIES = 12  # where a host takes processors away for milliseconds, devices rightly let go
-HOUR = 3600.0  # [s] that a command may take at most: user studies and tunings do on a busy machine
+MAX_MISSED_SHARE = 0.05  # of the deadlines: with more missed, a run on a device is not judged
+TRIES = 12  # a host that pauses for milliseconds makes devices stop, as they should
+TIMEOUT = 3600.0  # [s] timeout; user studies and tunings take long on a busy machine
 
 
 def lines(page: Path) -> list[str]:
-    """Each once; a command's mere name in a sentence is none."""
-    if page in TYPED:
+    """Commands of a page, each once; the mere name of a command does not count."""
+    if page in COMMAND_PAGES:
         found = [line for line in commands(page) if line.startswith("hvf ") and line.split()[1:] not in NAMES]
     else:
         found = [line for block in blocks(page, "") for line in block.splitlines() if line.startswith("hvf ")]
-    typed = dict.fromkeys(shlex.join(shlex.split(line, comments=True)) for line in found)
-    return [line for line in typed if not any(words in line for words in ELSEWHERE)]
+    normalised = dict.fromkeys(shlex.join(shlex.split(line, comments=True)) for line in found)
+    return [line for line in normalised if not any(words in line for words in NOT_RUN_HERE)]
 
 
-def typed(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """A line, in a folder."""
+def run_command(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder."""
     return subprocess.run(
         [sys.executable, "-m", "experiments.cli", *arguments],
         cwd=folder, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
-        capture_output=True, text=True, timeout=HOUR, check=False,
+        capture_output=True, text=True, timeout=TIMEOUT, check=False,
     )  # fmt: skip
 
 
-def in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.CompletedProcess[str], bool]:
-    """A line, typed again where it runs against the clock and this machine paused; whether it was kept at last."""
-    done = typed(arguments, folder)
+def run_in_time(line: str, arguments: list[str], folder: Path) -> tuple[subprocess.CompletedProcess[str], bool]:
+    """Run a command, again if it runs against the clock and this machine paused; whether it was in time at last."""
+    completed = run_command(arguments, folder)
     for tried in range(TRIES):
-        ticks, missed = map(int, (MISSED.findall(done.stdout) or [(1, 0)])[0])
-        paused = missed > KEPT * ticks or any(words in done.stdout for words in PAUSED)
+        ticks, missed = map(int, (MISSED.findall(completed.stdout) or [(1, 0)])[0])
+        paused = missed > MAX_MISSED_SHARE * ticks or any(words in completed.stdout for words in PAUSED)
         if not line.startswith(CLOCKED) or not paused:
-            return done, True
-        done = typed([*arguments, "--overwrite"], folder) if tried + 1 < TRIES else done
-    return done, False
+            return completed, True
+        completed = run_command([*arguments, "--overwrite"], folder) if tried + 1 < TRIES else completed
+    return completed, False
 
 
-def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None:
+def test_every_readme_row_with_standing_figure_states_its_residual() -> None:
     stands = [line for line, measured in ROW.findall(README.read_text(encoding="utf-8")) if "stands" in measured]
     assert len(stands) >= 8
     assert [shlex.join(shlex.split(line)) for line in stands] == list(
@@ -81,26 +81,27 @@ def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None
 
 
 @pytest.mark.commands
-@pytest.mark.parametrize("page", [page for page in TYPED + SHOWN if lines(page)], ids=name)
-def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> None:
-    for file, source in GIVEN.items():
+@pytest.mark.parametrize("page", [page for page in COMMAND_PAGES + EXPLANATIONS if lines(page)], ids=name)
+def test_commands_of_page_give_the_stated_results(page: Path, tmp_path: Path) -> None:
+    for file, source in PROVIDED_FILES.items():
         shutil.copy(ROOT / source, tmp_path / file)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     residuals, late = stated_residuals(page.read_text(encoding="utf-8")), []
-    for line in EARLIER.get(name(page), []) + lines(page):
+    for line in PREREQUISITES.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
-        shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none
-        done, kept = in_time(line, arguments, tmp_path)
-        if not kept or (done.returncode and any(out in line for out in late)):  # it, or what is made of its recording
+        shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the default folder of a run
+        completed, on_time = run_in_time(line, arguments, tmp_path)
+        needs_late_recording = any(out in line for out in late)
+        if not on_time or (completed.returncode and needs_late_recording):
             late.append(arguments[arguments.index("--out") + 1] if "--out" in arguments else line)
             continue
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
-        fell = " fell at " in done.stdout
-        assert fell == any(line.startswith(words) for words in FALLS), f"{line}\n{done.stdout}"
+        assert completed.returncode == 0, f"{line}\n{completed.stderr}"
+        fell = " fell at " in completed.stdout
+        assert fell == any(line.startswith(words) for words in FALLING), f"{line}\n{completed.stdout}"
         if line in residuals:
             (low, high), out = residuals[line], arguments[arguments.index("--out") + 1]
             summary = json.loads((tmp_path / out / "summary.json").read_text(encoding="utf-8"))
             measured = 100.0 * summary["figure"]["residual_force_rms"]
-            assert low - SPREAD <= measured <= high + SPREAD, f"{line}\n{done.stdout}"
+            assert low - SPREAD <= measured <= high + SPREAD, f"{line}\n{completed.stdout}"
     if late:
         pytest.skip(f"this machine pauses; of {TRIES} times none in time: {', '.join(late)}")

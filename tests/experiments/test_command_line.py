@@ -1,4 +1,4 @@
-"""What the ``hvf`` command says to bad input: one line, exit code 2, nothing lost."""
+"""The `hvf` command with bad input: one line on stderr, exit code 2, nothing lost."""
 
 import os
 import subprocess
@@ -8,20 +8,11 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main, parsed
-
-
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    code = main(arguments)
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.err.startswith("hvf: ")
-    assert captured.err.count("\n") == 1
-    assert "Traceback" not in captured.err
-    return captured.err
+from tests.experiments.refused_command import refused
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "message"),
     [
         (["--stiffness", "-5"], "--stiffness is -5; expected 0 N/m or more"),
         (["--damping", "nan"], "--damping is nan"),
@@ -66,16 +57,16 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ),
     ],
 )
-def test_a_run_that_cannot_be_is_refused_with_the_numbers(
-    flags: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_run_with_invalid_option_is_refused_with_its_value(
+    flags: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert told in refused(["run", "--out", str(out), *flags], capsys)
+    assert message in refused(["run", "--out", str(out), *flags], capsys)
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["arm", "--stiffness", "-1"], "--stiffness is -1"),
         (["certify", "--stiffness", "-1"], "--stiffness is -1"),
@@ -86,68 +77,64 @@ def test_a_run_that_cannot_be_is_refused_with_the_numbers(
         (["lift", "walk", "--seed", "-1"], "--seed is -1"),
     ],
 )
-def test_other_commands_name_the_option_and_the_file_too(
-    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+def test_other_commands_name_the_invalid_option_or_file(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert told in refused(arguments, capsys)
+    assert message in refused(arguments, capsys)
 
 
-def test_a_configuration_without_clips_is_refused_and_not_run_with_the_default_ones(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.json"
     file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")
-    said = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
-    assert "takes 1 to 4 clips, got 0" in said
+    stderr = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
+    assert "takes 1 to 4 clips, got 0" in stderr
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unwritable_output_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("no folder")
-    said = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
-    assert said.startswith(f"hvf: {tmp_path / 'file'}")
-    assert "Errno" not in said
+    stderr = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
+    assert stderr.startswith(f"hvf: {tmp_path / 'file'}")
+    assert "Errno" not in stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
-def test_a_place_without_a_size_is_not_said_to_be_full(capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
-    assert said.startswith("hvf: /proc/nowhere: ")
-    assert "free" not in said
+def test_output_on_a_file_system_without_size_is_not_reported_as_full(capsys: pytest.CaptureFixture[str]) -> None:
+    stderr = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
+    assert stderr.startswith("hvf: /proc/nowhere: ")
+    assert "free" not in stderr
 
 
-def test_a_folder_that_holds_a_run_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_with_a_run_is_kept_unchanged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
     assert "--overwrite" in refused(["run", "--out", str(tmp_path)], capsys)
     assert (tmp_path / "run.h5").read_bytes() == b"precious"
 
 
-def test_a_bad_configuration_does_not_cost_the_run_that_is_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_invalid_option_with_overwrite_keeps_the_old_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
     refused(["run", "--out", str(tmp_path), "--overwrite", "--stiffness", "-1"], capsys)
     assert (tmp_path / "run.h5").read_bytes() == b"precious"
 
 
-def test_an_output_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_output_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "out").write_text("a file")
     assert "is a file" in refused(["run", "--out", str(tmp_path / "out")], capsys)
 
 
 @pytest.mark.parametrize("command", ["report", "reproduce"])
-def test_a_folder_without_a_run_is_refused(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_without_a_run_is_refused(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "run.h5" in refused([command, str(tmp_path)], capsys)
     (tmp_path / "run.h5").write_bytes(b"not HDF5")
     assert "run.h5" in refused([command, str(tmp_path)], capsys)
 
 
-def test_a_motion_file_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_motion_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "bad.bvh"
     source.write_text("HIERARCHY\nROOT hips\n{\n")
     assert "bad.bvh:" in refused(["convert", str(source), str(tmp_path / "out.bvh")], capsys)
 
 
-def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_converted_file_is_not_replaced_without_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from models.mocap.library import embedded
     from models.mocap.readers.own_bvh import write_bvh
 
@@ -160,13 +147,13 @@ def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.parametrize("command", ["convert", "prepare"])
-def test_an_axis_that_points_down_is_the_value_of_its_option(command: str) -> None:
+def test_negative_axis_is_parsed_as_option_value(command: str) -> None:
     assert parsed([command, "in.bvh", "out.bvh", "--up", "-Y"]).up == "-Y"
     assert parsed([command, "--up=-Z", "in.bvh", "out.bvh"]).up == "-Z"
 
 
 @pytest.mark.slow
-def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None:
+def test_closed_pipe_ends_the_command_silently_with_code_141(tmp_path: Path) -> None:
     from models.mocap.library import embedded
     from models.mocap.readers.own_bvh import write_bvh
 
@@ -176,15 +163,15 @@ def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None
         os.close(reading)
         try:
             command = [sys.executable, "-m", "experiments.cli", *arguments]
-            ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=60)
+            completed = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=60)
         finally:
             os.close(writing)
-        assert ended.returncode == 141
-        assert ended.stderr == b""
+        assert completed.returncode == 141
+        assert completed.stderr == b""
 
 
 @pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
-def test_a_stream_that_is_closed_costs_neither_the_result_nor_the_exit_code(closed: str, tmp_path: Path) -> None:
+def test_closed_standard_stream_affects_neither_result_nor_exit_code(closed: str, tmp_path: Path) -> None:
     from models.mocap.library import embedded
     from models.mocap.readers.own_bvh import write_bvh
 
@@ -192,54 +179,54 @@ def test_a_stream_that_is_closed_costs_neither_the_result_nor_the_exit_code(clos
     number = ["stdin", "stdout", "stderr"].index(closed)
     main_of = f"import os, sys; os.close({number}); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     command = ["-m", "experiments.cli", "convert", str(tmp_path / "in.bvh"), str(tmp_path / "out.bvh")]
-    ended = subprocess.run([sys.executable, "-c", main_of, *command], capture_output=True, check=False, timeout=60)
-    assert ended.returncode == 0, ended.stderr
+    completed = subprocess.run([sys.executable, "-c", main_of, *command], capture_output=True, check=False, timeout=60)
+    assert completed.returncode == 0, completed.stderr
     assert (tmp_path / "out.bvh").read_text(encoding="utf-8").startswith("HIERARCHY")
 
 
-def test_an_interrupt_while_the_program_is_still_importing_is_a_line() -> None:
-    """Also where what is being imported would turn the exception into one of its own, as MuJoCo does."""
+def test_interrupt_during_imports_is_one_line() -> None:
+    """Also if the module being imported converts the exception, as MuJoCo does."""
     code = "import os, signal, experiments.console.startup\n"
     code += "try: os.kill(os.getpid(), signal.SIGINT)\nexcept BaseException: raise ImportError('initialization failed')"
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
-    assert ended.stderr == "hvf: stopped; nothing is left half done\n"
-    assert ended.returncode == 130
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert completed.stderr == "hvf: stopped; nothing is left half done\n"
+    assert completed.returncode == 130
 
 
-def test_a_warning_of_mujocos_is_counted_by_a_command_and_left_to_the_user_of_the_library(tmp_path: Path) -> None:
+def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_path: Path) -> None:
     """A command neither prints it nor writes MuJoCo's log into the user's folder."""
     code = (
         "import hvf, mujoco; print(mujoco.get_mju_user_warning())\nfrom experiments.cli import main; main(['clips'])\n"
     )
     code += "from sim.world.world import World; world = World(kind='none'); world.data.qvel[:] = 1e30\n"
     code += "mujoco.mj_checkVel(world.model, world.data); print(world.warnings())"
-    ended = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(Path.cwd())},
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
-    assert (ended.stdout.splitlines()[0], ended.stdout.splitlines()[-1]) == ("None", "{'badqvel': 1}")
-    assert ended.stderr == ""
+    assert (completed.stdout.splitlines()[0], completed.stdout.splitlines()[-1]) == ("None", "{'badqvel': 1}")
+    assert completed.stderr == ""
     assert not list(tmp_path.iterdir())
 
 
-def test_a_library_that_mujoco_gl_asks_for_in_vain_is_named_and_done_without() -> None:
+def test_missing_library_for_mujoco_gl_is_named_and_skipped() -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
     code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
-    ended = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"MUJOCO_GL": "osmesa"}, capture_output=True, text=True,
         check=True, timeout=60,
     )  # fmt: skip
-    assert ended.stderr.splitlines()[0] == (
+    assert completed.stderr.splitlines()[0] == (
         "MUJOCO_GL is 'osmesa', and libOSMesa is not on this machine: left out; unset it, or apt-get install libosmesa6"
     )
-    assert ended.stdout.endswith("None\n")
+    assert completed.stdout.endswith("None\n")
 
 
 @pytest.mark.parametrize(
     ("command", "implementation"),
     [(["arm"], "runs.run.run"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
 )
-def test_an_interrupted_run_of_arm_or_device_says_where_its_recording_is(
+def test_interrupted_arm_or_device_run_names_its_recording(
     command: list[str],
     implementation: str,
     tmp_path: Path,
@@ -256,20 +243,16 @@ def test_an_interrupted_run_of_arm_or_device_says_where_its_recording_is(
 
 
 @pytest.mark.parametrize("name", ["picture.foo", "picture", "folder.png"])
-def test_a_picture_that_is_no_png_is_refused_before_it_is_drawn(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_non_png_picture_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "folder.png").mkdir()
     assert "ends in .png" in refused(["picture", str(tmp_path), str(tmp_path / name)], capsys)
 
 
-def test_a_picture_that_exists_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_picture_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.png").write_bytes(b"mine")
     assert "exists and is left" in refused(["picture", str(tmp_path), str(tmp_path / "mine.png")], capsys)
     assert (tmp_path / "mine.png").read_bytes() == b"mine"
 
 
-def test_a_film_that_no_encoder_takes_is_refused_with_its_size(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_film_too_large_for_encoders_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "8192 at most" in refused(["render", str(tmp_path), "--width", "1000000"], capsys)

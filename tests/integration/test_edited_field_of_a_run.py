@@ -1,4 +1,4 @@
-"""V + U of runs on the simulated Phantom: integrating it gives what the hand performed."""
+"""The edited field V + U of a run on the simulated Phantom: its integral curve is the performed motion."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ CURVE = Trajectory.circle(0.0477, 4.0)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, -0.8, 0.2), (-1.0, 0.3, -0.5)])
-def test_a_push_on_the_simulated_phantom_comes_out_of_v_plus_u(direction):
+def test_edited_field_reproduces_a_push_on_the_phantom(direction):
     river = River(CURVE, 0.08, 4.0 / 300.0, 4.0)
     config = run_config(clips=("cheer", "angry"), seconds=1.4, pushes=(Push(0.4, 0.5, 3.0, direction),))
     rows = []

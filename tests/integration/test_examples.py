@@ -1,4 +1,4 @@
-"""Every example runs as it stands, and prints what it promises."""
+"""Every example script runs unchanged and prints its expected result."""
 
 import os
 import subprocess
@@ -24,17 +24,17 @@ PRINTS = {
 }
 
 
-def test_every_example_is_told_what_it_prints() -> None:
+def test_every_example_has_an_expected_output() -> None:
     assert {path.stem for path in EXAMPLES} == PRINTS.keys()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs(path: Path, tmp_path: Path) -> None:
+def test_example_runs_and_prints_its_result(path: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, str(path)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr
-    assert PRINTS[path.stem] in done.stdout
+    assert completed.returncode == 0, completed.stderr
+    assert PRINTS[path.stem] in completed.stdout
     assert not list(tmp_path.iterdir())

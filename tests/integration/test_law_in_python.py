@@ -1,4 +1,4 @@
-"""A law in plain Python: a tick cut in three is the compiled tick to the last bit."""
+"""A law in plain Python: a tick interrupted for it equals the compiled tick exactly."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def _run(program, seconds=0.2):
     return session, logs
 
 
-def test_a_tick_with_a_law_in_python_is_the_compiled_tick_to_the_last_bit():
+def test_tick_with_python_law_equals_the_compiled_tick_exactly():
     seen = []
 
     def nothing(hand):
@@ -47,13 +47,13 @@ def test_a_tick_with_a_law_in_python_is_the_compiled_tick_to_the_last_bit():
     np.testing.assert_array_equal(np.array(seen), hands[:, [0, 1, 2, 3, 8, 9, 10]])
 
 
-def test_a_built_in_law_called_from_python_gives_the_same_run_to_the_last_digits():
+def test_built_in_law_called_from_python_gives_nearly_the_same_run():
     _, plain = _run(FOLLOW)
     _, logged = _run(PythonLaw(lambda hand: FOLLOW.wrench(hand).force))
     np.testing.assert_allclose(logged[-1][0][:, 1:4], plain[-1][0][:, 1:4], atol=2e-5)
 
 
-def test_a_law_that_gives_no_number_latches_the_fault_and_the_device_lets_go():
+def test_nan_from_a_law_latches_the_fault_and_removes_the_force():
     _, logs = _run(PythonLaw(lambda hand: [np.nan if hand.t > 0.1 else 1.0, 0.0, 0.0]))
     force = np.concatenate([block[2] for block in logs])
     assert force[90, 0] == pytest.approx(1.0)
@@ -65,7 +65,7 @@ def leaning(hand, k=40.0, turn=0.02):
     return -k * hand.p[0], -k * hand.p[1], 0.0, -turn * hand.w[0], -turn * hand.w[1], turn * hand.p[2]
 
 
-def test_compiled_and_in_python_laws_of_one_s_own_give_the_same_run_to_the_last_bit_and_moments_are_recorded():
+def test_compiled_and_python_own_laws_give_identical_runs_with_moments():
     plain, compiled = law(leaning), law(compiled=True)(leaning)
     _, once = _run((FOLLOW + plain + compiled(k=10.0)).limited(6.0))
     _, again = _run((FOLLOW + compiled + plain(k=10.0)).limited(6.0))
@@ -77,7 +77,7 @@ def test_compiled_and_in_python_laws_of_one_s_own_give_the_same_run_to_the_last_
     assert np.abs(fields[:, 5]).max() > 0.0
 
 
-def test_a_loop_without_the_laws_of_its_field_is_refused():
+def test_loop_without_the_laws_of_its_field_is_refused():
     session, _ = loop_with(CONFIG, PythonLaw(lambda hand: hand.p))
     with pytest.raises(SimError, match="1 slots for laws in Python, 0 are given"):
         Loop(session.servo, session.world)

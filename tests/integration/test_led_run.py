@@ -1,4 +1,4 @@
-"""The whole servo leads a figure along an S in five seconds and straight back: it retraces its path, feet stay put."""
+"""A figure led along an S and straight back: it retraces its path, and its feet do not slide."""
 
 import json
 from pathlib import Path
@@ -32,14 +32,14 @@ def assert_led_back(summary: dict[str, Any]) -> None:
     assert lead["retrace_cm"] < 1.0
     assert lead["retrace_deg"] < 1.0
     assert lead["physical_retrace_cm"] < 1.0
-    # As captures are calibrated: SNU's run 2.5°, the others 2° at most.
+    # SNU's run: 2.5°; the others: 2° at most.
     assert lead["physical_retrace_deg"] < 3.0
     assert lead["slide_cm"] < 3.0
-    # Of CMU 02_03 2.80 to 2.99 cm, by the seed; of DeepMimic's run 3.4 cm, 3.69 with Nehalem's kernels.
+    # CMU 02_03: 2.80 to 2.99 cm by the seed; DeepMimic's run: 3.4 cm, 3.69 with Nehalem's kernels.
     assert lead["physical_slide_cm"] < 4.5
 
 
-def test_straight_back_it_retraces_its_path_within_a_centimetre_and_two_degrees(folder: Path) -> None:
+def test_led_walk_retraces_its_path_within_1_cm_and_2_degrees(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text())
     lead, figure = summary["lead"], summary["figure"]
     assert lead["length_m"] > 5.5
@@ -51,7 +51,7 @@ def test_straight_back_it_retraces_its_path_within_a_centimetre_and_two_degrees(
     assert figure["joint_error_rms_deg"] < 2.0
 
 
-def test_it_goes_along_the_s_and_comes_back_to_where_it_began(folder: Path) -> None:
+def test_led_walk_follows_the_s_curve_and_returns(folder: Path) -> None:
     with Recording(folder / "run.h5") as recording:
         s = recording.channel("ticks", "phase")[:]
         poses = recording.channel("frames", "reference")[:]
@@ -67,7 +67,7 @@ def test_it_goes_along_the_s_and_comes_back_to_where_it_began(folder: Path) -> N
     assert forth.max() - forth[-1] > 40.0
 
 
-def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> None:
+def test_soles_keep_contact_and_support_bounds_the_turn_rate(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["lead"]["slide_cm"] < 3.0
     none, one, two = summary["lead"]["turn_deg_per_s"]
@@ -91,7 +91,7 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
         ("deepmimic/humanoid3d_run.txt", 0.14),
     ],
 )
-def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, residual: float) -> None:
+def test_captured_walks_and_runs_stand_and_return(tmp_path: Path, file: str, residual: float) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
     run(run_config(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
@@ -101,7 +101,7 @@ def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, 
 
 
 @pytest.mark.usefixtures("without_page")
-def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stepping_run_returns_along_a_wider_s_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
@@ -112,7 +112,7 @@ def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))
 
 
-def test_a_run_flies_along_the_s_and_comes_back(tmp_path: Path) -> None:
+def test_led_run_flies_along_the_s_curve_and_returns(tmp_path: Path) -> None:
     run(run_config(mode="lead", clips=("run",), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)

@@ -1,4 +1,4 @@
-"""Real clips lifted: h along each clip's curve is the clip, at every frame, alone and among others."""
+"""Lifted clips: h along each clip's curve equals the clip at every frame, alone and among others."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
 
 
 def lifted(clips):
-    """Clips on a lattice of curves that wander; closed where they close, all at an uneven pace."""
+    """Clips on a lattice of wavy curves, closed if the clip closes, all at a varying pace."""
     m, side = len(clips), int(np.ceil(np.sqrt(len(clips))))
     lap, k = np.arange(64)[:, None] * TURN / 64, np.arange(m)
     r, z = 0.036 + 0.012 * (k % side), -0.012 + 0.012 * (k // side)
@@ -59,18 +59,18 @@ def worst_at_frames(h_map):
 
 
 @pytest.mark.parametrize("clip", EMBEDDED, ids=lambda clip: clip.name)
-def test_an_embedded_clip_alone_is_exact_at_every_frame(clip):
+def test_single_embedded_clip_is_exact_at_every_frame(clip):
     assert worst_at_frames(lifted([clip])) < 1e-9
 
 
 @pytest.mark.parametrize("clip", EMBEDDED, ids=lambda clip: clip.name)
-def test_an_embedded_clip_cut_open_is_exact_at_every_frame(clip):
+def test_open_embedded_clip_is_exact_at_every_frame(clip):
     cut = Clip(clip.poses[: round(0.7 * clip.n_frames)], clip.fps, clip.name)
     assert not lifted([cut]).closed[0]
     assert worst_at_frames(lifted([cut])) < 1e-9
 
 
-def test_all_embedded_clips_together_and_one_twice_distorted_are_exact_at_every_frame():
+def test_all_embedded_clips_and_a_distorted_copy_are_exact_at_every_frame():
     assert worst_at_frames(lifted(EMBEDDED)) < 1e-9
     walk = EMBEDDED[embedded_names().index("walk")]
     poses = walk.poses.copy()
@@ -93,7 +93,7 @@ def recorded():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not MOCAP.is_dir(), reason="no shared motion capture beside the project")
-def test_recorded_clips_alone_and_ten_together_are_exact_at_every_frame():
+def test_captured_clips_alone_and_together_are_exact_at_every_frame():
     clips = recorded()
     assert len(clips) >= 10
     for clip in clips:
@@ -102,7 +102,7 @@ def test_recorded_clips_alone_and_ten_together_are_exact_at_every_frame():
 
 
 @pytest.mark.slow
-def test_a_clip_that_rests_at_both_ends_is_lifted_there_and_back_and_one_that_goes_on_stays_open(
+def test_clip_at_rest_at_both_ends_is_lifted_forth_and_back(
     tmp_path: Path,
 ) -> None:
     bow, share = np.tile(rest_pose(), (61, 1)), 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 61))

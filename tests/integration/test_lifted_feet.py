@@ -1,4 +1,4 @@
-"""Feet of in-betweens of lifted clips stand where they stand, although the mixture changes on the way."""
+"""Feet of in-betweens of lifted clips do not slide, although the mixture changes on the way."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ TURN = 2.0 * np.pi
 NAMES = ("walk", "run", "jump", "angry")
 
 
-def changing():
+def poses_through_mixtures():
     """Four clips at the corners of a square, and a hand that goes round among them in a lap: poses (n, 75), with
     footing and without."""
     clips = [embedded(name) for name in NAMES]
@@ -28,21 +28,21 @@ def changing():
         [(clip.poses, clip.fps) for clip in clips], [True] * 4, angles, np.tile(corners, (16, 1, 1)),
         figure_legs(figure_model()),
     )  # fmt: skip
-    shown = []
-    for stands in (True, False):
+    results = []
+    for with_footing in (True, False):
         memory, poses = h_map.compiled().memory, []
         for s in np.linspace(0.0, 2.0, 480):
-            if not stands:
+            if not with_footing:
                 memory[MEMORY:] = h_map.compiled().memory[MEMORY:]
             angle, r, z = TURN * s, 0.05 + 0.006 * np.cos(TURN * s), 0.006 * np.sin(TURN * s)
             x = np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
             poses.append(h_map.pose(x, memory))
-        shown.append(np.array(poses))
-    return shown
+        results.append(np.array(poses))
+    return results
 
 
-def test_feet_stand_though_the_mixture_changes():
-    stands, dragged = (measure_motion(Clip(poses, 120.0, "changing")) for poses in changing())
+def test_feet_do_not_slide_while_the_mixture_changes():
+    stands, dragged = (measure_motion(Clip(poses, 120.0, "changing")) for poses in poses_through_mixtures())
     assert dragged.slide > 0.05
     assert stands.slide < 0.03
     assert stands.limits <= dragged.limits + np.deg2rad(1.0)
@@ -50,7 +50,7 @@ def test_feet_stand_though_the_mixture_changes():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("names", [("walk", "run", "jump", "backflip"), tuple(embedded_names())], ids=["four", "all"])
-def test_in_betweens_of_lifted_neighbours_do_not_slide_nor_sink(names):
+def test_in_betweens_of_lifted_neighbours_neither_slide_nor_sink(names):
     layout = lift_clips(names, Room()).layout()
     for i, j in layout.neighbours():
         found = measure_motion(in_between(layout, i, j))

@@ -1,4 +1,4 @@
-"""From clips to a map file to runs on it: FOLLOW on one curve, and a hand that is pushed over where lifting says."""
+"""From clips to a map file to runs on it: FOLLOW on one curve, and pushes over at the found transitions."""
 
 import json
 from pathlib import Path
@@ -24,7 +24,7 @@ def map_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
+def test_map_file_contains_the_found_transitions(map_file: Path) -> None:
     haptic_map, clips = load_figure_map(map_file)
     assert tuple(clip.name for clip in clips) == CLIPS
     pairs = {(at.first, at.second) for at in haptic_map.transitions}  # pyright: ignore
@@ -34,11 +34,11 @@ def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
 
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("curve", "seconds"), [("walk", 2.2), ("run", 2.2), ("jump", 2.4)])
-def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
+def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
 ) -> None:
     out = tmp_path / "follow"
-    # With this seed a runner whose feet did not bear a little over the floor would fall.
+    # With this seed a runner falls unless feet bear slightly above the floor.
     command = ["run", "--map", str(map_file), "--curve", curve, "--seconds", "10", "--seed", "2", "--out", str(out)]
     assert main(command) == 0
     summary = json.loads((out / "summary.json").read_text())
@@ -51,25 +51,25 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
 
 
 @pytest.mark.usefixtures("without_page")
-def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
+def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: Path) -> None:
     residuals, furthest = [], []
     for seed in (1, 2, 3):
         config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
         summary = run(config, tmp_path / "bent", True, 0.0)
         assert summary.stretch is not None
         assert summary.stretch.edits == 3
-        # It fell as soon as it was performed: at full speed from the middle of a step.
+        # The performance begins at full speed in the middle of a step.
         assert summary.figure.fell_at is None
         assert summary.performance is not None
         furthest.append(summary.performance.figure.root_error_max_cm)
         residuals.append(summary.performance.figure.residual_force_rms)
-    # 0.10 to 0.15 by three kernels and nine seeds; a figure that hangs on its help takes 1.
+    # 0.10 to 0.15 over three kernels and nine seeds; a figure carried by the residual has 1.
     assert np.median(residuals) < 0.4
-    # 1.0 to 1.6 cm, or 3.3 where a lift ends in another optimum: kernels of OpenBLAS decide that.
+    # 1.0 to 1.6 cm, or 3.3 if lifting ends in another optimum, depending on the kernels of OpenBLAS.
     assert np.median(furthest) < 5.0
 
 
-def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
+def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
     run(run_config(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
         assert (recording.channel("ticks", "river")[:] == 0.0).all()
@@ -78,7 +78,7 @@ def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file
 
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(("first", "second"), [("walk", "run"), ("run", "walk")])
-def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_run_or_falls_into_a_walk(
+def test_push_at_the_transition_switches_between_walk_and_run(
     map_file: Path, tmp_path: Path, first: str, second: str
 ) -> None:
     config = run_config(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
@@ -90,11 +90,11 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     with Recording(tmp_path / "pushed" / "run.h5") as recording:
         t, p = recording.channel("ticks", "t")[:], recording.channel("ticks", "p")[:]
         distance = recording.channel("ticks", "distance")[:]
-        residual, shown = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
+        residual, reference = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
         frames, weight = recording.channel("frames", "t")[:], recording.array("body_weight")
     at = p[np.searchsorted(t, change.t)]
     assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
-    # The hand has let go and stays with the other river, and the figure with its clip: five seconds and more.
+    # For at least five seconds the hand stays in the other river, and the figure with its clip.
     assert distance[-2000:].max() < 1e-3
     assert config.seconds - change.t > 5.0
     assert summary.figure.fell_at is None
@@ -102,16 +102,16 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     assert summary.figure.root_error_max_cm < 12.0
     assert summary.figure.residual_in_flight_max == 0.0
     assert summary.figure.residual_force_rms < 0.18
-    # The change itself takes help, walking and running hardly any.
+    # The switch itself needs residual force, walking and running hardly any.
     force = np.linalg.norm(residual[:, :3], axis=1) / weight
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
     assert np.sqrt(np.mean(force[away] ** 2)) < 0.08
     lap = round(2.2 / (frames[1] - frames[0]))
-    speed = np.linalg.norm(shown[-1, :2] - shown[-1 - lap, :2]) / 2.2
+    speed = np.linalg.norm(reference[-1, :2] - reference[-1 - lap, :2]) / 2.2
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 
-def test_a_lap_of_a_circle_has_no_meaning_on_a_lifted_map(
+def test_lap_option_with_lifted_map_is_refused(
     map_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "--map", str(map_file), "--lap", "3", "--out", str(tmp_path / "run")]) == 2
@@ -119,7 +119,7 @@ def test_a_lap_of_a_circle_has_no_meaning_on_a_lifted_map(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "one.npz")
     assert main(["lift", "walk", "--out", out]) == 0
     capsys.readouterr()
@@ -130,7 +130,7 @@ def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         (["lift", "walk", "--out", "map.txt"], "a map is written into a .npz file"),
         (["lift", "walk", "nobody"], "no embedded clip 'nobody'"),
@@ -140,13 +140,17 @@ def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys
         (["run", "--curve", "walk"], "--curve has no meaning with --mode follow; it belongs to --map FILE.npz"),
     ],
 )
-def test_what_cannot_be_lifted_is_one_line_and_exit_code_2(
-    arguments: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_invalid_lift_command_is_refused_in_one_line(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     import re
 
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     error = capsys.readouterr().err
-    assert re.search(says, error), error
+    assert re.search(message, error), error
     assert len(error.strip().splitlines()) == 1

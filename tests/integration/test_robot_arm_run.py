@@ -1,4 +1,4 @@
-"""Fields lead a robot arm through the same loop and device as they do the figure."""
+"""Fields drive a robot arm through the same loop and device as the figure."""
 
 import json
 import shutil
@@ -33,18 +33,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_the_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
+def test_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
     with Recording(folder / "run.h5") as recording:
         t, tool = recording.channel("frames", "t")[:], recording.channel("frames", "tool")[:]
         curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.array("curve")
-    away = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
+    distance = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
     alone = (t > 1.0) & (t < 4.4)
-    assert away[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm
-    assert away[(t > 4.4) & (t < 6.0)].max() > 8.0e-3
+    assert distance[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm
+    assert distance[(t > 4.4) & (t < 6.0)].max() > 8.0e-3
 
 
 @pytest.mark.slow
-def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> None:
+def test_arm_tracks_the_map_with_torque_margin(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text())["arm"]
     assert summary["tool_rms_mm"] < 0.2
     assert summary["tool_max_mm"] < 0.5
@@ -56,7 +56,7 @@ def test_the_arm_is_where_the_map_has_it_with_torque_to_spare(folder: Path) -> N
 
 
 @pytest.mark.slow
-def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_arm_run_is_reproduced_exactly(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = load_config(folder / "config.json")
     assert replace(config, user=run_config().user) == resolved(run_config(map="robot-arm", seconds=8.0))
     assert config.user.does == "push"
@@ -67,9 +67,9 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
     assert main(["report", str(folder)]) == 0
     assert (folder / "report.html").read_text(encoding="utf-8") == page
     assert main(["certify", str(folder), "--out", str(tmp_path / "certificate")]) == 0
-    told = capsys.readouterr().out
-    assert "stability: certified" in told
-    assert "ballistic" not in told  # an arm plays no clip
+    stdout = capsys.readouterr().out
+    assert "stability: certified" in stdout
+    assert "ballistic" not in stdout  # an arm plays no clip
     altered = tmp_path / "altered"
     shutil.copytree(folder, altered)
     with h5py.File(altered / "run.h5", "r+") as file:
@@ -85,8 +85,8 @@ def test_it_is_reproduced_bit_for_bit(folder: Path, tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.slow
-def test_a_weak_motor_gives_way_at_its_limit_and_says_so() -> None:
-    """The tracking above is the motors' doing: with a tenth of the shoulder's torque the arm hangs behind."""
+def test_weak_motor_saturates_and_is_reported() -> None:
+    """With a tenth of the shoulder's torque the arm lags: tracking is not enforced kinematically."""
     session = wire(run_config(map="robot-arm", seconds=1.5))
     servo = session.servo
     assert isinstance(servo.figure, RobotState)
@@ -97,7 +97,7 @@ def test_a_weak_motor_gives_way_at_its_limit_and_says_so() -> None:
     assert np.abs(servo.figure.qpos - servo.reference.pose).max() > 0.1
 
 
-def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for flags in (["--seconds", "0"], ["--figure-ticks", "0"], ["--radius", "0.5"], ["--lap", "nan"]):
         assert main(["arm", *flags, "--out", str(tmp_path / "run")]) == 2
         assert "Traceback" not in capsys.readouterr().err
@@ -105,7 +105,7 @@ def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("--figure kinematic", "a robot arm takes the figure's place; leave out --figure kinematic"),
         (
@@ -121,12 +121,12 @@ def test_bad_numbers_are_one_line_and_exit_code_two(tmp_path: Path, capsys: pyte
         ("--scale 4", "expected --scale 2.2 or less, or a smaller curve"),
     ],
 )
-def test_what_has_no_meaning_for_an_arm_is_refused(
-    words: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_options_inapplicable_to_an_arm_are_refused(
+    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
     assert main(["run", "--map", "robot-arm", *words.split(), "--out", str(out)]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not out.exists()
     assert main(["arm", "--map", "cylindrical", "--out", str(out)]) == 2
     assert "the map cylindrical moves a figure; expected --map robot-arm" in capsys.readouterr().err
@@ -138,24 +138,24 @@ def test_what_has_no_meaning_for_an_arm_is_refused(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["bunny", "rivers", "stretch"])
-def test_every_field_leads_the_arm(mode: str) -> None:
+def test_tool_follows_the_stylus_in_every_mode(mode: str) -> None:
     """By MuJoCo's own kinematics, the tool is where the stylus is, scaled; it lags by the filter between the two."""
     session = wire(run_config(mode, "robot-arm", seconds=4.0, figure_ticks=4))
-    apart: list[np.ndarray] = []
+    distances: list[np.ndarray] = []
     of_block = channels(session.servo, session.world)
 
     def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
         block = of_block(ticks, frames, n)
         tool = block["frames"]["tool"] - HOME - [0.0, 0.0, PEDESTAL]
-        apart.append(np.linalg.norm(tool - 1.5 * block["ticks"]["p"][::4], axis=1))
+        distances.append(np.linalg.norm(tool - 1.5 * block["ticks"]["p"][::4], axis=1))
 
     Loop(session.servo, session.world, keep).run(4.0)
-    away = np.concatenate(apart)[250:]
-    assert 1e-6 < away.max() < 4e-3
+    settled = np.concatenate(distances)[250:]
+    assert 1e-6 < settled.max() < 4e-3
 
 
 @pytest.mark.slow
-def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
+def test_robot_arm_map_in_a_python_simulation(tmp_path: Path) -> None:
     """One's own law beside FOLLOW, with the tool at a smaller scale: recorded, stepped and drawn as any run."""
     curve = hvf.circle(radius=0.04, lap=4.0)
 
@@ -172,7 +172,7 @@ def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
     assert run.summary.figure is None
     tool = run.frames["tool"] - HOME - [0.0, 0.0, PEDESTAL]
     p = run.ticks["p"][:: round(len(run.ticks["p"]) / len(tool))]
-    assert np.linalg.norm(tool - p, axis=1)[500:].max() < 4e-3  # at a scale of one, and not of one and a half
+    assert np.linalg.norm(tool - p, axis=1)[500:].max() < 4e-3  # scale 1.0, not the default 1.5
     assert np.linalg.norm(p[500:], axis=1).min() > 0.03
     tick = next(iter(sim))
     assert tick.pose.shape == tick.figure.shape == (7,)
@@ -182,11 +182,11 @@ def test_an_arm_is_a_map_of_a_simulation_in_python(tmp_path: Path) -> None:
     assert "robot arm" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
 
 
-def test_an_arm_beside_a_figure_s_numbers_is_refused_in_python() -> None:
+def test_figure_numbers_with_a_robot_arm_map_are_refused_in_python() -> None:
     curve = hvf.circle(radius=0.04, lap=4.0)
     river = hvf.Follow(curve, k_r=300, b_d=8)
-    for figure, said in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):
-        with pytest.raises(hvf.ParameterError, match=said):
+    for figure, message in ((hvf.Figure(kind="none"), "takes the figure's place"), (hvf.Figure(mass=60.0), "mass=60")):
+        with pytest.raises(hvf.ParameterError, match=message):
             hvf.Simulation(field=river, haptic_map=hvf.RobotArm(around=curve), figure=figure)
     for name, value in (("scale", -1.0), ("reach", 0.0), ("scale", float("nan"))):
         with pytest.raises(hvf.ParameterError, match=f"{name} is"):

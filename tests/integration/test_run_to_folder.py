@@ -1,4 +1,4 @@
-"""A run from the command line to its folder: what it writes, what it measures, and that it happens again."""
+"""A run from the command line to its folder: files, measures, and exact reproduction."""
 
 import json
 import signal
@@ -24,18 +24,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_everything_is_written(folder: Path) -> None:
+def test_run_writes_all_files(folder: Path) -> None:
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     figures = {f"figures/{name}.png" for name in ("path", "deviation", "forces", "torques", "figure")}
     assert names == {"run.h5", "summary.json", "config.json", "report.html", "edited.bvh", "default.bvh"} | figures
 
 
-def test_a_relaxed_hand_stays_within_a_millimetre_of_the_curve(folder: Path) -> None:
+def test_relaxed_hand_stays_within_1_mm_of_the_curve(folder: Path) -> None:
     path = json.loads((folder / "summary.json").read_text())["path"]
     assert path["deviation_rms_mm"] <= 1.0
 
 
-def test_the_deviation_follows_the_push(folder: Path) -> None:
+def test_deviation_follows_the_push(folder: Path) -> None:
     pushes = json.loads((folder / "summary.json").read_text())["path"]["pushes"]
     assert len(pushes) == 2
     for push in pushes:
@@ -43,8 +43,8 @@ def test_the_deviation_follows_the_push(folder: Path) -> None:
         assert push["along_push"] > 0.95
 
 
-def test_the_animation_differs_where_and_only_where_it_was_pushed(folder: Path) -> None:
-    """Frame by frame: the two files are in step, so a difference is the hand's doing."""
+def test_animation_differs_only_where_pushed(folder: Path) -> None:
+    """Both files have the same times, so that differences come from the hand."""
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["animation"]["pushed_deg"] > 5.0
     assert summary["animation"]["unpushed_deg"] < 1.0
@@ -53,52 +53,54 @@ def test_the_animation_differs_where_and_only_where_it_was_pushed(folder: Path) 
     assert edited.fps == pytest.approx(50.0)
     assert edited.fps == default.fps
     t = np.arange(edited.n_frames) / edited.fps
-    apart = np.linalg.norm(edited.poses[:, 7:] - default.poses[:, 7:], axis=1)
+    difference = np.linalg.norm(edited.poses[:, 7:] - default.poses[:, 7:], axis=1)
     pushes = summary["path"]["pushes"]
     pushed = np.any([(t > p["start"]) & (t < p["start"] + p["seconds"]) for p in pushes], axis=0)
     near = np.any([(t > p["start"] - 0.05) & (t < p["start"] + p["seconds"] + 1.0) for p in pushes], axis=0)
-    assert apart[pushed].max() > 10.0 * apart[~near & (t > 1.0)].max()
+    assert difference[pushed].max() > 10.0 * difference[~near & (t > 1.0)].max()
 
 
-def test_the_physical_figure_follows_without_warnings(folder: Path) -> None:
+def test_physical_figure_follows_without_warnings(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["warnings"] == {}
     assert summary["figure"]["residual_in_flight_max"] == 0.0
     assert summary["figure"]["root_error_max_cm"] < 5.0
 
 
-def test_memory_stays_below_a_gigabyte(tmp_path: Path) -> None:
-    """In a process of its own: the largest memory that a process ever took does not fall again."""
+def test_peak_memory_is_below_1_gb(tmp_path: Path) -> None:
+    """In a separate process, for the peak memory of a process never decreases."""
     command = [sys.executable, "-m", "experiments.cli", "run", "--seconds", "2", "--out", str(tmp_path / "run")]
     subprocess.run(command, check=True, capture_output=True)
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0
 
 
-def test_a_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["certify", str(folder), "--no-hand", "--out", str(tmp_path)]
     assert main([*command, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["stability"]["verdict"] == "certified"
-    assert told["ballistic"]["verdict"] == "certified"
-    assert set(told["ballistic"]["figures"]["clips"]) == {"cheer", "angry", "as played"}
+    result = json.loads(capsys.readouterr().out)
+    assert result["stability"]["verdict"] == "certified"
+    assert result["ballistic"]["verdict"] == "certified"
+    assert set(result["ballistic"]["figures"]["clips"]) == {"cheer", "angry", "as played"}
     assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
     assert main(["certify", "--no-hand", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: clips;" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("figure", ["kinematic", "none"])
-def test_a_run_without_a_figure_in_the_physics_is_reproduced(figure: str, tmp_path: Path) -> None:
+def test_run_without_physical_figure_is_reproduced(figure: str, tmp_path: Path) -> None:
     out = str(tmp_path / "run")
     assert main(["run", "--figure", figure, "--seconds", "1", "--out", out]) == 0
     assert main(["reproduce", out]) == 0
 
 
-def test_a_run_is_reproduced_bit_for_bit_from_its_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_is_reproduced_exactly_from_its_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 9000 ticks" in capsys.readouterr().out
 
 
-def test_another_gain_is_told_apart(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recording_with_altered_gain_is_not_reproduced(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The comparison can fail: a recording whose configuration is altered is not the same."""
     import shutil
 
@@ -115,7 +117,7 @@ def test_another_gain_is_told_apart(folder: Path, tmp_path: Path, capsys: pytest
     assert "differs first at tick" in capsys.readouterr().out
 
 
-def test_a_run_that_is_killed_keeps_what_it_recorded_and_can_be_reported(tmp_path: Path) -> None:
+def test_killed_run_keeps_its_recording_and_can_be_reported(tmp_path: Path) -> None:
     out = tmp_path / "killed"
     command = [
         sys.executable,

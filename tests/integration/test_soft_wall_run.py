@@ -1,4 +1,4 @@
-"""A hand that pushes towards what the figure cannot do meets a wall; without walls it goes there."""
+"""A hand pushed towards poses beyond the joint limits meets a wall; without walls it reaches them."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from experiments.studies.wall_trials import meet
 
 
 @pytest.mark.slow
-def test_a_wall_keeps_the_hand_out_of_a_region_that_the_figure_cannot_do() -> None:
+def test_wall_keeps_the_hand_out_of_infeasible_region() -> None:
     without, with_walls = meet(walls=False), meet(walls=True)
     pushed = (without.t > 2.0) & (without.t < 5.0)
     assert np.degrees(without.excess[pushed].max()) > 35.0

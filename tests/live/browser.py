@@ -1,4 +1,4 @@
-"""A live page in this process, and Debian's chromium that looks at it."""
+"""A live page served by this process, and Debian's chromium to use it."""
 
 import contextlib
 import math
@@ -28,13 +28,13 @@ ARGUMENTS = [
 ]
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 WIDTH, HEIGHT = 900, 520
-PICTURES = os.environ.get("HVF_SCREENSHOTS", "")
-"""Folder in which pictures of the page are kept for who looks; none if it is empty."""
+SCREENSHOT_FOLDER = os.environ.get("HVF_SCREENSHOTS", "")
+"""Folder for screenshots; none are saved if it is empty."""
 
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """The browser; skips where there is none."""
+    """The browser; skips if there is none."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="needs Playwright for Python")
     if CHROMIUM is None:
         pytest.skip("needs Debian's chromium")
@@ -53,10 +53,10 @@ def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT
     return page
 
 
-def kept(tab: Any, name: str) -> None:
-    """Keep a picture of the page, where the environment names a folder."""
-    if PICTURES:
-        tab.screenshot(path=Path(PICTURES) / f"{name}.png")
+def save_screenshot(tab: Any, name: str) -> None:
+    """Save a screenshot of the page, if the environment names a folder."""
+    if SCREENSHOT_FOLDER:
+        tab.screenshot(path=Path(SCREENSHOT_FOLDER) / f"{name}.png")
 
 
 def choose(tab: Any, label: str, option: str) -> None:
@@ -65,14 +65,14 @@ def choose(tab: Any, label: str, option: str) -> None:
     tab.get_by_role("option", name=option, exact=True).click()
 
 
-def beside(tab: Any, label: str) -> Any:
-    """What is to be filled in, or moved, beside a label."""
+def control_beside(tab: Any, label: str) -> Any:
+    """The input control beside a label."""
     return tab.get_by_text(label, exact=True).first.locator("xpath=ancestor::*[.//input][1]")
 
 
 def fill(tab: Any, label: str, value: str) -> None:
     """Type into the field beside a label."""
-    typed = beside(tab, label).locator("input:visible")
+    typed = control_beside(tab, label).locator("input:visible")
     typed.fill(value)
     typed.press("Enter")
 
@@ -81,38 +81,38 @@ def fill(tab: Any, label: str, value: str) -> None:
 def drag(
     tab: Any, where: Callable[[], tuple[float, float]], by: tuple[float, float], patience: float = PATIENCE
 ) -> Iterator[None]:
-    """The left button pressed over what can be dragged somewhere and moved by so many pixels, then let go."""
-    x, y = _over(tab, where, patience)
+    """Drag the object at a position by so many pixels; the button is released at the end of the context."""
+    x, y = _hover_draggable(tab, where, patience)
     tab.mouse.down()
-    _drawn(tab)
+    _wait_for_frame(tab)
     for share in (0.3, 1.0):
         tab.mouse.move(x + share * by[0], y + share * by[1])
-        _drawn(tab)
+        _wait_for_frame(tab)
     try:
         yield
     finally:
         tab.mouse.up()
 
 
-def _over(tab: Any, where: Callable[[], tuple[float, float]], patience: float) -> tuple[float, float]:
-    """Move the mouse to a place until its cursor says that something there can be dragged; where that was."""
+def _hover_draggable(tab: Any, where: Callable[[], tuple[float, float]], patience: float) -> tuple[float, float]:
+    """Move the mouse to a position until the cursor shows a draggable object; that position."""
     end, k = time.monotonic() + patience, 0
     while True:
         x, y = where()
-        tab.mouse.move(x + k % 2, y)  # it is looked for where the mouse moves
-        _drawn(tab)
+        tab.mouse.move(x + k % 2, y)  # the page looks for objects only when the mouse moves
+        _wait_for_frame(tab)
         if tab.evaluate("[...document.querySelectorAll('canvas')].some(one => one.style.cursor === 'pointer')"):
             return x + k % 2, y
         assert time.monotonic() < end, f"nothing to be dragged at {x:.0f}, {y:.0f} after {patience:g} s"
         k += 1
 
 
-def _drawn(tab: Any) -> None:
-    """Wait until the browser has drawn another picture."""
+def _wait_for_frame(tab: Any) -> None:
+    """Wait until the browser has drawn another frame."""
     tab.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-class Served:
+class ServedPage:
     """A page that is served in a thread of this process."""
 
     def __init__(self, config: RunConfig, folder: Path):
@@ -141,7 +141,7 @@ class Served:
             time.sleep(step)
 
     def settled(self) -> dict[str, np.ndarray]:
-        """What is shown once time stands still."""
+        """The displayed state once the simulated time has stopped."""
         self.assert_until(lambda: self.desk.paused, "time is stopped")
         seen = [math.nan]
 
@@ -159,11 +159,11 @@ class Served:
 
 
 def on_screen(p_H: np.ndarray, height: int = HEIGHT) -> tuple[float, float]:
-    """Where a point of the hand frame is seen in a tab that is so high, in pixels."""
+    """Pixel position of a point of the hand frame in a tab of some height."""
     camera = camera_of(VIEWS["both"], WIDTH, height)
     forward = camera.look_at - camera.position
     forward /= np.linalg.norm(forward)
     right, up = screen_axes(forward)
-    way = drawn_at(p_H) - camera.position
-    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
-    return 0.5 * WIDTH + scale * (way @ right), 0.5 * height - scale * (way @ up)
+    offset = drawn_at(p_H) - camera.position
+    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (offset @ forward)
+    return 0.5 * WIDTH + scale * (offset @ right), 0.5 * height - scale * (offset @ up)

@@ -1,4 +1,4 @@
-"""A reader of a board never sees half of what was written."""
+"""The shared-memory board: a reader never sees a partial write."""
 
 import threading
 import time
@@ -10,7 +10,7 @@ from experiments.live.session.board import Board
 SIZES = {"a": 3, "b": 500}
 
 
-def test_rows_are_read_as_they_were_written_together():
+def test_arrays_are_read_as_written_together():
     memory = Board.memory(SIZES)
     writer, reader = Board(memory, SIZES), Board(memory, SIZES)
     writer.write({"a": [1.0, 2.0, 3.0], "b": np.arange(500.0)})
@@ -23,7 +23,7 @@ def test_rows_are_read_as_they_were_written_together():
     np.testing.assert_array_equal(reader.read()["a"], [9.0, 2.0, 3.0])
 
 
-def test_a_reader_beside_a_busy_writer_sees_whole_sets():
+def test_reader_never_sees_a_partial_write():
     memory = Board.memory(SIZES)
     writer, reader = Board(memory, SIZES), Board(memory, SIZES)
     ended = threading.Event()

@@ -1,4 +1,4 @@
-"""A person in front of the live page: Debian's chromium, Playwright's mouse and keyboard."""
+"""The live page in Debian's chromium, used by Playwright's mouse and keyboard."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +17,7 @@ from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording
 from sim.viewer.live_stage import LiveStage
 from tests.devices.test_spacemouse import Cap
-from tests.live.browser import PATIENCE, Served, choose, chromium, drag, kept, new_tab, on_screen
+from tests.live.browser import PATIENCE, ServedPage, choose, chromium, drag, new_tab, on_screen, save_screenshot
 
 __all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
@@ -27,14 +27,14 @@ CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "xia" / "strutting_01
 
 
 @pytest.fixture(scope="module")
-def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    it = Served(run_config(mode="stretch", figure="kinematic", seconds=3600.0), tmp_path_factory.mktemp("live"))
-    yield it
-    it.close()
+def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedPage]:
+    page = ServedPage(run_config(mode="stretch", figure="kinematic", seconds=3600.0), tmp_path_factory.mktemp("live"))
+    yield page
+    page.close()
 
 
 @pytest.fixture(scope="module")
-def tab(chromium: Any, served: Served) -> Iterator[Any]:
+def tab(chromium: Any, served: ServedPage) -> Iterator[Any]:
     page = new_tab(chromium, served.address)
     yield page
     if not page.is_closed():
@@ -42,8 +42,8 @@ def tab(chromium: Any, served: Served) -> Iterator[Any]:
 
 
 @pytest.fixture(autouse=True)
-def goes_on(served: Served) -> Iterator[None]:
-    """Nobody holds the stylus and time goes on, whatever a test has left."""
+def resume(served: ServedPage) -> Iterator[None]:
+    """Release the stylus and resume time, whatever the previous test left."""
     served.desk.let_go()
     served.desk.pause(False)
     yield
@@ -56,7 +56,7 @@ def arrow_of(stage: LiveStage) -> float:
     return float(np.linalg.norm(shaft)) if stage._arrows["user"].visible else 0.0
 
 
-def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, served: Served) -> None:
+def test_dragged_hand_moves_the_figure_and_lengthens_the_force_arrow(tab: Any, served: ServedPage) -> None:
     desk, stage = served.desk, served.page.stage
     assert stage is not None
     desk.pause(True)
@@ -71,11 +71,11 @@ def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, se
         served.assert_until(
             lambda: float(np.abs(desk.now["reference"] - pose).max()) > 1e-3, "the figure's pose changes"
         )
-        kept(tab, "dragged")
+        save_screenshot(tab, "dragged")
     served.assert_until(lambda: not desk.holds, "it is let go")
 
 
-def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
+def test_curve_is_bent_and_the_bend_undone(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     served.assert_until(lambda: desk.now["distance"][0] < 0.001, "the stylus is on the curve")
     desk.pause(True)
@@ -85,7 +85,7 @@ def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -
         served.assert_until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
         served.assert_until(lambda: desk.now["p"][2] - place[2] > 0.01, "it comes along")
-        kept(tab, "bending")
+        save_screenshot(tab, "bending")
     tab.keyboard.up("Shift")
     served.assert_until(lambda: desk.now["bends"][0] == 1.0, "the curve is bent")
     bent = desk.now["course"].copy()
@@ -98,7 +98,7 @@ def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -
     served.assert_until(lambda: desk.now["bends"][0] == 0.0, "and undone")
 
 
-def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
+def test_keys_move_and_release_the_hand(tab: Any, served: ServedPage) -> None:
     desk = served.desk
     desk.pause(True)
     place = served.settled()["p"].copy()
@@ -112,7 +112,7 @@ def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
     served.assert_until(lambda: not desk.holds, "it is let go")
 
 
-def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served) -> None:
+def test_spacemouse_moves_the_hand_while_pushed(tab: Any, served: ServedPage) -> None:
     desk, cap = served.desk, Cap()
     served.page._cap = CapHand(SpaceMouse(cap, "SpaceNavigator", "test"))
     cap.push(0, 0, -200)  # the cap is lifted
@@ -125,15 +125,15 @@ def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served
     tab.get_by_text("The SpaceMouse is gone.").wait_for()
 
 
-def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served) -> None:
+def test_gain_moved_beyond_stability_turns_its_verdict_red(tab: Any, served: ServedPage) -> None:
     tab.get_by_role("tab", name="Gains").click()
     tab.locator(".verdict-certified").first.wait_for()
-    kept(tab, "green")
+    save_screenshot(tab, "green")
     field = tab.locator("input[type=text]:visible").first
     field.fill("11000")
     field.press("Enter")
     tab.locator(".verdict-refuted").first.wait_for()
-    kept(tab, "red")
+    save_screenshot(tab, "red")
     assert served.desk.config.mode.seek == 11000.0
     tab.get_by_role("tab", name="Play").click()
     tab.get_by_role("button", name="Undo").first.click()
@@ -142,7 +142,7 @@ def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served) -
     tab.locator(".verdict-refuted").first.wait_for(state="detached")
 
 
-def record(tab: Any, served: Served, name: str, seconds: float = 1.5) -> None:
+def record(tab: Any, served: ServedPage, name: str, seconds: float = 1.5) -> None:
     tab.get_by_role("button", name="Record", exact=True).click()
     served.assert_until(lambda: bool(served.desk.now["recording"][0] > seconds), "it is recorded")
     tab.get_by_role("button", name="Stop").click()
@@ -156,7 +156,7 @@ def downloaded(tab: Any, button: str, path: Path) -> Path:
     return path
 
 
-def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, served: Served, tmp_path: Path) -> None:
+def test_takes_are_recorded_downloaded_compared_and_mixed(tab: Any, served: ServedPage, tmp_path: Path) -> None:
     tab.get_by_role("tab", name="Takes").click()
     record(tab, served, "take 1")
     served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.03]), False)
@@ -172,7 +172,7 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     served.assert_until(lambda: served.page._takes.compares, "both are shown")
     tab.get_by_text("take 1:").first.wait_for()
     tab.wait_for_timeout(500.0)
-    kept(tab, "compared")
+    save_screenshot(tab, "compared")
     served.page._takes._region_slider.value = (0.2, 1.2)
     tab.get_by_role("button", name="Take over").click()
     tab.get_by_text("0.2 to 1.2 s from take 1").wait_for()
@@ -188,13 +188,13 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     served.assert_until(lambda: not served.page._takes.compares, "the default animation is back")
 
 
-def test_a_mode_is_switched(tab: Any, served: Served) -> None:
+def test_mode_is_switched(tab: Any, served: ServedPage) -> None:
     tab.get_by_role("tab", name="Play").click()
     choose(tab, "Mode", "follow")
     tab.get_by_role("button", name="Run this").click()
     served.assert_until(lambda: served.desk.built.config.mode.kind == "follow", "it runs")
     tab.get_by_label("Grab and bend").wait_for(state="detached")
-    kept(tab, "follow")
+    save_screenshot(tab, "follow")
 
 
 def upload(tab: Any, file: Any) -> None:
@@ -204,14 +204,14 @@ def upload(tab: Any, file: Any) -> None:
     chooser.value.set_files(file)
 
 
-def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
+def test_upload_of_invalid_motion_is_answered_in_the_page(tab: Any, served: ServedPage) -> None:
     upload(tab, {"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"})
     tab.get_by_text("broken.bvh:3: found 'oh'", exact=False).last.wait_for()
     served.assert_until(lambda: served.desk.preparing is None, "the next one can come")
-    kept(tab, "refused")
+    save_screenshot(tab, "refused")
 
 
-def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: Served, tmp_path: Path) -> None:
+def test_upload_beyond_the_size_limit_is_answered_in_the_page(tab: Any, served: ServedPage, tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
     large.write_bytes(b"HIERARCHY\n" + b" " * (MOST_BYTES + 500_000))
     upload(tab, large)
@@ -220,8 +220,8 @@ def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: S
 
 
 @pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
-def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
-    served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
+def test_capture_is_uploaded_prepared_and_driven(tab: Any, served: ServedPage) -> None:
+    served.desk.pause(True)  # without a graphics card, drawing competes with preparation
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
     served.assert_until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)
@@ -233,10 +233,10 @@ def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> 
     served.assert_until(lambda: float(served.desk.now["t"][0]) > before + 0.5, "time goes on")
     served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.02]), False)
     served.assert_until(lambda: float(np.linalg.norm(served.desk.now["user"])) > 0.2, "it is driven")
-    kept(tab, "own-motion")
+    save_screenshot(tab, "own-motion")
 
 
-def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab: Any, served: Served) -> None:
+def test_closed_tab_leaves_the_run_and_a_phone_takes_over(chromium: Any, tab: Any, served: ServedPage) -> None:
     served.desk.hold(served.desk.now["p"], False)
     tab.close()
     served.assert_until(lambda: served.page.driver.client is None, "the driver has left")
@@ -245,13 +245,13 @@ def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab
     phone = new_tab(chromium, served.address, width=390, height=780)
     served.assert_until(lambda: float(served.desk.now["t"][0]) > before, "time went on")
     phone.wait_for_timeout(2000.0)
-    kept(phone, "phone")
+    save_screenshot(phone, "phone")
     phone.get_by_role("button", name="Reset").click()
     served.assert_until(lambda: float(served.desk.now["t"][0]) < before, "the other one drives")
     phone.close()
 
 
-def test_a_wrong_token_is_refused_and_the_right_one_opens_the_page(chromium: Any, served: Served) -> None:
+def test_only_the_right_token_opens_the_page(chromium: Any, served: ServedPage) -> None:
     gate = Gate("127.0.0.1", 0, served.page.port, TOKEN)
     context = chromium.new_context()
     try:

@@ -1,4 +1,4 @@
-"""The hand on a SpaceMouse begins where the stylus is, goes as the cap is pushed, and lets go when it rests."""
+"""The hand moved by a SpaceMouse: it starts at the stylus, follows the cap, and lets go at rest."""
 
 import numpy as np
 import pytest
@@ -19,39 +19,39 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> tuple[CapHand, Cap, Clock]:
     return CapHand(SpaceMouse(cap, "SpaceNavigator", "test", lambda: clock.now)), cap, clock
 
 
-def test_a_cap_at_rest_holds_nothing(hand: tuple[CapHand, Cap, Clock]) -> None:
-    held, _, _ = hand
-    assert held.wish(STYLUS) is None
+def test_cap_at_rest_holds_nothing(hand: tuple[CapHand, Cap, Clock]) -> None:
+    on_cap, _, _ = hand
+    assert on_cap.wish(STYLUS) is None
 
 
-def test_a_push_takes_the_hand_along_and_a_rest_lets_go(hand: tuple[CapHand, Cap, Clock]) -> None:
-    held, cap, clock = hand
-    held.wish(STYLUS)
+def test_pushed_cap_moves_the_hand_and_rest_releases_it(hand: tuple[CapHand, Cap, Clock]) -> None:
+    on_cap, cap, clock = hand
+    on_cap.wish(STYLUS)
     cap.push(0, 0, -350)  # lifted all the way
     for _ in range(11):
         clock.now += 0.02
-        wish = held.wish(STYLUS)
+        wish = on_cap.wish(STYLUS)
     assert wish is not None
     target, pressed = wish
     np.testing.assert_allclose(target - STYLUS, [0.0, 0.0, 0.2 * TOP_SPEED], atol=0.03 * TOP_SPEED)
     assert not pressed
     cap.push(0, 0, 0)
-    held.wish(STYLUS)
+    on_cap.wish(STYLUS)
     clock.now += 0.5 * RESTS
-    assert held.wish(STYLUS) is not None  # a short rest is none
+    assert on_cap.wish(STYLUS) is not None  # a short rest is none
     clock.now += 2.0 * RESTS
-    assert held.wish(STYLUS) is None
+    assert on_cap.wish(STYLUS) is None
 
 
-def test_the_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
-    held, cap, clock = hand
+def test_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
+    on_cap, cap, clock = hand
     cap.queue.append(b"\x03\x01")
     clock.now += 0.02
-    wish = held.wish(STYLUS)
+    wish = on_cap.wish(STYLUS)
     assert wish is not None
     assert wish[1]
 
 
-def test_without_a_spacemouse_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_spacemouse_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cap_hand, "found_devices", lambda: [])
     assert cap_hand.cap_there() == (None, "")

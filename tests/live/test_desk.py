@@ -1,4 +1,4 @@
-"""What the live page can do, without a page: processes of its own, and a person's doings in them."""
+"""The desk of the live page, without a browser: its processes, and every action of a user."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,8 +18,8 @@ PATIENCE = 300.0  # [s] for what takes a second or two on a machine that does no
 pytestmark = pytest.mark.processes
 
 
-class Said(Desk):
-    """A desk that keeps what it says."""
+class LoggingDesk(Desk):
+    """A desk that stores its messages."""
 
     def __init__(self, folder: Path):
         self.said: list[str] = []
@@ -34,23 +34,23 @@ class Said(Desk):
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Said]:
-    it = Said(tmp_path_factory.mktemp("live"))
-    it.build(run_config(mode="stretch", figure="kinematic", seconds=3600.0))
-    it.until(lambda: it.built is not None, "the run is put together")
-    yield it
-    it.record("under way")
-    it.until(lambda: it.now["recording"][0] > 0.8, "a take is under way")
-    it.close()
-    assert not it.engine.alive
-    assert load(it.take("under way") / "edited.bvh").clip.duration > 0.7  # the end of the page keeps it
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoggingDesk]:
+    logging_desk = LoggingDesk(tmp_path_factory.mktemp("live"))
+    logging_desk.build(run_config(mode="stretch", figure="kinematic", seconds=3600.0))
+    logging_desk.until(lambda: logging_desk.built is not None, "the run is put together")
+    yield logging_desk
+    logging_desk.record("under way")
+    logging_desk.until(lambda: logging_desk.now["recording"][0] > 0.8, "a take is under way")
+    logging_desk.close()
+    assert not logging_desk.engine.alive
+    assert load(logging_desk.take("under way") / "edited.bvh").clip.duration > 0.7  # closing the page saves it
 
 
-def time_of(it: Said) -> float:
-    return float(it.now["t"][0])
+def time_of(desk: LoggingDesk) -> float:
+    return float(desk.now["t"][0])
 
 
-def test_time_goes_stands_and_steps(desk: Said) -> None:
+def test_time_runs_pauses_and_steps(desk: LoggingDesk) -> None:
     desk.until(lambda: time_of(desk) > 0.5, "time goes")
     desk.pause(True)
     desk.until(lambda: desk.paused, "it is paused")
@@ -68,7 +68,7 @@ def test_time_goes_stands_and_steps(desk: Said) -> None:
     desk.pause(False)
 
 
-def test_a_curve_is_grabbed_bent_and_undone_with_the_page_s_undo(desk: Said) -> None:
+def test_bend_is_undone_and_redone(desk: LoggingDesk) -> None:
     desk.until(lambda: len(desk.history) > 5, "something is remembered")
     place = desk.now["p"].copy()
     desk.hold(place + np.array([0.0, 0.0, 0.02]), pressed=True)
@@ -84,20 +84,20 @@ def test_a_curve_is_grabbed_bent_and_undone_with_the_page_s_undo(desk: Said) -> 
     desk.until(lambda: desk.now["bends"][0] == 1.0, "it is made again")
 
 
-def test_gains_move_and_are_undone_and_their_verdict_turns_red_and_green(desk: Said) -> None:
+def test_gain_changes_and_undo_update_the_verdict(desk: LoggingDesk) -> None:
     desk.until(lambda: bool(desk.verdict) and not desk.checking, "the first verdict")
     assert {v.verdict for v in desk.verdict} == {"certified"}
     for seek in (9000.0, 11000.0):
         desk.set_gain("seek", seek)
     desk.until(lambda: desk.verdict[0].verdict == "refuted", "the verdict turns red")
     assert "11000" in desk.verdict[0].reason
-    desk.undo()  # one way of a slider is one thing to undo
+    desk.undo()  # one movement of a slider is one undo step
     assert desk.config is not None
     assert desk.config.mode.seek == 150.0
     desk.until(lambda: desk.verdict[0].verdict == "certified", "and green again")
 
 
-def test_a_take_is_recorded_and_its_animation_is_read_again(desk: Said) -> None:
+def test_take_is_recorded_and_its_animation_loads(desk: LoggingDesk) -> None:
     with pytest.raises(SimError, match="cannot be named"):
         desk.record("../elsewhere")
     desk.record("take 1")
@@ -110,7 +110,7 @@ def test_a_take_is_recorded_and_its_animation_is_read_again(desk: Said) -> None:
         desk.record("take 1")
 
 
-def test_one_looks_back_and_goes_on_from_there(desk: Said) -> None:
+def test_run_continues_from_an_earlier_state(desk: LoggingDesk) -> None:
     desk.until(lambda: len(desk.history) > 60, "two seconds are remembered")
     back = desk.at(1.0)
     assert time_of(desk) - float(back["t"][0]) == pytest.approx(1.0, abs=0.2)
@@ -121,7 +121,7 @@ def test_one_looks_back_and_goes_on_from_there(desk: Said) -> None:
     desk.until(lambda: time_of(desk) < 0.5, "it begins again")
 
 
-def test_motion_files_are_prepared_or_refused_in_one_line(desk: Said, tmp_path: Path) -> None:
+def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path: Path) -> None:
     with pytest.raises(SimError, match="expected at most 30 MB"):
         desk.upload("large.bvh", bytes(MOST_BYTES + 1))
     with pytest.raises(SimError, match="no motion file"):
@@ -143,7 +143,7 @@ def test_motion_files_are_prepared_or_refused_in_one_line(desk: Said, tmp_path: 
     assert "own" in str(desk.built.drawn["title"])
 
 
-def test_what_cannot_be_put_together_is_said_and_what_runs_goes_on(desk: Said) -> None:
+def test_failed_build_is_reported_and_the_run_continues(desk: LoggingDesk) -> None:
     builds = desk.builds
     desk.build(run_config(map="cylindrical", clips=("nobody.bvh",), figure="kinematic"))
     desk.until(lambda: "nobody.bvh" in desk.said[-1], "it is said")
@@ -156,7 +156,7 @@ CAPTURES = Path(__file__).resolve().parents[3] / "shared" / "mocap" / "cmu_amc"
 
 
 @pytest.mark.skipif(not (CAPTURES / "02.asf").exists(), reason="needs the captures beside this repository")
-def test_an_asf_and_its_amc_are_prepared_mapped_and_driven(desk: Said) -> None:
+def test_asf_and_amc_upload_is_prepared_and_driven(desk: LoggingDesk) -> None:
     for name in ("02.asf", "02_03.amc"):
         desk.upload(name, (CAPTURES / name).read_bytes())
     desk.until(lambda: desk.preparing is None, "it is prepared", patience=4.0 * PATIENCE)

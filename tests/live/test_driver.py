@@ -1,4 +1,4 @@
-"""Several watch, one drives."""
+"""Several browsers watch, one drives."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from experiments.live import driver
 from experiments.live.driver import Driver
 
 
-def test_the_first_that_does_something_drives_until_it_leaves():
+def test_first_active_client_drives_until_it_leaves():
     who = Driver()
     assert who.client is None
     assert who.may(4)
@@ -17,7 +17,7 @@ def test_the_first_that_does_something_drives_until_it_leaves():
     assert who.may(7)
 
 
-def test_a_driver_is_relieved_only_when_it_does_nothing(monkeypatch: pytest.MonkeyPatch):
+def test_only_an_idle_driver_is_replaced(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
     monkeypatch.setattr(driver.time, "monotonic", lambda: now[0])
     who = Driver()

@@ -1,4 +1,4 @@
-"""A servo in somebody's hand: dragged, bent, tuned, put back, recorded."""
+"""The engine of the live page: dragging, bending, gains, stored states, takes."""
 
 import json
 
@@ -21,170 +21,170 @@ from sim.loop.field_slice import field_slice
 from sim.recording.recording import Recording
 
 
-def engine(mode: str = "follow", **words: object) -> Engine:
+def make_engine(mode: str = "follow", **words: object) -> Engine:
     return Engine(wire(run_config(mode=mode, figure="kinematic", seconds=3600.0, **words)))
 
 
-def run(it: Engine, seconds: float) -> None:
-    for _ in range(round(seconds / it.seconds)):
-        it.advance()
+def run(engine: Engine, seconds: float) -> None:
+    for _ in range(round(seconds / engine.seconds)):
+        engine.advance()
 
 
-def test_a_hand_that_drags_is_followed_with_a_lag_that_shows_the_force():
-    it = engine()
-    run(it, 0.8)
-    relaxed = it.session.servo.reference.pose.copy()
-    target = it.stylus + np.array([0.0, 0.0, 0.02])
-    it.drag = Drag(target)
-    run(it, 1.0)
-    lag = target - it.stylus
-    user = it.logs[0].user[-1]
+def test_drag_force_is_stiffness_times_lag():
+    engine = make_engine()
+    run(engine, 0.8)
+    relaxed = engine.session.servo.reference.pose.copy()
+    target = engine.stylus + np.array([0.0, 0.0, 0.02])
+    engine.drag = Drag(target)
+    run(engine, 1.0)
+    lag = target - engine.stylus
+    user = engine.logs[0].user[-1]
     assert np.linalg.norm(user) > 1.0
     np.testing.assert_allclose(user, 300.0 * lag, atol=0.15)  # k times the lag, but for tremor and damping
-    assert np.abs(it.session.servo.reference.pose - relaxed).max() > 0.01
-    it.drag = None
-    it.advance()
-    assert np.all(it.logs[0].user[-1] == 0.0)
+    assert np.abs(engine.session.servo.reference.pose - relaxed).max() > 0.01
+    engine.drag = None
+    engine.advance()
+    assert np.all(engine.logs[0].user[-1] == 0.0)
 
 
-def test_a_hand_that_holds_on_long_is_not_taken_for_a_broken_encoder():
-    it = engine()
-    run(it, 0.4)
-    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]))
-    run(it, 3.0)
-    assert it.session.servo.device.faults[0] == 0.0
-    assert np.linalg.norm(it.logs[0].force[-1]) > 0.5
+def test_long_hold_is_not_an_encoder_fault():
+    engine = make_engine()
+    run(engine, 0.4)
+    engine.drag = Drag(engine.stylus + np.array([0.0, 0.0, 0.015]))
+    run(engine, 3.0)
+    assert engine.session.servo.device.faults[0] == 0.0
+    assert np.linalg.norm(engine.logs[0].force[-1]) > 0.5
 
 
-def test_a_hand_is_no_stronger_than_a_person():
-    it = engine()
-    it.drag = Drag(np.array([0.0, 0.0, 0.12]))  # 36 N of the arm's spring away
+def test_drag_force_is_bounded():
+    engine = make_engine()
+    engine.drag = Drag(np.array([0.0, 0.0, 0.12]))  # 36 N of the arm's spring away
     strongest = 0.0
     for _ in range(60):
-        it.advance()
-        strongest = max(strongest, float(np.linalg.norm(it.logs[0].user, axis=1).max()))
+        engine.advance()
+        strongest = max(strongest, float(np.linalg.norm(engine.logs[0].user, axis=1).max()))
     # The spring is bounded at every block, and so is the speed at which the damper takes the stylus along.
     assert STRONGEST / 2.0 < strongest < 1.5 * STRONGEST
 
 
-def test_grab_and_bend_undo_and_redo():
-    it = engine("stretch")
-    run(it, 0.4)
-    before = it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41))
-    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.02]), pressed=True)
-    run(it, 0.6)
-    it.drag = None
-    run(it, 0.1)
-    bent = it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41))
-    assert it.bends() == 1
+def test_bend_undo_and_redo_restore_the_curve():
+    engine = make_engine("stretch")
+    run(engine, 0.4)
+    before = engine.tubes.edited(engine.memory).point(np.linspace(0.0, 4.0, 41))
+    engine.drag = Drag(engine.stylus + np.array([0.0, 0.0, 0.02]), pressed=True)
+    run(engine, 0.6)
+    engine.drag = None
+    run(engine, 0.1)
+    bent = engine.tubes.edited(engine.memory).point(np.linspace(0.0, 4.0, 41))
+    assert engine.bends() == 1
     assert np.abs(bent - before)[:, 2].max() > 0.005
-    assert it.undo()
-    np.testing.assert_array_equal(it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41)), before)
-    assert not it.undo()
-    assert it.redo()
-    np.testing.assert_array_equal(it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41)), bent)
+    assert engine.undo()
+    np.testing.assert_array_equal(engine.tubes.edited(engine.memory).point(np.linspace(0.0, 4.0, 41)), before)
+    assert not engine.undo()
+    assert engine.redo()
+    np.testing.assert_array_equal(engine.tubes.edited(engine.memory).point(np.linspace(0.0, 4.0, 41)), bent)
 
 
-def test_a_bent_curve_is_performed_when_it_is_asked_for_and_not_before():
-    it = engine("stretch-then-follow")
-    run(it, 0.8)
-    start = it.stylus.copy()
-    run(it, 0.8)
-    assert np.linalg.norm(it.stylus - start) < 2e-3  # it is sought, nothing leads along it
-    it.perform(True)
-    run(it, 2.0)
-    assert it.performs
-    assert np.linalg.norm(it.stylus - start) > 0.02
-    it.perform(False)
-    run(it, 0.5)
-    start = it.stylus.copy()
-    run(it, 0.5)
-    assert np.linalg.norm(it.stylus - start) < 2e-3
+def test_bent_curve_is_performed_only_on_request():
+    engine = make_engine("stretch-then-follow")
+    run(engine, 0.8)
+    start = engine.stylus.copy()
+    run(engine, 0.8)
+    assert np.linalg.norm(engine.stylus - start) < 2e-3  # the hand is pulled to the curve, not along it
+    engine.perform(True)
+    run(engine, 2.0)
+    assert engine.performs
+    assert np.linalg.norm(engine.stylus - start) > 0.02
+    engine.perform(False)
+    run(engine, 0.5)
+    start = engine.stylus.copy()
+    run(engine, 0.5)
+    assert np.linalg.norm(engine.stylus - start) < 2e-3
 
 
 @pytest.mark.parametrize("mode", ["follow", "bunny", "stretch", "stretch-then-follow", "lead"])
-def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
-    it = engine(mode)
-    for gain, value in gains_of(it.config).items():
-        # What paces a curve that can be bent: of the test below.
+def test_changed_gains_equal_those_of_a_fresh_run(mode):
+    engine = make_engine(mode)
+    for gain, value in gains_of(engine.config).items():
+        # Gains that time a bendable curve are left to the next test.
         if mode != "stretch-then-follow" or gain.name not in ("damping", "stiffness"):
-            it.set_gains(with_gain(it.config, gain.name, 1.25 * value))
-    other = engine(mode, **{gain.name: value for gain, value in gains_of(it.config).items()})
+            engine.set_gains(with_gain(engine.config, gain.name, 1.25 * value))
+    other = make_engine(mode, **{gain.name: value for gain, value in gains_of(engine.config).items()})
     for _ in range(60):
-        it.advance()
+        engine.advance()
         other.advance()
-    np.testing.assert_array_equal(it.stylus, other.stylus)
-    np.testing.assert_array_equal(it.logs[0].force, other.logs[0].force)
+    np.testing.assert_array_equal(engine.stylus, other.stylus)
+    np.testing.assert_array_equal(engine.logs[0].force, other.logs[0].force)
 
 
 @pytest.mark.parametrize(("gain", "value"), [("damping", 20.0), ("stiffness", 600.0)])
-def test_a_curve_that_can_be_bent_keeps_its_pace_while_a_gain_that_paced_it_moves(gain, value):
-    it, same = engine("stretch-then-follow"), engine("stretch-then-follow")
-    other = engine("stretch-then-follow", **{gain: value})
-    record = it.tubes.record_at(TRACE_SIZE)
-    assert len(other.memory) != len(it.memory) or np.any(other.memory[record:] != it.memory[record:])
-    it.set_gains(with_gain(it.config, gain, value))
-    np.testing.assert_array_equal(it.memory[record:], same.memory[record:])
-    np.testing.assert_array_equal(it.memory[:record], other.memory[:record])
-    assert np.any(it.memory[:record] != same.memory[:record])
-    for one in (it, same):
+def test_bendable_curve_keeps_its_timing_if_a_gain_changes(gain, value):
+    engine, same = make_engine("stretch-then-follow"), make_engine("stretch-then-follow")
+    other = make_engine("stretch-then-follow", **{gain: value})
+    record = engine.tubes.record_at(TRACE_SIZE)
+    assert len(other.memory) != len(engine.memory) or np.any(other.memory[record:] != engine.memory[record:])
+    engine.set_gains(with_gain(engine.config, gain, value))
+    np.testing.assert_array_equal(engine.memory[record:], same.memory[record:])
+    np.testing.assert_array_equal(engine.memory[:record], other.memory[:record])
+    assert np.any(engine.memory[:record] != same.memory[:record])
+    for one in (engine, same):
         one.perform(True)
         run(one, 1.0)
-    assert it.tubes.edited(it.memory).duration == same.tubes.edited(same.memory).duration
-    assert np.any(it.stylus != same.stylus)
+    assert engine.tubes.edited(engine.memory).duration == same.tubes.edited(same.memory).duration
+    assert np.any(engine.stylus != same.stylus)
 
 
-def test_other_parts_are_no_gains():
-    it = engine()
+def test_gains_of_another_mode_are_refused():
+    engine = make_engine()
     with pytest.raises(ParameterError, match="same mode and map"):
-        it.set_gains(run_config(mode="bunny", figure="kinematic"))
+        engine.set_gains(run_config(mode="bunny", figure="kinematic"))
 
 
-def test_what_happens_from_a_kept_state_on_happens_again_bit_for_bit():
-    it = Engine(wire(run_config(mode="stretch", seconds=3600.0)))
-    run(it, 2.4)
-    assert it.back_to(1.9) <= 1.9
-    run(it, 0.8)
-    first = it.session.servo.plant.qpos.copy(), it.memory.copy(), it.time
-    it.drag = Drag(it.stylus + 0.01)
-    run(it, 0.4)
-    it.back_to(1.9)
-    run(it, 0.8)
-    np.testing.assert_array_equal(it.session.servo.plant.qpos, first[0])
-    np.testing.assert_array_equal(it.memory, first[1])
-    assert it.time == first[2]
-    it.reset()
-    assert it.time == 0.0
+def test_run_from_a_stored_state_is_repeated_exactly():
+    engine = Engine(wire(run_config(mode="stretch", seconds=3600.0)))
+    run(engine, 2.4)
+    assert engine.back_to(1.9) <= 1.9
+    run(engine, 0.8)
+    first = engine.session.servo.plant.qpos.copy(), engine.memory.copy(), engine.time
+    engine.drag = Drag(engine.stylus + 0.01)
+    run(engine, 0.4)
+    engine.back_to(1.9)
+    run(engine, 0.8)
+    np.testing.assert_array_equal(engine.session.servo.plant.qpos, first[0])
+    np.testing.assert_array_equal(engine.memory, first[1])
+    assert engine.time == first[2]
+    engine.reset()
+    assert engine.time == 0.0
 
 
-def test_looking_at_the_field_changes_nothing():
-    it, same = engine("stretch"), engine("stretch")
+def test_field_slice_does_not_change_the_state():
+    engine, same = make_engine("stretch"), make_engine("stretch")
     for _ in range(40):
-        it.advance()
+        engine.advance()
         same.advance()
         points = slice_points(0.0)
-        forces, hand = np.full_like(points, np.nan), it.session.servo.device.hand.copy()
+        forces, hand = np.full_like(points, np.nan), engine.session.servo.device.hand.copy()
         hand[8:11] = 0.0
-        field_slice(it.field, hand, points, forces)
+        field_slice(engine.field, hand, points, forces)
         assert np.all(np.isfinite(forces))
-    np.testing.assert_array_equal(it.memory, same.memory)
+    np.testing.assert_array_equal(engine.memory, same.memory)
     # A hand at rest is drawn to the curve; on the circle's axis, all ways are as far.
-    curve = it.session.curve.point(np.linspace(0.0, 4.0, 200))
+    curve = engine.session.curve.point(np.linspace(0.0, 4.0, 200))
     nearest = curve[np.argmin(np.linalg.norm(points[:, None] - curve[None], axis=2), axis=1)]
     off = np.linalg.norm(points[:, :2], axis=1) > 1e-3
     assert np.all(np.sum((nearest - points) * forces, axis=1)[off] > 0.0)
 
 
-def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
-    it = engine("stretch")
-    run(it, 0.4)
-    take = Take(tmp_path / "take", it)
-    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]), pressed=True)
+def test_take_is_a_recording_whose_animation_loads(tmp_path):
+    engine = make_engine("stretch")
+    run(engine, 0.4)
+    take = Take(tmp_path / "take", engine)
+    engine.drag = Drag(engine.stylus + np.array([0.0, 0.0, 0.015]), pressed=True)
     for _ in range(100):
-        take.add(it.advance(), it)
-    it.drag = None
-    lines = take.end(it)
-    assert any("bent once" in line for line in lines) or it.bends() == 0
+        take.add(engine.advance(), engine)
+    engine.drag = None
+    lines = take.end(engine)
+    assert any("bent once" in line for line in lines) or engine.bends() == 0
     with Recording(tmp_path / "take" / RECORDING) as recording:
         assert recording.complete
         t = recording.channel("ticks", "t")[:]
@@ -195,7 +195,7 @@ def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
     with pytest.raises(SimError, match="dragged by hand"):
         reproduce(tmp_path / "take")
     with pytest.raises(SimError, match="holds a run"):
-        Take(tmp_path / "take", it)
+        Take(tmp_path / "take", engine)
 
 
 @pytest.mark.parametrize(
@@ -209,21 +209,21 @@ def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
         ("lead", False, False, 0),
     ],
 )
-def test_a_drag_that_neither_bends_nor_leads_is_told_as_one_push(tmp_path, mode, pressed, performs, pushes):
-    it = engine(mode)
-    run(it, 0.8)
-    it.perform(performs)
-    take = Take(tmp_path / "take", it)
+def test_drag_without_bend_or_lead_is_reported_as_one_push(tmp_path, mode, pressed, performs, pushes):
+    engine = make_engine(mode)
+    run(engine, 0.8)
+    engine.perform(performs)
+    take = Take(tmp_path / "take", engine)
     for block in range(160):
         if block == 40:
-            it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]), pressed)
+            engine.drag = Drag(engine.stylus + np.array([0.0, 0.0, 0.015]), pressed)
         elif block == 110:
-            it.drag = None
-        take.add(it.advance(), it)
-    lines = take.end(it)
-    told = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
-    assert len(told) == pushes
-    for push in told:
+            engine.drag = None
+        take.add(engine.advance(), engine)
+    lines = take.end(engine)
+    reported = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
+    assert len(reported) == pushes
+    for push in reported:
         assert push["start"] == pytest.approx(0.32, abs=1e-9)
         assert push["seconds"] == pytest.approx(0.56, abs=0.002)
         assert push["peak_force"] > 1.0
@@ -232,23 +232,23 @@ def test_a_drag_that_neither_bends_nor_leads_is_told_as_one_push(tmp_path, mode,
         assert "The hand did not push." not in lines
 
 
-def test_a_slip_of_the_mouse_is_no_take(tmp_path):
-    it = engine()
-    take = Take(tmp_path / "take", it)
-    take.add(it.advance(), it)
+def test_too_short_take_is_refused(tmp_path):
+    engine = make_engine()
+    take = Take(tmp_path / "take", engine)
+    take.add(engine.advance(), engine)
     with pytest.raises(SimError, match=r"0\.01 s is not measured"):
-        take.end(it)
+        take.end(engine)
 
 
-def test_a_take_while_time_stood_still_leaves_no_folder(tmp_path):
-    it = engine()
-    take = Take(tmp_path / "take", it)
+def test_take_during_pause_leaves_no_folder(tmp_path):
+    engine = make_engine()
+    take = Take(tmp_path / "take", engine)
     with pytest.raises(SimError, match="time stood still"):
-        take.end(it)
+        take.end(engine)
     assert not (tmp_path / "take").exists()
 
 
-def test_sliders_hold_what_gains_are():
+def test_slider_ranges_contain_the_gains():
     for mode in ("follow", "bunny", "stretch", "stretch-then-follow", "lead"):
         config = run_config(mode=mode)
         for gain, value in gains_of(config).items():

@@ -1,4 +1,4 @@
-"""The verdict beside a slider is the certificate's."""
+"""The verdict beside a gain's slider equals the certificate."""
 
 import pytest
 
@@ -19,7 +19,7 @@ from experiments.setups.certified_law import governor_drag
         {"governor": True}, {"governor": True, "governor_drag": 30.0},
     ],
 )  # fmt: skip
-def test_it_is_what_the_certificate_says(words):
+def test_gain_verdict_equals_the_certificate(words):
     config = run_config(**words)
     (river,) = certified_rivers(config).values()
     whole = governed_stability(river, governor_drag(config), HandRange().hands())
@@ -29,18 +29,18 @@ def test_it_is_what_the_certificate_says(words):
         assert found.margin == pytest.approx(whole.margin, rel=1e-6)
 
 
-def test_what_is_unstable_is_red_at_once_and_says_why():
+def test_unstable_gain_is_red_with_a_reason():
     (found,) = next(GainVerdicts().of(run_config(stiffness=11000.0)))
     assert found.verdict == "refuted"
     assert "k = 11000 N/m" in found.reason
-    shown = verdict_html((found,), False)
-    assert "unstable" in shown
-    assert "#c02020" in shown
+    html = verdict_html((found,), False)
+    assert "unstable" in html
+    assert "#c02020" in html
 
 
 @pytest.mark.slow
-def test_what_there_is_no_certificate_for_is_unknown_and_says_why():
-    for words, said in (
+def test_uncertified_configuration_is_unknown_with_a_reason():
+    for words, message in (
         ({"mode": "lead"}, "led"),
         ({"mode": "rivers", "map": "rivers", "governor": True}, "--governor"),
         ({"walls": True}, "--walls"),
@@ -48,5 +48,5 @@ def test_what_there_is_no_certificate_for_is_unknown_and_says_why():
     ):
         (found,) = next(GainVerdicts().of(run_config(**words)))
         assert found.verdict == "unknown"
-        assert said in found.reason
+        assert message in found.reason
     assert "checking" in verdict_html((), True)

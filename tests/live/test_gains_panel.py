@@ -1,4 +1,4 @@
-"""What a slider shows is its gain, and a number that is none of its is refused with its bounds."""
+"""The gains panel: sliders show the gains, and numbers out of range are refused with their bounds."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -25,9 +25,11 @@ class Gui:
         return Folder()
 
     def add_slider(self, label: str, least: float, most: float, step: float, value: float, hint: str) -> Any:
-        made = SimpleNamespace(min=least, max=most, value=value, on_update=lambda call: setattr(made, "moved", call))
-        self.sliders[label] = made
-        return made
+        slider = SimpleNamespace(
+            min=least, max=most, value=value, on_update=lambda call: setattr(slider, "moved", call)
+        )
+        self.sliders[label] = slider
+        return slider
 
 
 class Folder:
@@ -46,35 +48,35 @@ class Desk:
         self.config = with_gain(self.config, name, value)
 
 
-def made(**words: object) -> tuple[GainsPanel, Any, Any]:
+def make_panel(**words: object) -> tuple[GainsPanel, Any, Any]:
     gui, desk = Gui(), Desk(mode="follow", **words)
     panel = GainsPanel(gui, desk, lambda does: does)  # pyright: ignore[reportArgumentType]
     panel.rebuild()
     return panel, desk, gui.sliders["k_r [N/m]"]
 
 
-def typed(slider: Any, value: float) -> None:
+def type_value(slider: Any, value: float) -> None:
     slider.value = value
     slider.moved(None)
 
 
-def test_a_number_beyond_a_slider_is_refused_with_its_bounds_and_the_gain_shown_again(
+def test_number_beyond_slider_is_refused_and_the_gain_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    panel, desk, slider = made()
-    typed(slider, 400.0)
+    panel, desk, slider = make_panel()
+    type_value(slider, 400.0)
     with pytest.raises(ParameterError, match="k_r is 20000; expected 10 to 12000 N/m"):
-        typed(slider, 20000.0)
+        type_value(slider, 20000.0)
     assert desk.config.mode.stiffness == 400.0
     panel.write()
-    assert slider.value == 20000.0  # a number may be half typed
+    assert slider.value == 20000.0  # typing may not be finished
     monkeypatch.setattr(gains_panel, "TYPING", -1.0)
     panel.write()
     assert slider.value == 400.0
 
 
-def test_a_slider_that_moved_before_its_handler_ran_stays_and_one_whose_gain_was_undone_moves() -> None:
-    panel, desk, slider = made()
+def test_slider_keeps_pending_value_and_follows_undo() -> None:
+    panel, desk, slider = make_panel()
     slider.value = 500.0
     panel.write()
     assert slider.value == 500.0
@@ -85,6 +87,6 @@ def test_a_slider_that_moved_before_its_handler_ran_stays_and_one_whose_gain_was
     assert slider.value == 300.0
 
 
-def test_a_slider_reaches_a_gain_of_the_command_line() -> None:
-    _, desk, slider = made(stiffness=20000.0)
+def test_slider_range_includes_a_gain_from_the_command_line() -> None:
+    _, desk, slider = make_panel(stiffness=20000.0)
     assert slider.value == slider.max == desk.config.mode.stiffness == 20000.0

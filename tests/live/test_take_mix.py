@@ -1,4 +1,4 @@
-"""Regions of a take are taken over from another one where that is at the same phase of the curve."""
+"""Mixing of takes: a region is taken from another take at equal phase of the curve."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def take(name: str, seconds: float, pace: float, height: float, start: float = 0
     return TakeData(name, poses, phase, LAP, np.zeros((len(t), 3)), none, none)
 
 
-def test_outside_of_its_region_a_take_stays_and_inside_it_is_the_other_one_at_the_same_phase():
+def test_mix_uses_the_other_take_at_equal_phase_inside_the_region():
     one, other = take("one", 6.0, 0.5, 1.0), take("other", 4.0, 1.0, 2.0)
     poses = mixed(one, [Region(1.0, 4.0, other)], ease=0.3)
     t = one.times
@@ -31,7 +31,7 @@ def test_outside_of_its_region_a_take_stays_and_inside_it_is_the_other_one_at_th
     np.testing.assert_allclose(poses[inside, 0], 0.5 * t[inside], atol=1e-9)  # the same phase, not the same time
 
 
-def test_it_goes_over_smoothly():
+def test_mix_eases_between_the_takes():
     one, other = take("one", 6.0, 1.0, 1.0), take("other", 6.0, 1.0, 2.0)
     height = mixed(one, [Region(1.0, 3.0, other)], ease=0.5)[:, 2]
     assert np.abs(np.diff(height)).max() < 1.9 / 0.5 / FPS  # the steepest of the ease is 15/8
@@ -39,7 +39,7 @@ def test_it_goes_over_smoothly():
     assert np.all((height >= 1.0) & (height <= 2.0))
 
 
-def test_turns_stay_turns():
+def test_mixed_quaternions_stay_normalised():
     one, other = take("one", 6.0, 1.0, 1.0), take("other", 6.0, 0.7, 2.0)
     poses = mixed(one, [Region(1.0, 3.0, other)])
     np.testing.assert_allclose(np.linalg.norm(poses[:, 3:].reshape(len(poses), -1, 4), axis=2), 1.0, atol=1e-12)
@@ -47,7 +47,7 @@ def test_turns_stay_turns():
     np.testing.assert_allclose(half[0, 7:9], [np.cos(0.15), np.sin(0.15)], atol=1e-12)
 
 
-def test_another_lap_of_the_other_take_does_as_well():
+def test_other_take_may_be_in_another_lap():
     one, other = take("one", 6.0, 1.0, 1.0), take("other", 6.0, 1.0, 2.0, start=8.0)
     poses = mixed(one, [Region(1.0, 3.0, other)])
     inside = (one.times > 1.4) & (one.times < 2.6)
@@ -56,21 +56,21 @@ def test_another_lap_of_the_other_take_does_as_well():
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "said"), [(3.0, 2.0, "two times"), (1.0, 9.0, "two times"), (1.0, 1.2, "lasts 0.20 s")]
+    ("start", "end", "message"), [(3.0, 2.0, "two times"), (1.0, 9.0, "two times"), (1.0, 1.2, "lasts 0.20 s")]
 )
-def test_a_region_that_is_none_is_refused(start, end, said):
+def test_invalid_region_is_refused(start, end, message):
     one = take("one", 6.0, 1.0, 1.0)
-    with pytest.raises(ParameterError, match=said):
+    with pytest.raises(ParameterError, match=message):
         mixed(one, [Region(start, end, one)])
 
 
-def test_a_take_that_never_comes_there_is_refused():
+def test_take_without_the_phases_of_the_region_is_refused():
     one, short = take("one", 6.0, 0.5, 1.0), take("short", 1.0, 0.5, 2.0)
     with pytest.raises(ParameterError, match="both takes go through"):
         mixed(one, [Region(1.0, 5.0, short)])
 
 
-def test_the_next_take_has_the_next_number():
+def test_next_take_name_has_the_next_number():
     assert next_name("take 1") == "take 2"
     assert next_name("take 19") == "take 20"
     assert next_name("proud") == "proud 2"

@@ -1,4 +1,4 @@
-"""Who has no token does not come in, and no other web page uses this one."""
+"""The token gate: requests without the token, or from other web pages, are refused."""
 
 import http.client
 import socket
@@ -46,7 +46,7 @@ def get(port: int, path: str = "/", headers: dict[str, str] | None = None) -> ht
     return answered
 
 
-def test_a_page_with_a_token_is_seen_with_it_only(behind):
+def test_page_is_served_only_with_the_token(behind):
     gate = Gate("127.0.0.1", 0, behind, TOKEN)
     try:
         assert get(gate.port).status == 403
@@ -64,7 +64,7 @@ def test_a_page_with_a_token_is_seen_with_it_only(behind):
         gate.close()
 
 
-def test_a_web_socket_without_the_token_is_refused(behind):
+def test_web_socket_without_token_is_refused(behind):
     gate = Gate("127.0.0.1", 0, behind, TOKEN)
     try:
         assert get(gate.port, headers={"Upgrade": "websocket", "Connection": "Upgrade"}).status == 403
@@ -72,21 +72,21 @@ def test_a_web_socket_without_the_token_is_refused(behind):
         gate.close()
 
 
-def test_a_second_request_does_not_come_in_behind_the_first_ones_token(behind):
+def test_second_request_on_one_connection_is_not_forwarded(behind):
     gate = Gate("127.0.0.1", 0, behind, TOKEN)
     try:
         with socket.create_connection(("127.0.0.1", gate.port), timeout=10) as peer:
             head = f"GET / HTTP/1.1\r\nHost: x\r\nCookie: hvf_token={TOKEN}\r\n\r\n"
             peer.sendall((head + "GET /secret HTTP/1.1\r\nHost: x\r\n\r\n").encode())
-            said = b""
+            received = b""
             while piece := peer.recv(4096):
-                said += piece
-        assert said.count(b"HTTP/1.1") == 1
+                received += piece
+        assert received.count(b"HTTP/1.1") == 1
     finally:
         gate.close()
 
 
-def test_what_is_no_request_is_answered(behind):
+def test_malformed_request_is_answered_with_400(behind):
     gate = Gate("127.0.0.1", 0, behind, TOKEN)
     try:
         with socket.create_connection(("127.0.0.1", gate.port), timeout=10) as peer:
@@ -96,25 +96,25 @@ def test_what_is_no_request_is_answered(behind):
         gate.close()
 
 
-def test_no_other_page_uses_this_one():
+def test_requests_from_other_origins_are_refused():
     assert answer(request(origin="http://evil.example"), None) is not None
     assert answer(request(origin="http://evil.example", cookie=f"hvf_token={TOKEN}"), TOKEN) is not None
     assert answer(request(origin="http://10.0.0.5:8080", cookie=f"hvf_token={TOKEN}"), TOKEN) is None
 
 
-def test_without_a_token_a_name_that_is_not_this_machines_is_refused():
+def test_foreign_host_name_without_token_is_refused():
     assert answer(Request("/", {"host": "127.0.0.1:8080"}), None) is None
     assert answer(Request("/", {"host": "localhost:8080"}), None) is None
     assert answer(Request("/", {"host": "rebound.example:8080"}), None) is not None
     assert answer(Request("/", {}), None) is not None
 
 
-def test_another_host_always_has_a_token_that_cannot_be_guessed():
+def test_non_local_host_always_gets_a_strong_token():
     assert token_for("127.0.0.1", "") is None
-    made = token_for("0.0.0.0", "")
-    assert made is not None
-    assert len(made) == 32
-    assert made != token_for("0.0.0.0", "")
+    token = token_for("0.0.0.0", "")
+    assert token is not None
+    assert len(token) == 32
+    assert token != token_for("0.0.0.0", "")
     assert token_for("127.0.0.1", TOKEN) == TOKEN
     with pytest.raises(ParameterError, match="easily guessed"):
         token_for("0.0.0.0", "secret")

@@ -20,13 +20,13 @@ from websockets.typing import Origin, Subprotocol
 
 from experiments.live.page import Page
 
-COMING = 2.0  # [s] in which a browser is told what there is
+CONNECTING = 2.0  # [s] for the initial messages of the page
 HEADER = 16  # bytes: lengths of what is packed, unpacked and packed
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 MOVES = "/phantom/"  # it moves in every picture
 
 
-def watching(port: int, seconds: float, stalled: bool = False) -> "subprocess.Popen[str]":
+def start_watcher(port: int, seconds: float, stalled: bool = False) -> "subprocess.Popen[str]":
     """Begin to watch a page."""
     command = [sys.executable, "-m", "tests.live.watcher", str(port), str(seconds), *["stalled"] * stalled]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -34,7 +34,7 @@ def watching(port: int, seconds: float, stalled: bool = False) -> "subprocess.Po
 
 def sent_and_drawn(page: Page, seconds: float) -> tuple[float, float]:
     """Pictures a second that a watcher gets of a page of this process, and that the page draws meanwhile."""
-    watcher = watching(page.port, COMING + seconds)
+    watcher = start_watcher(page.port, CONNECTING + seconds)
     drawn: list[tuple[float, int]] = []
     while watcher.poll() is None:
         drawn.append((time.perf_counter(), page.pictures))
@@ -55,14 +55,14 @@ def pictures(port: int, seconds: float) -> list[float]:
         while time.perf_counter() < end:
             raw = page.recv(timeout=seconds)
             size = int.from_bytes(raw[8:HEADER], "little")
-            told = msgspec.msgpack.decode(unpack.decompress(raw[HEADER : HEADER + size]))["messages"]
-            if any(one["type"] == "SetOrientationMessage" and one["name"].startswith(MOVES) for one in told):
+            messages = msgspec.msgpack.decode(unpack.decompress(raw[HEADER : HEADER + size]))["messages"]
+            if any(one["type"] == "SetOrientationMessage" and one["name"].startswith(MOVES) for one in messages):
                 found.append(time.perf_counter())
     return found
 
 
 def stall(port: int, seconds: float) -> None:
-    """Come, and read nothing: what is sent fills the buffers between."""
+    """Connect and read nothing, so that the buffers fill up."""
     with socket.create_connection(("127.0.0.1", port)) as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         key = base64.b64encode(bytes(16)).decode()

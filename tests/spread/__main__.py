@@ -21,11 +21,11 @@ RUNS: dict[str, dict[str, str]] = {
     "haswell": {"OPENBLAS_CORETYPE": "Haswell", START_OFFSET: "1e-9", SEED_OFFSET: "100"},
     "zen": {"OPENBLAS_CORETYPE": "Zen", START_OFFSET: "-1e-9", SEED_OFFSET: "200"},
 }
-LOOKED_AT = ("audit", "experiments", "golden", "integration", "models/mocap", "sim", "controllers/certificates")
+LOOKED_AT = ("experiments", "golden", "integration", "models/mocap", "sim", "controllers/certificates")
 """Folders of tests in which a figure is simulated or a run looked at, fast ones and slow."""
 OF_THE_CLOCK = (
-    "test_c_function", "test_habits", "test_hardware_command", "test_run_to_folder", "test_shared", "test_processes",
-    "test_trial_cost",
+    "test_c_function", "test_command_interrupts", "test_hardware_command", "test_processes", "test_progress",
+    "test_run_to_folder", "test_shared", "test_trial_cost",
 )  # fmt: skip
 """Files in which what moves from run to run is the machine's time; they are in the CSV file and not in the table."""
 

@@ -1,4 +1,4 @@
-"""What `hvf bench` prepares: clips with the faults of captures, which preparation removes."""
+"""Clips degraded for `hvf bench`: they have the faults of captures, and preparation removes them."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from models.mocap.readers.own_bvh import write_bvh
 
 
 @pytest.mark.parametrize("name", _CLIPS)
-def test_a_clip_with_errors_has_the_faults_of_a_capture(name):
+def test_degraded_clip_has_skate_residual_and_open_ends(name):
     clip = _add_capture_errors(embedded(name), np.random.default_rng(0))
     measures = well_formed(clip, clip_flights(clip))
     assert measures.skate > 0.015
@@ -21,8 +21,8 @@ def test_a_clip_with_errors_has_the_faults_of_a_capture(name):
 
 
 @pytest.mark.slow
-def test_what_the_bench_prepares_is_found_feasible(tmp_path):
+def test_degraded_clip_is_prepared_to_a_feasible_motion(tmp_path):
     write_bvh(_add_capture_errors(embedded("walk"), np.random.default_rng(0)), tmp_path / "walk.bvh")
-    made = prepared(tmp_path / "walk.bvh")
-    assert made.near
-    assert made.seconds > 0.0
+    result = prepared(tmp_path / "walk.bvh")
+    assert result.near
+    assert result.seconds > 0.0

@@ -1,4 +1,4 @@
-"""What `hvf bench` says of studies, in small: that its rows are measured, not how fast this machine is."""
+"""Cost of studies in `hvf bench`, on small studies: values are measured, the speed of this machine is not judged."""
 
 import pytest
 from rich.console import Console
@@ -8,16 +8,16 @@ from experiments.bench.trial_cost import grown, overhead, start_seconds
 QUIET = Console(quiet=True)
 
 
-def test_what_a_study_costs_beside_its_trials_is_little_and_more_than_nothing() -> None:
+def test_study_overhead_is_positive_and_below_its_trials() -> None:
     more, seconds = overhead(1, 1.0, QUIET)
-    assert 0.0 < more < 1.0  # of trials a fifth as long as those of the bench, whose bound is 0.05
+    assert 0.0 < more < 1.0  # trials a fifth as long as in `hvf bench`, where the bound is 0.05
     assert seconds > 0.0
 
 
-def test_memory_after_short_trials_is_told() -> None:
+def test_memory_growth_over_trials_is_measured() -> None:
     assert 0.5 < grown(40, QUIET) < 1.5
 
 
 @pytest.mark.slow
-def test_a_new_process_tells_when_its_first_row_is_there() -> None:
+def test_start_time_of_a_new_process_is_measured() -> None:
     assert start_seconds() > 0.0

@@ -1,4 +1,4 @@
-"""Certificates of laws of one's own: of every case of a law, never of one that shakes, and with a true reason."""
+"""Certificates of a user's own laws: all cases are covered, no oscillating law is certified, and reasons are true."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.state import HandState
 
 CURVE = hvf.circle(radius=0.0477, lap=4.0)
-ON_CURVE = np.hstack([CURVE.point(np.linspace(0.0, 3.9, 40)), CURVE.velocity(np.linspace(0.0, 3.9, 40))])
+CURVE_STATES = np.hstack([CURVE.point(np.linspace(0.0, 3.9, 40)), CURVE.velocity(np.linspace(0.0, 3.9, 40))])
 
 
 def simulation(law):
@@ -41,11 +41,11 @@ def numpy_rail(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if 0.04 < r < 0.06 else (0.0, 0.0, 0.0)
 
 
-def cut(hand, k=2e4):
+def saturated(hand, k=2e4):
     return 0.0, 0.0, max(-5.0, min(5.0, -k * float(hand.p[2])))
 
 
-def swallowing(hand, k=2e4):
+def catching_errors(hand, k=2e4):
     try:
         z = float(hand.p[2])
     except Exception:
@@ -53,16 +53,16 @@ def swallowing(hand, k=2e4):
     return 0.0, 0.0, -k * z
 
 
-def of_floats(hand, k=2e4):
+def checking_type(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if isinstance(hand.p[2], float) else (0.0, 0.0, 0.0)
 
 
-def beside(hand, k=2e4):
+def zero_on_curve(hand, k=2e4):
     return (0.0, 0.0, -k * hand.p[2]) if abs(hand.p[2]) > 1e-4 else (0.0, 0.0, 0.0)
 
 
-def hidden(hand, k=2e4):
-    """Without stiffness on the curve, with all of it a few hundredths of a millimetre off."""
+def steep_off_curve(hand, k=2e4):
+    """No stiffness on the curve, full stiffness a few hundredths of a millimetre off it."""
     return 0.0, 0.0, -k * hand.p[2] * (1.0 - np.exp(-((hand.p[2] / 1e-5) ** 2)))
 
 
@@ -70,7 +70,7 @@ def relay(hand, c=1.0):
     return 0.0, 0.0, (-c if hand.p[2] > 0.0 else c)
 
 
-def dry(hand, c=0.5):
+def dry_friction(hand, c=0.5):
     return 0.0, 0.0, -c * np.sign(hand.v[2])
 
 
@@ -92,79 +92,93 @@ def step(hand):
     return (0.1 if hand.p[0] > 0 else 0.0), 0, 0
 
 
-def flip(hand, k=900.0):
+def switching_spring(hand, k=900.0):
     return (0, 0, -k * hand.p[2]) if hand.p[2] * hand.v[2] > 0 else (0, 0, 0.25 * k * hand.p[2])
 
 
-# What shakes is never certified.
+# Laws that oscillate are never certified.
 
 
-@pytest.mark.parametrize("function", [rail, cut, swallowing, of_floats, numpy_rail, beside, hidden, relay, dry, damped])
-def test_a_law_that_shakes_in_a_run_is_not_certified(function):
+@pytest.mark.parametrize(
+    "function",
+    [
+        rail,
+        saturated,
+        catching_errors,
+        checking_type,
+        numpy_rail,
+        zero_on_curve,
+        steep_off_curve,
+        relay,
+        dry_friction,
+        damped,
+    ],
+)
+def test_law_that_oscillates_in_simulation_is_not_certified(function):
     assert "It oscillates" in str(simulation(hvf.law(function)).run(1.0))
     assert stability(function).verdict != "certified"
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_law_that_makes_plain_numbers_of_the_hand_is_not_followed_but_seen_to_shake(compiled):
+def test_law_that_converts_to_float_is_refuted_by_linearisation_or_unknown(compiled):
     found = stability(rail, compiled)
     assert found.verdict == "refuted"
     assert "mm off the curve at phase" in found.reason
     assert "makes a plain number" in found.reason
     assert "np.hypot" in found.reason
-    # Seen only; a soft one is stable at all states, of which nothing follows.
+    # Linearisation at sampled states can refute but not certify: the same law with a soft spring is unknown.
     soft = hvf.certify(simulation(hvf.law(rail)(k=100.0)), NO_HANDS).stability
     assert soft.verdict == "unknown"
     assert "makes a plain number" in soft.reason
 
 
-def test_an_expression_that_differs_from_the_law_that_runs_is_no_certificate():
+def test_symbolic_law_that_differs_from_executed_law_is_rejected():
     with pytest.raises(ControllerError, match="another force in a run than on symbols, as for a hand at p = "):
-        certified_cases(hvf.law(of_floats), CURVE)
+        certified_cases(hvf.law(checking_type), CURVE)
     with pytest.raises(ControllerError, match="numbers that are not finite"):
         certified_cases(hvf.law(lambda hand: (math.nan, 0, 0)), CURVE)
-    kept = [0.0]
+    state = [0.0]
 
     def filtered(hand):
-        kept[0] = 0.9 * kept[0] + 0.1 * hand.p[2]
-        return 0, 0, -kept[0]
+        state[0] = 0.9 * state[0] + 0.1 * hand.p[2]
+        return 0, 0, -state[0]
 
     with pytest.raises(ControllerError, match="another force when it is asked again"):
         certified_cases(hvf.law(filtered), CURVE)
 
 
-# A jump is no slope.
+# Discontinuous forces.
 
 
-def test_a_step_of_a_tenth_of_a_newton_is_unknown_and_not_refuted():
+def test_small_force_step_is_unknown_not_refuted():
     found = stability(step)
     assert found.verdict == "unknown"
     assert "where it jumps" in found.reason
     assert "its force jumps, bends or is no number" in found.reason
 
 
-# Every case of a law.
+# Piecewise laws: every case counts.
 
 
 @pytest.mark.slow
-def test_states_at_which_the_limit_of_the_field_cuts_its_force_are_not_judged():
-    """A plane of 8 kN/m meets 8 N a millimetre off: further away the loop has neither its stiffness nor its damping."""
+def test_states_with_saturated_force_are_excluded_from_linearisation():
+    """A plane of 8 kN/m reaches the limit of 8 N at 1 mm: beyond, the loop has no stiffness or damping."""
     plane = hvf.law(lambda hand, k=8000.0: (0.0, 0.0, -k * hand.p[2]))
     sim = simulation(plane)
-    cut, in_part = (
+    saturated, in_part = (
         dataclasses.replace(sim, field=field)
         for field in (sim.field.limited(8.0), hvf.Follow(CURVE, k_r=300.0, b_d=8.0).limited(0.5) + plane)
     )
-    free, less, part = (hvf.certify(of, NO_HANDS).stability for of in (sim, cut, in_part))
-    whole, judged = (int(re.findall(r"grows at (\d+) states", told.reason)[0]) for told in (free, less))
+    free, less, part = (hvf.certify(variant, NO_HANDS).stability for variant in (sim, saturated, in_part))
+    whole, judged = (int(re.findall(r"grows at (\d+) states", verdict.reason)[0]) for verdict in (free, less))
     assert less.verdict == "certified"
     assert judged < whole
-    # Where a part of the field alone is cut, the plane acts without the damping of the river.
+    # Where only a part of the field is limited, the plane acts without the damping of FOLLOW.
     assert part.verdict == "refuted"
 
 
 @pytest.mark.slow
-def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
+def test_readme_floor_is_certified_in_both_cases_for_all_hands():
     found = hvf.certify(simulation(hvf.law(floor))).stability
     assert found.verdict == "certified"
     assert "the least of 2 cases" in found.reason
@@ -176,7 +190,7 @@ def test_the_floor_of_the_readme_is_certified_in_both_its_cases_with_any_hand():
 
 
 @pytest.mark.slow
-def test_a_floor_is_as_stable_as_its_hardest_case():
+def test_floor_verdict_is_that_of_its_stiffest_case():
     assert stability(floor).verdict == "certified"
     hard = hvf.certify(simulation(hvf.law(floor)(k=2e4)), NO_HANDS).stability
     assert hard.verdict == "refuted"
@@ -184,32 +198,32 @@ def test_a_floor_is_as_stable_as_its_hardest_case():
 
 
 @pytest.mark.slow
-def test_cases_that_are_stable_one_by_one_are_not_certified_if_switching_between_them_is_not():
-    found = hvf.certify(simulation(hvf.law(flip))).stability
+def test_stable_cases_with_uncertified_switching_are_unknown():
+    found = hvf.certify(simulation(hvf.law(switching_spring))).stability
     assert found.verdict == "unknown"
     assert "switching between them is not certified" in found.reason
 
 
-def test_the_slopes_of_a_law_bound_its_force_as_seen_from_the_curve():
-    kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, beside: 2, numpy_rail: 2}
+def test_case_slopes_bound_the_force_around_the_curve():
+    kinds = {floor: 2, step: 0, sticking_floor: 0, relay: 0, zero_on_curve: 2, numpy_rail: 2}
     for function, count in kinds.items():
         cases = cases_of(hvf.law(function))
         if not count:
             with pytest.raises(ControllerError, match="no stiffness and damping"):
-                slopes_of(cases, ON_CURVE)
+                slopes_of(cases, CURVE_STATES)
             continue
-        assert len(slopes_of(cases, ON_CURVE)) == count
-    soft, stiff = sorted(slopes_of(cases_of(hvf.law(floor)), ON_CURVE), key=lambda slope: np.abs(slope).max())
+        assert len(slopes_of(cases, CURVE_STATES)) == count
+    soft, stiff = sorted(slopes_of(cases_of(hvf.law(floor)), CURVE_STATES), key=lambda slope: np.abs(slope).max())
     rng = np.random.default_rng(1)
     for off in rng.normal(scale=(3e-3,) * 3 + (0.05,) * 3, size=(200, 6)):
-        hand = ON_CURVE[0] + off
+        hand = CURVE_STATES[0] + off
         force = hvf.law(floor).wrench(HandState.at(hand[:3], hand[3:])).force[2]
         ends = sorted((float(soft[2] @ off), float(stiff[2] @ off)))
         assert ends[0] - 1e-12 <= force <= ends[1] + 1e-12
 
 
 @pytest.mark.slow
-def test_vectors_are_arrays_as_in_a_run():
+def test_law_with_vector_arithmetic_is_certified():
     def spring(hand, k=50.0, b=1.0):
         return -k * hand.p - b * hand.v
 
@@ -223,14 +237,14 @@ def test_vectors_are_arrays_as_in_a_run():
         assert stability(function).verdict == "certified", function
 
 
-def test_a_distance_that_has_no_derivative_on_the_curve_is_unknown():
+def test_force_without_derivative_on_the_curve_is_unknown():
     found = stability(lambda hand: (0, 0, -300.0 * np.sqrt(hand.p[2] ** 2)))
     assert found.verdict == "unknown"
     assert "bends where nothing is compared" in found.reason
 
 
-def test_all_ways_through_a_function_are_followed_and_none_that_no_number_takes():
-    assert len(cases_of(hvf.law(dry)).cases) == 3
+def test_all_feasible_branches_become_cases_up_to_a_limit():
+    assert len(cases_of(hvf.law(dry_friction)).cases) == 3
     assert len(cases_of(hvf.law(floor)).cases) == 3
     with pytest.raises(ControllerError, match="more than 16 cases"):
         cases_of(hvf.law(lambda hand: np.clip(-300.0 * hand.p, -1.0, 1.0)))
@@ -247,15 +261,15 @@ def _endless(hand):
     return x, 0, 0
 
 
-# A law that is none.
+# Invalid laws.
 
 
 def _boom(hand):
     raise ValueError("boom")
 
 
-def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
-    """CasADi prints six digits of a number: by its text this law would be one smooth expression."""
+def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
+    """CasADi prints six digits of a number: compared as text, the cases of this law would be one smooth expression."""
 
     def notched(hand, k=1e6):
         if hand.p[2] > 0.12345671:
@@ -268,7 +282,7 @@ def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
 
 
 @pytest.mark.parametrize(
-    ("function", "says"),
+    ("function", "message"),
     [
         (_boom, r"law _boom \(.*\) raised ValueError: boom"),
         (lambda hand: (1.0, 2.0), r"numbers of shape \(2,\)"),
@@ -277,33 +291,33 @@ def test_comparisons_and_forces_that_differ_beyond_the_sixth_digit_are_two():
         (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
     ],
 )
-def test_a_law_that_raises_or_gives_another_shape_is_an_error_that_names_it(function, says):
-    with pytest.raises(ParameterError, match=says):
+def test_law_that_raises_or_returns_wrong_shape_is_named_in_the_error(function, message):
+    with pytest.raises(ParameterError, match=message):
         stability(function)
 
 
-def test_the_reasons_hold_no_path_of_a_library():
+def test_reasons_contain_no_library_paths():
     for function in (rail, step):
         assert ".cpp" not in stability(function).reason
 
 
-@pytest.mark.parametrize("delay", [1, 1000])  # less and more than the hands at which a law is looked at
-def test_a_law_that_keeps_numbers_of_the_hand_is_unknown_each_time(delay: int) -> None:
-    kept = [0.0] * delay
+@pytest.mark.parametrize("delay", [1, 1000])  # fewer and more calls than there are sampled hand states
+def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
+    queue = [0.0] * delay
 
     @hvf.law
-    def late(hand, k=50.0):
-        kept.append(hand.p[2])
-        return 0.0, 0.0, -k * kept.pop(0)
+    def delayed(hand, k=50.0):
+        queue.append(hand.p[2])
+        return 0.0, 0.0, -k * queue.pop(0)
 
-    sim, said = simulation(late), "another force when it is asked again|keeps numbers of the hand between calls"
+    sim, message = simulation(delayed), "another force when it is asked again|keeps numbers of the hand between calls"
     for _ in range(2):
         found = hvf.certify(sim).stability
         assert found.verdict == "unknown"
-        assert re.search(said, found.reason), found.reason
+        assert re.search(message, found.reason), found.reason
 
 
-def test_a_symbol_that_a_law_kept_is_told_as_its_state() -> None:
+def test_law_that_stores_a_symbol_is_reported_as_stateful() -> None:
     kept = [0.0]
 
     @hvf.law
@@ -337,14 +351,14 @@ floor_law = hvf.law(floor)
         (2 * FOLLOW.limited(4.0), hvf.Follow(CURVE, k_r=600.0, b_d=16.0).limited(8.0)),
     ],
 )
-def test_a_field_times_a_number_is_certified_as_the_field_of_these_gains(scaled, plain):
+def test_scaled_field_is_certified_as_field_with_scaled_gains(scaled, plain):
     for of_scaled, of_plain in zip(verdicts(scaled), verdicts(plain), strict=True):
         assert of_scaled.verdict == of_plain.verdict != "unknown"
         assert of_scaled.margin == pytest.approx(of_plain.margin, rel=1e-9)
         assert of_scaled.assumptions == of_plain.assumptions
 
 
-def test_a_field_that_leads_the_hand_away_is_refuted_in_the_executed_program():
+def test_negated_field_is_refuted_by_linearisation_of_executed_program():
     certificate = hvf.certify(dataclasses.replace(simulation(damped_law), field=-FOLLOW))
     assert certificate.stability.verdict == "refuted"
     assert certificate.passivity.verdict == "unknown"

@@ -1,4 +1,4 @@
-"""`certify` writes what it finds, finds it again by its hash, and `--verify` notices every change of an input."""
+"""`hvf certify`: files written, reuse of a certificate with equal inputs, and `--verify` for every changed input."""
 
 import json
 import subprocess
@@ -41,11 +41,11 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_the_demos_river_is_certified_and_told(folder):
-    held = json.loads((folder / CERTIFICATE).read_text())
-    assert held["stability"]["verdict"] == "certified"
-    assert held["energy"]["verdict"] == "certified"
-    assert held["passivity"]["verdict"] == "refuted"
+def test_demo_river_is_certified_and_reported(folder):
+    certificate = json.loads((folder / CERTIFICATE).read_text())
+    assert certificate["stability"]["verdict"] == "certified"
+    assert certificate["energy"]["verdict"] == "certified"
+    assert certificate["passivity"]["verdict"] == "refuted"
     page = (folder / PAGE).read_text()
     assert "stability: " in page
     assert "<script" not in page
@@ -53,7 +53,7 @@ def test_the_demos_river_is_certified_and_told(folder):
 
 
 @pytest.mark.slow
-def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
+def test_certificate_with_same_inputs_is_reused(folder):
     before, begin = (folder / CERTIFICATE).stat().st_mtime_ns, time.perf_counter()
     again = certify_into(run_config(seconds=3.0, seed=9), folder, hands=HANDS)
     assert time.perf_counter() - begin < 1.0
@@ -63,7 +63,7 @@ def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "changed_part"),
     [
         ({"stiffness": 301.0}, "gains"),
         ({"damping": 4.1}, "gains"),
@@ -75,15 +75,15 @@ def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
         ({"cutoff": 149.0}, "filter"),
     ],
 )
-def test_a_certificate_is_of_one_field_only(folder, change, said):
+def test_changed_field_parameter_invalidates_certificate(folder, change, changed_part):
     file = folder / CERTIFICATE
     verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
-    with pytest.raises(CertificateError, match=f"changed: {said}; certify again"):
+    with pytest.raises(CertificateError, match=f"changed: {changed_part}; certify again"):
         verify_certificate(file, certificate_inputs(run_config(**change), 0.0, HANDS, 1.0))
 
 
 @pytest.mark.slow
-def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
+def test_changed_delay_hand_or_push_invalidates_certificate(folder):
     file = folder / CERTIFICATE
     with pytest.raises(CertificateError, match="changed: delay;"):
         verify_certificate(file, certificate_inputs(run_config(), 1e-4, HANDS, 1.0))
@@ -92,7 +92,7 @@ def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
 
 
 @pytest.mark.slow
-def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
+def test_changed_device_or_code_invalidates_certificate(folder, monkeypatch):
     file = folder / CERTIFICATE
     heavier = replace(certified_field.PREMIUM_1_5, m_a=0.021)
     with monkeypatch.context() as patch:
@@ -105,7 +105,7 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_command_verifies_without_casadi_or_splines_and_says_what_changed(folder, capsys):
+def test_verify_needs_no_casadi_or_splines_and_names_changes(folder, capsys):
     file = str(folder / CERTIFICATE)
     hands = ["--hand.mass", "0.1", "0.1", "--hand.damping", "2", "2", "--hand.stiffness", "0", "0"]
     assert main(["certify", "--verify", file, *hands]) == 0
@@ -119,7 +119,7 @@ def test_the_command_verifies_without_casadi_or_splines_and_says_what_changed(fo
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
-def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
+def test_invalid_hand_intervals_are_refused_in_one_line(tmp_path, capsys):
     out = str(tmp_path / "none")
     assert main(["certify", "--out", out, "--hand.mass", "0.2", "0.1"]) == 2
     assert "mass of hands lies between 0.2 and 0.1" in capsys.readouterr().err
@@ -128,7 +128,7 @@ def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("arguments", "message"),
     [
         (
             "runs/demo --stiffness 500",
@@ -146,13 +146,13 @@ def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
         ("--tolerance.yaw 1", "--tolerance.yaw has no meaning with a field alone; it belongs to clips"),
     ],
 )
-def test_what_a_certificate_does_not_depend_on_is_refused_by_name(asked, said, tmp_path, capsys):
-    assert main(["certify", *asked.split(), "--out", str(tmp_path / "out")]) == 2
-    assert f"hvf: {said}" in capsys.readouterr().err
+def test_options_irrelevant_to_the_certificate_are_refused_by_name(arguments, message, tmp_path, capsys):
+    assert main(["certify", *arguments.split(), "--out", str(tmp_path / "out")]) == 2
+    assert f"hvf: {message}" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
-def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_is_said():
+def test_certified_laws_of_bunny_and_tubes_and_uncovered_gates():
     point = certified_rivers(run_config(mode="bunny"))[""]
     along = certified_rivers(run_config(mode="bunny", bunny_attraction="along"))[""]
     assert (point.law.slides, along.law.slides) == (False, True)
@@ -165,7 +165,7 @@ def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_i
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])
-def test_what_is_no_certificate_is_refused(tmp_path, text):
+def test_invalid_certificate_files_are_refused(tmp_path, text):
     (tmp_path / CERTIFICATE).write_text(text)
     if text.startswith("{"):
         assert read_certificate(tmp_path / CERTIFICATE).verdicts == {}
@@ -175,13 +175,13 @@ def test_what_is_no_certificate_is_refused(tmp_path, text):
 
 
 @pytest.mark.slow
-def test_a_held_file_that_is_no_certificate_is_replaced(folder, tmp_path):
+def test_existing_invalid_certificate_file_is_replaced(folder, tmp_path):
     (tmp_path / CERTIFICATE).write_text("not json")
     (tmp_path / PAGE).write_text("")
     assert certify_into(run_config(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
 
 
-def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged_by(tmp_path, capsys):
+def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp_path, capsys):
     out = tmp_path / "jump"
     clip = ["certify", "--clip", "jump", "--out", str(out)]
     assert main(clip) == 0
@@ -191,11 +191,11 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
     written = (out / CERTIFICATE).stat().st_mtime_ns
     assert main(clip) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
-    check = ["certify", "--verify", str(out / CERTIFICATE), "--clip"]
-    assert main([*check, "jump"]) == 0
-    assert main([*check, "jump", "--friction", "0.5"]) == 1
+    verify = ["certify", "--verify", str(out / CERTIFICATE), "--clip"]
+    assert main([*verify, "jump"]) == 0
+    assert main([*verify, "jump", "--friction", "0.5"]) == 1
     assert "changed: judging;" in capsys.readouterr().err
-    assert main([*check, "walk"]) == 1
+    assert main([*verify, "walk"]) == 1
     assert "changed: clip;" in capsys.readouterr().err
     other = [*clip, "--tolerance.gravity", "9.0", "9.81001"]
     assert main(other) == 2
@@ -203,7 +203,7 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
     assert main([*other, "--overwrite"]) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns != written
-    assert main([*check, "jump"]) == 1
+    assert main([*verify, "jump"]) == 1
     assert "changed: judging;" in capsys.readouterr().err
     assert main([*clip, "--friction", "0"]) == 2
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err
@@ -212,7 +212,7 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
 
 
 @pytest.mark.parametrize("rig", [Rig(), Rig(leading=1), Rig(without=("head", "neck"), leading=1)])
-def test_flights_of_a_capture_are_judged_whatever_there_is_to_say_of_its_file(rig, tmp_path):
+def test_capture_certificate_lists_scaling_and_dropped_first_frame(rig, tmp_path):
     write_rig(rig, embedded("walk"), tmp_path / "walker.bvh")
     certificate = certify_clip_into(str(tmp_path / "walker.bvh"), tmp_path / "out", JUDGING)
     assumed = certificate.verdicts["ballistic"].assumptions

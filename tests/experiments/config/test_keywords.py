@@ -23,7 +23,7 @@ SIM = hvf.Simulation(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("--wall-margin is 3 rad", "wall_margin is 3 rad"),
         ("expected --lap 1.1 or more, or --bump 0.24.", "expected lap=1.1 or more, or bump=0.24."),
@@ -38,11 +38,11 @@ SIM = hvf.Simulation(
         ("0.4 m --> 0.5 m", "0.4 m --> 0.5 m"),
     ],
 )
-def test_an_option_is_named_as_the_keyword_that_it_is(text: str, said: str) -> None:
-    assert keywords(text, out="record") == said
+def test_option_in_message_becomes_keyword(text: str, message: str) -> None:
+    assert keywords(text, out="record") == message
 
 
-def test_the_kind_of_an_error_and_where_it_was_raised_stay() -> None:
+def test_error_type_and_traceback_are_preserved() -> None:
     @in_keywords()
     def fails() -> None:
         raise ParameterError("--lap is 0; expected more")
@@ -52,7 +52,7 @@ def test_the_kind_of_an_error_and_where_it_was_raised_stay() -> None:
     assert raised.traceback[-1].name == "fails"
 
 
-def test_the_command_line_says_what_was_written_also_through_several_functions() -> None:
+def test_nested_conversion_to_options_restores_the_message() -> None:
     @in_keywords()
     def fails() -> None:
         raise ParameterError("--lap is 0 with --figure none")
@@ -70,12 +70,12 @@ NAN, DESIGN = float("nan"), {"name": "s", "factors": {"stiffness": [100.0, 300.0
 PUSH = hvf.Push(0.0, 1.0, 1.0)
 
 
-def meant(**does: Any) -> Any:
+def person_session(**does: Any) -> Any:
     return replace(SIM, user=hvf.User(person=hvf.Person(), **does)).session(1.0)
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: hvf.Figure(stature=-1.0), "stature is -1; expected more than 0 m, and finite"),
         (lambda: hvf.Figure(kind="ghost"), "kind is 'ghost'; expected 'physical', 'kinematic' or 'none'"),  # pyright: ignore
@@ -122,7 +122,7 @@ def meant(**does: Any) -> Any:
         (lambda: hvf.sweep(SIM, {"field.k_r": [200, -1]}), "k_r must be finite and at least 0 N/m, got -1"),
         (lambda: hvf.sweep(SIM, {3: [1]}), "a path of values is 3; expected text"),  # pyright: ignore
         (lambda: hvf.sweep(SIM, {"seed": [1]}, seconds=NAN), "a run of nan s; expected 0.004 s or more, and finite"),
-        (lambda: meant(intent=hvf.intents.Trace(), pushes=[PUSH]), "expected an intent or pushes, not both"),
+        (lambda: person_session(intent=hvf.intents.Trace(), pushes=[PUSH]), "expected an intent or pushes, not both"),
         (lambda: hvf.Search(journal=""), "journal is empty; expected a path"),
         (lambda: hvf.tune(SIM, SPACE, lambda: 1.0), "cost is <lambda>(); expected a function of a run"),  # pyright: ignore
         (lambda: hvf.tune(SIM, {"field.k_r": (-5.0, 90.0)}, len), "k_r must be finite and at least 0 N/m, got -5"),  # pyright: ignore
@@ -130,27 +130,27 @@ def meant(**does: Any) -> Any:
         (lambda: hvf.tune(SIM, SPACE, len, seconds=None), "seconds is None; expected a number"),  # pyright: ignore
     ],
 )  # fmt: skip
-def test_each_name_of_the_public_face_is_told_what_is_wrong_in_keywords(
-    make: Callable[[], Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_messages_of_public_interface_name_keywords(
+    make: Callable[[], Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises((hvf.ControllerError, hvf.ModelError, hvf.SimError)) as error:
         make()
-    assert said in str(error.value)
+    assert message in str(error.value)
     assert "--" not in str(error.value)
     assert "\n" not in str(error.value)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("wrong", ["x", True, None])
-def test_a_search_says_at_which_values_a_cost_is_no_number(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_non_numeric_cost_is_refused_with_its_values(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
-    said = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
-    with pytest.raises(hvf.ParameterError, match=said):
+    message = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
+    with pytest.raises(hvf.ParameterError, match=message):
         hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 
 
-def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(
+def test_messages_use_keywords_in_python_and_options_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
@@ -160,7 +160,7 @@ def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(
             begin()
     assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(tmp_path)]) == 2
     assert "choose another --out, or --overwrite it" in capsys.readouterr().err
-    for given, said in (
+    for keyword_arguments, message in (
         ({"foo": 3}, "^foo is not known; there are "),
         (
             {"figure": "none", "smoothing": 6.0},
@@ -169,27 +169,27 @@ def test_what_python_is_told_is_in_keywords_and_the_command_line_in_options(
         ({"mode": "lead", "clips": ["walk", "run"]}, "expected clips of one, such as walk or run$"),
         ({"stiffness": -1.0}, "^stiffness is -1; expected 0 N/m or more"),
     ):
-        with pytest.raises(hvf.ParameterError, match=said):
-            hvf.run(**given)
+        with pytest.raises(hvf.ParameterError, match=message):
+            hvf.run(**keyword_arguments)
     with pytest.raises(hvf.ParameterError, match=r"^--foo is not known; there are "):
         run_config(foo=3)
     with pytest.raises(hvf.ParameterError, match=r"got 0; expected so many clips$"):
         hvf.Cylindrical([], around=CURVE)
 
 
-def test_remarks_of_a_run_are_in_keywords() -> None:
+def test_run_remarks_name_keywords() -> None:
     turns = hvf.run(user="turn", figure="none", seconds=0.1)
     assert any(remark.endswith("this map does not look at that; expressive does") for remark in turns.remarks)
     assert "--" not in str(turns)
 
 
-def test_what_a_prepared_capture_is_not_is_warned_of_in_keywords(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_warning_of_infeasible_capture_names_keywords(monkeypatch: pytest.MonkeyPatch) -> None:
     class Found:
         feasible, remarks, clip = False, ("not feasible; --raw takes the capture as it is",), SIM
 
     monkeypatch.setattr("experiments.public.prepared_clips", lambda *given: (Found(),))
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         hvf.load("mine.bvh")
-    assert [str(one.message) for one in said] == ["not feasible; raw takes the capture as it is"]
-    assert said[0].filename == __file__
+    assert [str(one.message) for one in caught] == ["not feasible; raw takes the capture as it is"]
+    assert caught[0].filename == __file__

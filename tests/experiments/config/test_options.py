@@ -1,14 +1,15 @@
-"""Configurations: every number has an interval, every option its place; JSON and words say the same as the parts."""
+"""Configurations: every number is bounded, every option has its place, and JSON and words round-trip."""
 
 import json
 from dataclasses import fields, is_dataclass, replace
 from math import inf, nan
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.cli import main
+from experiments.cli import main, parsed
 from experiments.config.keywords import in_options
 from experiments.config.maps import MAPS, Circle, Composite, Cylindrical, Led, MapFile, RiverClips, RobotArm
 from experiments.config.modes import (
@@ -52,13 +53,13 @@ def _kinds(hint: object) -> set[object]:
 
 
 def _numbers(cls: type) -> dict[str, object]:
-    """Names and types of what is a number in a part."""
+    """Names and type hints of the numeric fields of a part."""
     hints = get_type_hints(cls)
     return {name: hint for name, hint in hints.items() if _kinds(hint) & {int, float}}
 
 
 def _limits(cls: Any, name: str) -> dict[str, Any]:
-    """What bounds a number of a part."""
+    """Bounds of a numeric field of a part."""
     found: dict[str, Any] = {}
     for bound in cls.__pydantic_fields__[name].metadata:
         found |= {key: getattr(bound, key) for key in ("ge", "gt", "lt", "allow_inf_nan") if hasattr(bound, key)}
@@ -68,7 +69,7 @@ def _limits(cls: Any, name: str) -> dict[str, Any]:
 NUMBERS = [(cls, name) for cls in PARTS for name in _numbers(cls)]
 
 
-def of(cls: type, **values: object) -> Any:
+def make_part(cls: type, **values: object) -> Any:
     return cls(**NEEDED.get(cls, {}), **values)
 
 
@@ -86,7 +87,7 @@ class Outer:
     inner: Inner = Inner()
 
 
-def test_no_number_of_a_configuration_is_without_an_interval() -> None:
+def test_every_number_of_a_configuration_has_bounds() -> None:
     assert len(NUMBERS) > 50
     for cls, name in NUMBERS:
         limits = _limits(cls, name)
@@ -94,8 +95,8 @@ def test_no_number_of_a_configuration_is_without_an_interval() -> None:
         assert "lt" in limits or "allow_inf_nan" in limits, (cls, name)
 
 
-def test_all_that_a_run_is_made_of_is_looked_at() -> None:
-    """What is in a configuration, however deep, is one of the parts above."""
+def test_parts_list_covers_the_whole_run_configuration() -> None:
+    """Every dataclass nested in a configuration is one of the parts above."""
     found, waiting = set[type](), [RunConfig]
     while waiting:
         cls = waiting.pop()
@@ -111,23 +112,23 @@ def test_all_that_a_run_is_made_of_is_looked_at() -> None:
 
 
 @pytest.mark.parametrize(("cls", "name"), NUMBERS, ids=lambda value: getattr(value, "__name__", value))
-def test_a_number_outside_its_interval_is_refused_by_its_name(cls: type, name: str) -> None:
+def test_number_outside_its_interval_is_refused_by_name(cls: type, name: str) -> None:
     limits, flag = _limits(cls, name), "--" + name.replace("_", "-")
     is_whole = float not in _kinds(_numbers(cls)[name])
     wrong: list[float] = [-1] if is_whole else [-1.0, -inf, nan]
     wrong += [0] * ("gt" in limits or limits["ge"] > 0) + [inf] * (limits.get("allow_inf_nan") is False)
     for value in wrong:
         with pytest.raises(ParameterError, match=rf"^{name} is {value:g}; expected ") as error:
-            of(cls, **{name: value})
+            make_part(cls, **{name: value})
         assert in_options(error.value).startswith(f"{flag} is {value:g}; expected ")
     if limits.get("allow_inf_nan"):
-        assert getattr(of(cls, **{name: inf}), name) == inf
+        assert getattr(make_part(cls, **{name: inf}), name) == inf
     if "ge" in limits:
-        assert getattr(of(cls, **{name: limits["ge"]}), name) == limits["ge"]
+        assert getattr(make_part(cls, **{name: limits["ge"]}), name) == limits["ge"]
 
 
-def test_the_message_says_what_would_be_right() -> None:
-    for options, said in (
+def test_message_says_what_is_expected() -> None:
+    for options, message in (
         (lambda: Outer(wide_gap=0.4), "wide_gap is 0.4; expected 0.5 s or more, and finite"),
         (lambda: Outer(wide_gap=nan), "wide_gap is nan; expected 0.5 s or more, and finite"),
         (lambda: Outer(reach=0.0), "reach is 0; expected 1 or more"),
@@ -141,11 +142,11 @@ def test_the_message_says_what_would_be_right() -> None:
     ):  # fmt: skip
         with pytest.raises(ParameterError) as error:
             options()
-        assert str(error.value) == said
+        assert str(error.value) == message
     assert Outer(wide_gap=0.5, reach=inf).wide_gap == 0.5
 
 
-def test_parts_do_not_change() -> None:
+def test_parts_are_immutable() -> None:
     with pytest.raises(AttributeError):
         Follow().stiffness = 3.0  # pyright: ignore[reportAttributeAccessIssue]
     with pytest.raises(ParameterError, match=r"^stiffness is -1"):
@@ -153,7 +154,7 @@ def test_parts_do_not_change() -> None:
 
 
 @pytest.mark.parametrize("seed", [2**63, 2**64, 10**30])
-def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
+def test_seed_beyond_int64_is_refused(seed: int) -> None:
     assert run_config(seed=2**63 - 1).seed == 2**63 - 1
     text = to_json(run_config()).replace('"seed": 1', f'"seed": {seed}')
     for make in (lambda: run_config(seed=seed), lambda: from_json(RunConfig, text, "c")):
@@ -162,7 +163,7 @@ def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"stifness": 3.0}, "--stifness is not known; there are "),
         ({"river_stiffness": 3.0}, "--river-stiffness is not known; there are "),
@@ -188,19 +189,19 @@ def test_a_seed_beyond_what_a_file_holds_is_refused(seed: int) -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_a_word_that_means_nothing_is_refused_and_told_where_it_belongs(words: dict[str, Any], said: str) -> None:
+def test_unknown_or_inapplicable_word_is_refused_with_its_place(words: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError) as error:
         run_config(**words)
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
-def test_a_led_figure_and_its_map_belong_together() -> None:
+def test_lead_mode_and_led_map_require_each_other() -> None:
     for make in (lambda: RunConfig(mode=Lead()), lambda: RunConfig(map=Led())):
         with pytest.raises(ParameterError, match="expected both, or neither"):
             make()
 
 
-def _every_config() -> list[RunConfig]:
+def _configs_of_all_kinds() -> list[RunConfig]:
     user = User(does="push", pushes=PUSHES, turns=TURNS, grabs=GRABS)
     maps = (
         Cylindrical(), Cylindrical(clips=("walk",), around=Circle(lap=2.5, radius=0.05), reach=0.02, expressive=True),
@@ -216,25 +217,25 @@ def _every_config() -> list[RunConfig]:
         Stretch(), Stretch(seek=0.0, tube_damping=3.0, walls=JointWalls(wall_margin=0.05)),
         StretchThenFollow(), StretchThenFollow(seek=70.0, bump=0.3, stiffness=200.0),
     )  # fmt: skip
-    made = [RunConfig(mode=mode, map=h_map) for mode in modes for h_map in maps]
-    made += [
+    configs = [RunConfig(mode=mode, map=h_map) for mode in modes for h_map in maps]
+    configs += [
         RunConfig(mode=mode, user=replace(user, does=does, grabs=() if does == "trace" else user.grabs))
         for mode in modes
         for does in ("trace", "push", "turn")
     ]
-    made += [RunConfig(mode=lead, map=Led(clips=clips), user=User(does="lead"))
+    configs += [RunConfig(mode=lead, map=Led(clips=clips), user=User(does="lead"))
              for lead, clips in ((Lead(), ("walk",)), (Lead(leash=90.0, floor_scale=70.0), ("run",)))]  # fmt: skip
     arm, by_arm = RobotArm(around=Circle(lap=3.0), reach=0.02, scale=1.2), Figure(smoothing=5.0, figure_ticks=4)
-    made += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
-    made.append(RunConfig(
+    configs += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
+    configs.append(RunConfig(
         figure=Figure(stature=1.6, mass=60.0, smoothing=5.0, figure_ticks=4, blend=0.0), device=Phantom(cutoff=99.0),
         clock=Clock(servo_period=2e-3, physics_step=5e-4), seconds=3.0, seed=2**63 - 1,
     ))  # fmt: skip
-    return made
+    return configs
 
 
-@pytest.mark.parametrize("config", _every_config(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
-def test_words_and_json_say_all_that_a_configuration_does(config: RunConfig) -> None:
+@pytest.mark.parametrize("config", _configs_of_all_kinds(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
+def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> None:
     assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_json(RunConfig, to_json(config), "config.json") == config
     assert from_dict(RunConfig, to_dict(config), "a recording") == config
@@ -242,14 +243,14 @@ def test_words_and_json_say_all_that_a_configuration_does(config: RunConfig) -> 
     assert changed(config, {}) == config
 
 
-def test_every_mode_and_map_is_among_those() -> None:
-    made = _every_config()
-    assert {type(config.mode) for config in made} == set(MODES)
-    assert {type(config.map) for config in made} == {*MAPS, Led}
+def test_round_trip_cases_cover_every_mode_and_map() -> None:
+    configs = _configs_of_all_kinds()
+    assert {type(config.mode) for config in configs} == set(MODES)
+    assert {type(config.map) for config in configs} == {*MAPS, Led}
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ('"stiffness"', '"stifness"', "mode.follow.stifness is not known; expected some of kind, stiffness, damping"),
         ('"lap"', '"lab"', "map.cylindrical.around.lab is not known; expected some of lap, radius"),
@@ -265,17 +266,17 @@ def test_every_mode_and_map_is_among_those() -> None:
         ("{", "", "is not JSON"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_named_with_the_file(old: str, new: str, said: str, tmp_path) -> None:
+def test_error_in_configuration_file_names_file_and_key(old: str, new: str, message: str, tmp_path) -> None:
     path, text = tmp_path / "my.json", to_json(run_config())
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ParameterError) as error:
         load_config(path)
     assert str(error.value).startswith(f"{path}: ")
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path) -> None:
+def test_missing_configuration_file_is_named(tmp_path) -> None:
     with pytest.raises(SimError, match=r"none\.json: cannot be read \(No such file or directory\)"):
         load_config(tmp_path / "none.json")
 
@@ -284,7 +285,7 @@ def _options(**given: object) -> RunConfig:
     return config_of_options(RunOptions(**given))
 
 
-def test_options_of_the_command_line_are_the_words_and_nothing_that_is_given_is_dropped() -> None:
+def test_run_options_equal_words_and_keep_given_zeros() -> None:
     assert set(VOCABULARY) <= {option.name for option in fields(RunOptions)}
     assert _options() == run_config() == RunConfig()
     given: dict[str, Any] = {
@@ -292,7 +293,7 @@ def test_options_of_the_command_line_are_the_words_and_nothing_that_is_given_is_
         "clips": ("walk", "cheer"), "wall_margin": 0.05,
     }  # fmt: skip
     assert _options(**given) == run_config(**given)
-    # Zeros are numbers like others.
+    # Zeros are kept.
     zeros: dict[str, Any] = {"stiffness": 0.0, "damping": 0.0, "seed": 0, "blend": 0.0, "orientation_stiffness": 0.0}
     config = _options(**zeros)
     assert config == run_config(**zeros)
@@ -300,7 +301,7 @@ def test_options_of_the_command_line_are_the_words_and_nothing_that_is_given_is_
     assert (config.seed, config.figure.blend) == (0, 0.0)
 
 
-def test_options_change_a_file_s_configuration(tmp_path) -> None:
+def test_options_override_a_configuration_file(tmp_path) -> None:
     path = tmp_path / "config.json"
     config = run_config(
         "follow", "composite", "push", stiffness=200.0, lap=2.0, walls=True, wall_margin=0.05, seed=5, cutoff=90.0,
@@ -311,7 +312,7 @@ def test_options_change_a_file_s_configuration(tmp_path) -> None:
     assert _options(config=path, stiffness=0.0, seed=0) == replace(
         config, mode=replace(config.mode, stiffness=0.0), seed=0
     )
-    # Another mode or map begins with its own defaults, the rest stays.
+    # Another mode or map has its own defaults, the rest is kept.
     assert _options(config=path, mode="bunny") == replace(config, mode=Bunny())
     assert _options(config=path, map="cylindrical") == replace(config, map=Cylindrical())
     assert _options(config=path, map="some.npz") == replace(config, map=MapFile(file="some.npz"))
@@ -323,24 +324,24 @@ def test_options_change_a_file_s_configuration(tmp_path) -> None:
         _options(config=path, tube=0.1)
 
 
-def test_the_command_refuses_a_file_with_a_typo_in_a_line(tmp_path, capsys) -> None:
+def test_run_refuses_a_file_with_a_misspelt_key_in_one_line(tmp_path, capsys) -> None:
     path = tmp_path / "typo.json"
     path.write_text(to_json(run_config()).replace("stiffness", "stifness"), encoding="utf-8")
     assert main(["run", "--config", str(path), "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"hvf: {path}: mode.follow.stifness is not known; expected some of kind, stiffness, ")
+    stderr = capsys.readouterr().err
+    assert stderr.startswith(f"hvf: {path}: mode.follow.stifness is not known; expected some of kind, stiffness, ")
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(("mode", "map", "does"), [("follow", "cylindrical", "lead"), ("lead", "led", "relaxed")])
-def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> None:
+def test_leading_hand_outside_lead_mode_is_refused(mode: str, map: str, does: str) -> None:
     text = f'{{"mode": {{"kind": "{mode}"}}, "map": {{"kind": "{map}"}}, "user": {{"does": "{does}"}}}}'
     with pytest.raises(ParameterError, match="a hand leads in the mode lead only"):
         from_json(RunConfig, text, "f.json")
 
 
 @pytest.mark.parametrize(
-    ("does", "actions", "says"),
+    ("does", "actions", "message"),
     [
         ("lead", {"pushes": PUSHES}, "a hand that leads follows its own path; leave out its pushes"),
         ("trace", {"person": persona("median"), "pushes": PUSHES}, "a person either pushes or has the intent 'trace'"),
@@ -348,15 +349,25 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
         ("trace", {"grabs": GRABS}, 'a hand that traces cannot grab; choose user="relaxed", push or turn'),
     ],
 )
-def test_actions_that_a_hand_would_not_do_are_refused(does: str, actions: dict[str, Any], says: str) -> None:
-    with pytest.raises(ParameterError, match=says):
+def test_contradictory_hand_actions_are_refused(does: str, actions: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         User(does=does, **actions)  # pyright: ignore[reportArgumentType]
 
 
-def test_a_figure_that_is_not_there_is_not_led_in_a_run_and_its_walker_is_on_a_device() -> None:
+def test_lead_without_figure_is_refused_in_a_run_and_allowed_on_a_device() -> None:
     with pytest.raises(ParameterError, match=r"^the mode lead with the figure none: nobody to lead"):
         run_config(mode="lead", figure="none")
     led = run_config(mode="lead")
     with pytest.raises(ParameterError, match="nobody to lead"):
         wire(replace(led, figure=replace(led.figure, kind="none")))
     assert session_of(served(led)).servo.argument.shape == (7,)
+
+
+@pytest.mark.parametrize("mode", [cls().kind for cls in MODES])
+def test_configuration_of_every_mode_round_trips_through_its_file(mode: str, tmp_path: Path) -> None:
+    from experiments.config.part import to_json
+
+    config = config_of_options(parsed(["run", "--mode", mode, "--seconds", "3"]).options)
+    file = tmp_path / "config.json"
+    file.write_text(to_json(config))
+    assert config_of_options(parsed(["run", "--config", str(file)]).options) == config == load_config(file)

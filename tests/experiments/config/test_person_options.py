@@ -1,4 +1,4 @@
-"""A person in a configuration: by name on the command line, whole in the file, refused in one line."""
+"""A person in a configuration: by name on the command line, written out in the file, invalid ones refused."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,25 +19,25 @@ from sim.users.person.person import Person
 from sim.users.person.population import population
 
 
-def test_a_person_by_name_lies_whole_in_the_file() -> None:
+def test_named_person_is_written_out_in_the_file() -> None:
     config = run_config(person="novice", user="trace")
     assert config.user.person == hvf.persona("novice")
     assert from_json(RunConfig, to_json(config), "here") == config
     assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
 
 
-def test_a_person_is_kept_or_replaced_when_a_configuration_is_changed() -> None:
+def test_changed_configuration_keeps_or_replaces_the_person() -> None:
     config = run_config(person="7:2")
     assert changed(config, {"seconds": 3.0}).user.person == population(3, 7)[2]
     assert changed(config, {"person": "elder"}).user.person == hvf.persona("elder")
 
 
-def test_without_a_person_the_hand_is_the_arm_that_it_was() -> None:
+def test_default_user_has_no_person() -> None:
     assert run_config().user.person is None
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ({"person": "nobody"}, "median, expert"),
         ({"user": "exaggerate"}, "add a person"),
@@ -45,22 +45,24 @@ def test_without_a_person_the_hand_is_the_arm_that_it_was() -> None:
         ({"user": "fly", "person": "median"}, "no user"),
     ],
 )
-def test_what_a_person_cannot_do_is_refused(words: dict[str, object], said: str) -> None:
-    with pytest.raises((ParameterError, SimError), match=said):
+def test_inapplicable_person_options_are_refused(words: dict[str, object], message: str) -> None:
+    with pytest.raises((ParameterError, SimError), match=message):
         run_config(**words)  # pyright: ignore[reportArgumentType]
 
 
-def test_a_wrong_number_in_a_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_person_number_in_file_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = to_json(run_config(person="median")).replace('"visual_delay": 0.2', '"visual_delay": -0.2')
     (tmp_path / "config.json").write_text(text)
     assert main(["run", "--config", str(tmp_path / "config.json"), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert "visual_delay" in said
-    assert "expected 0.15 to 0.25 s" in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert "visual_delay" in stderr
+    assert "expected 0.15 to 0.25 s" in stderr
+    assert stderr.count("\n") == 1
 
 
-def test_doings_of_a_run_become_a_person_s_intents() -> None:
+def test_user_actions_map_to_person_intents() -> None:
     user = run_config(person="median", user="exaggerate").user
     assert isinstance(intent_of(user), Exaggerate)
     assert isinstance(intent_of(replace(user, does="push", pushes=(hvf.Push(1.0, 1.0, 2.0),))), Press)
@@ -69,20 +71,20 @@ def test_doings_of_a_run_become_a_person_s_intents() -> None:
     )
 
 
-def test_an_intent_without_a_person_is_refused() -> None:
+def test_intent_without_person_is_refused() -> None:
     user = hvf.User(intent=hvf.intents.Trace())
     with pytest.raises(ParameterError, match="person"):
         user.hand(hvf.circle(), 1.0, 1)
 
 
-def test_laws_say_which_there_are_and_print_as_a_table(tmp_path: Path) -> None:
+def test_unknown_user_law_is_refused_with_the_known_names(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="fitts, scatter"):
         user_laws(2, 1, ("gravity",))
     assert main(["users", "--people", "0", "--out", str(tmp_path)]) == 2
     assert lines([])[0].split() == ["here", "published", "source"]
 
 
-def test_numbers_of_a_person_can_be_changed_one_by_one() -> None:
+def test_single_person_parameter_can_be_replaced() -> None:
     person = replace(hvf.persona("median"), grip=4.0)
     assert isinstance(person, Person)
     assert person.grip == 4.0

@@ -1,4 +1,4 @@
-"""Compilation before a run: what it needs is known before it is wired, and only what is missing is compiled."""
+"""Compilation before a run: its units are known before wiring, and only missing ones are compiled."""
 
 import os
 import sys
@@ -20,8 +20,8 @@ from sim.errors import SimError
 TOYS = Path(__file__).parents[2] / "sim" / "compilation"
 
 
-class _Told(Exception):
-    """Stops a wiring when it has said what it needs."""
+class _UnitsAnnounced(Exception):
+    """Ends wiring once it has announced its units."""
 
 
 def _names(units: tuple[Unit, ...]) -> list[str]:
@@ -29,7 +29,7 @@ def _names(units: tuple[Unit, ...]) -> list[str]:
 
 
 def _stop(units: tuple[Unit, ...]) -> None:
-    raise _Told(units)
+    raise _UnitsAnnounced(units)
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TOYS), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.syspath_prepend(str(TOYS))
     unit_function.cache_clear()
-    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # compiled for another folder
+    monkeypatch.delitem(sys.modules, "toy_kernels", raising=False)  # as imported for another cache folder
     import toy_kernels  # pyright: ignore[reportMissingImports]
 
     vector = types.Array(types.float64, 1, "C")
@@ -49,34 +49,34 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     )
 
 
-def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
+def test_missing_units_are_compiled_in_parallel_and_reported_once(toys, capsys):
     assert missing_units((*toys, *toys)) == (toys[1], toys[0])
     compiler(Console())(toys)
-    told = capsys.readouterr().out
-    assert "Compiling" in told
-    assert "2 of 2" in told
+    stdout = capsys.readouterr().out
+    assert "Compiling" in stdout
+    assert "2 of 2" in stdout
     assert missing_units(toys) == ()
     compiler(Console())(toys)
     assert not capsys.readouterr().out
 
 
-def test_only_what_is_missing_is_compiled(toys):
-    done: list[Unit] = []
+def test_only_missing_units_are_compiled(toys):
+    compiled: list[Unit] = []
     toys[0].load()
-    compile_units(toys, done.append)
-    assert done == [toys[1]]
+    compile_units(toys, compiled.append)
+    assert compiled == [toys[1]]
 
 
 @pytest.mark.slow
-def test_what_cannot_be_compiled_is_left_to_the_run(toys):
-    done: list[Unit] = []
+def test_unit_that_fails_to_compile_stays_missing(toys):
+    compiled: list[Unit] = []
     wrong = Unit(toys[0].module, "other", (types.float64, types.float64))
-    compile_units((wrong, toys[1]), done.append)
-    assert done == [toys[1]]
+    compile_units((wrong, toys[1]), compiled.append)
+    assert compiled == [toys[1]]
     assert missing_units((wrong, toys[1])) == (wrong,)
 
 
-def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
+def test_no_process_starts_if_no_unit_is_missing(toys, monkeypatch):
     for unit in toys:
         unit.load()
     monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
@@ -84,16 +84,16 @@ def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
     assert missing_units(toys) == ()
 
 
-def test_a_unit_is_a_function_of_a_module():
+def test_unknown_unit_function_is_refused():
     with pytest.raises(SimError, match="no_such"):
         unit_function("sim.world.plant", "no_such")
     assert "toy_kernels" not in sys.modules or hasattr(sys.modules["toy_kernels"], "force")
 
 
-def test_a_robot_arm_says_what_it_needs_before_it_is_made():
-    with pytest.raises(_Told) as told:
+def test_robot_arm_run_announces_its_units_before_wiring():
+    with pytest.raises(_UnitsAnnounced) as stopped:
         wire(run_config(map="robot-arm"), ready=_stop)
-    assert _names(told.value.args[0]) == [
+    assert _names(stopped.value.args[0]) == [
         "run_block", "update_reference", "robot_torque", "robot_arm_map", "follow_wrench", "_poses_along",
     ]  # fmt: skip
 
@@ -112,19 +112,19 @@ def test_a_robot_arm_says_what_it_needs_before_it_is_made():
     ],
     ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
 )
-def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: list[str]):
-    with pytest.raises(_Told) as told:
+def test_run_announces_its_units_before_wiring(config: RunConfig, more: list[str]):
+    with pytest.raises(_UnitsAnnounced) as stopped:
         wire(config, ready=_stop)
-    names = _names(told.value.args[0])
+    names = _names(stopped.value.args[0])
     update = "update_river_reference" if config.mode.kind == "rivers" else "update_reference"
     assert names[:3] == ["run_block", update, "figure_torque"]
     assert set(more) <= set(names)
 
 
-def test_runs_of_the_figure_share_the_loop_and_all_that_drives_it():
+def test_modes_share_the_units_of_loop_and_figure():
     parts: list[tuple[Unit, ...]] = []
     for config in (run_config(), run_config(mode="bunny"), run_config(mode="lead")):
-        with pytest.raises(_Told) as told:
+        with pytest.raises(_UnitsAnnounced) as stopped:
             wire(config, ready=_stop)
-        parts.append(told.value.args[0][:3])
+        parts.append(stopped.value.args[0][:3])
     assert parts[0] == parts[1] == parts[2]

@@ -22,13 +22,13 @@ def joints(fps: float, frames: int, first: int) -> dict[str, np.ndarray]:
 
 
 def empty(fps: float) -> None:
-    """Begin with an empty scene at a rate."""
+    """Reset to an empty scene at a frame rate."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = round(fps), round(fps) / fps
 
 
 def main(glb: str, bvh: str, out: str, back: str, fps: float, frames: int) -> None:
-    """Import both, and export."""
+    """Import both files, write the joint positions, and export BVH."""
     empty(fps)
     bpy.ops.import_scene.gltf(filepath=glb)
     from_gltf = joints(fps, frames, 0)

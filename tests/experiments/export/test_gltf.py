@@ -1,4 +1,4 @@
-"""glTF and BVH of the figure in Blender: joints where they are here, and back from there without a loss."""
+"""glTF and BVH of the figure in Blender: joint positions agree, and BVH round-trips without loss."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from models.mocap.readers.own_bvh import write_bvh
 pytest.importorskip("pygltflib")
 
 FRAMES = 40
-BLENDER = os.environ.get("BLENDER_PYTHON", sys.executable)  # a Python of its own: bpy wants an older NumPy
+BLENDER = os.environ.get("BLENDER_PYTHON", sys.executable)  # a separate Python, for bpy needs an older NumPy
 
 
 def joints_of(clip: Clip) -> Array:
@@ -54,7 +54,7 @@ def rows(document: dict, binary: bytes, accessor: int) -> Array:
     return values.reshape(item["count"], width).astype(float) / largest
 
 
-def test_its_nodes_turned_by_its_animation_put_every_joint_where_the_figure_has_it(tmp_path: Path) -> None:
+def test_animated_nodes_reproduce_joint_positions(tmp_path: Path) -> None:
     clip, file = embedded("backflip"), tmp_path / "flip.glb"
     write_bvh(clip, tmp_path / "flip.bvh")
     assert main(["convert", str(tmp_path / "flip.bvh"), str(file)]) == 0
@@ -88,7 +88,7 @@ def test_its_nodes_turned_by_its_animation_put_every_joint_where_the_figure_has_
             np.testing.assert_allclose(place[[2, 0, 1]], places[frame, node], atol=2e-6)
 
 
-def test_its_skin_is_the_figure_at_rest_and_every_vertex_goes_with_one_joint(tmp_path: Path) -> None:
+def test_skin_is_the_figure_at_rest_with_one_joint_per_vertex(tmp_path: Path) -> None:
     from experiments.export.gltf import write_gltf
 
     write_gltf(embedded("walk"), tmp_path / "walk.glb")
@@ -111,7 +111,7 @@ def test_its_skin_is_the_figure_at_rest_and_every_vertex_goes_with_one_joint(tmp
     assert high[0] == pytest.approx(-low[0], abs=1e-3)  # left and right
 
 
-def test_a_file_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_file_is_not_replaced_without_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_bvh(embedded("walk"), tmp_path / "walk.bvh")
     (tmp_path / "walk.glb").write_bytes(b"mine")
     assert main(["convert", str(tmp_path / "walk.bvh"), str(tmp_path / "walk.glb")]) == 2
@@ -120,7 +120,7 @@ def test_a_file_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.slow
-def test_blender_has_the_joints_where_they_are_here_and_its_own_bvh_comes_back_the_same(tmp_path: Path) -> None:
+def test_blender_reproduces_joint_positions_and_its_bvh_round_trips(tmp_path: Path) -> None:
     if subprocess.run([BLENDER, "-c", "import bpy"], capture_output=True, check=False).returncode:
         pytest.skip("no Blender: BLENDER_PYTHON names no Python that can import bpy (pip install 'bpy==4.5.*')")
     from experiments.export.gltf import write_gltf
@@ -132,16 +132,16 @@ def test_blender_has_the_joints_where_they_are_here_and_its_own_bvh_comes_back_t
     write_bvh(clip, paths[1])
     script = Path(__file__).with_name("in_blender.py")
     command = [BLENDER, str(script), *map(str, paths), str(clip.fps), str(FRAMES)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
     places = joints_of(clip)
-    seen = np.stack((places[..., 1], -places[..., 0], places[..., 2]), axis=-1)  # Blender's axes: facing −Y
-    with np.load(paths[2]) as there:
-        assert there["meshes"] >= 1
+    expected = np.stack((places[..., 1], -places[..., 0], places[..., 2]), axis=-1)  # Blender's axes: facing −Y
+    with np.load(paths[2]) as in_blender:
+        assert in_blender["meshes"] >= 1
         for kind in ("gltf", "bvh"):
             for k, segment in enumerate(SEGMENTS):
-                apart = np.linalg.norm(there[f"{kind} {segment.joint}"] - seen[:, k], axis=1)
-                assert apart.max() < 1e-3, (kind, segment.joint)
+                distance = np.linalg.norm(in_blender[f"{kind} {segment.joint}"] - expected[:, k], axis=1)
+                assert distance.max() < 1e-3, (kind, segment.joint)
     back = load(paths[3])
     assert back.report is None  # it is the figure's own skeleton, not another's
     difference = pose_difference(back.clip.poses, clip.poses)

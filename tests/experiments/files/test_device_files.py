@@ -1,4 +1,4 @@
-"""Device files: what the program writes is read again, and what no device can be is refused by name."""
+"""Device files: written files are read back, and implausible values are refused by name."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ def refusal(file: Path, **content: object) -> str:
     return str(refused.value)
 
 
-def test_what_identify_and_calibrate_write_is_read_again(tmp_path: Path) -> None:
+def test_files_of_identify_and_calibrate_are_read_back(tmp_path: Path) -> None:
     file, content = tmp_path / "device.json", json.loads(Path("examples/hidden.json").read_text())
     for step in (
         lambda base: identified_json(FOUND, ["a"], base),  # the offset of this base has no margin
@@ -35,7 +35,7 @@ def test_what_identify_and_calibrate_write_is_read_again(tmp_path: Path) -> None
     assert content["recordings"] == ["b"]
 
 
-def test_keys_that_are_not_known_are_refused_with_those_that_are(tmp_path: Path) -> None:
+def test_unknown_keys_are_refused_with_the_known_ones(tmp_path: Path) -> None:
     file, three = tmp_path / "device.json", {"value": [0.01, 0.01, 0.01]}
     assert "(couloumb is not known, only format, coulomb, viscous, inertia, offset, delay" in refusal(
         file, couloumb=three
@@ -46,7 +46,7 @@ def test_keys_that_are_not_known_are_refused_with_those_that_are(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("name", "entry", "says"),
+    ("name", "entry", "message"),
     [("coulomb", {"value": [0.01, 0.01]}, "coulomb.value has 2 numbers, not 3"),
      ("offset", {"value": [0, 0, 0], "margin": [1e-4, 1e-4]}, "offset.margin has 2 numbers, not 3"),
      ("delay", {"value": [1e-4, 1e-4]}, "delay.value has 2 numbers, not 1"),
@@ -55,5 +55,5 @@ def test_keys_that_are_not_known_are_refused_with_those_that_are(tmp_path: Path)
      ("viscous", {"value": [True, 0, 0]}, "viscous.value True is not from"),
      ("offset", {"value": [0, 0, 0], "margin": [1e-4, -1e-4, 0]}, "offset.margin -0.0001 is not from 0 to inf")],
 )  # fmt: skip
-def test_numbers_that_no_device_has_are_refused(tmp_path: Path, name: str, entry: dict, says: str) -> None:
-    assert says in refusal(tmp_path / "device.json", **{name: entry})
+def test_implausible_device_numbers_are_refused(tmp_path: Path, name: str, entry: dict, message: str) -> None:
+    assert message in refusal(tmp_path / "device.json", **{name: entry})

@@ -1,4 +1,4 @@
-"""What is printed for other programs is JSON, whatever was measured."""
+"""JSON output is strict JSON for any measured value."""
 
 import json
 
@@ -16,7 +16,7 @@ from sim.recording.recording import Recording
 
 
 def strictly(text: str) -> object:
-    """The value, by a reader that takes nothing that JSON has not."""
+    """The value, by a parser that refuses NaN and Infinity."""
 
     def refuse(constant: str) -> None:
         raise ValueError(constant)
@@ -24,7 +24,7 @@ def strictly(text: str) -> object:
     return json.loads(text, parse_constant=refuse)
 
 
-def test_a_number_that_is_not_finite_is_null_wherever_it_is() -> None:
+def test_non_finite_numbers_become_null() -> None:
     value = {"a": np.inf, "b": [1.5, (float("nan"), "Infinity")], "c": {"d": np.float64(-np.inf), "e": 2, "f": None}}
     assert strictly(json_text(value)) == {
         "a": None,
@@ -33,7 +33,7 @@ def test_a_number_that_is_not_finite_is_null_wherever_it_is() -> None:
     }
 
 
-def test_an_infinite_number_of_a_configuration_is_json_in_every_file_of_a_run(tmp_path) -> None:
+def test_infinite_configuration_values_are_strict_json_in_all_run_files(tmp_path) -> None:
     words = ["--figure", "none", "--walls", "--joint-speed", "inf", "--tube", "inf", "--seconds", "0.1"]
     assert main(["run", *words, "--out", str(tmp_path)]) == 0
     config = run_config(figure="none", walls=True, joint_speed=np.inf, tube=np.inf, seconds=0.1, flow="curve")
@@ -48,7 +48,7 @@ def test_an_infinite_number_of_a_configuration_is_json_in_every_file_of_a_run(tm
         assert config_of(recording) == config
 
 
-def test_a_file_of_another_program_may_have_its_own_word_for_an_infinite_number(tmp_path) -> None:
+def test_nonstandard_infinity_token_is_read(tmp_path) -> None:
     (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "tube": Infinity}}', encoding="utf-8")
     assert load_config(tmp_path / "mine.json") == run_config(tube=np.inf)
     (tmp_path / "mine.json").write_text('{"mode": {"kind": "follow", "stiffness": "Infinity"}}', encoding="utf-8")
@@ -57,7 +57,7 @@ def test_a_file_of_another_program_may_have_its_own_word_for_an_infinite_number(
 
 
 @pytest.mark.slow
-def test_the_report_of_a_map_is_json_also_where_it_is_singular(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lift_report_of_singular_map_is_strict_json(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lift", "walk", "--out", str(tmp_path / "map.npz"), "--json"]) == 0
     report = strictly(capsys.readouterr().out)
     assert isinstance(report, dict)

@@ -1,7 +1,9 @@
-"""Maps in files: they come back to the last bit, a file that is none is refused, and a run takes its map from one."""
+"""Map files: exact round trip, refusal of other files, and runs that take their map from a file."""
 
 import json
+import random
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from models.world.scene import SceneConfig
 from sim.errors import SimError
 from sim.recording.recorder import Group, Recorder
 from sim.world.world import World
+from tests.experiments.refused_command import refused
 
 R, Z = (0.03, 0.06), (-0.02, 0.02)
 
@@ -45,22 +48,22 @@ def lifted():
     return Lifted(clips(), [True, True, False], angles, sites, legs(), ("walk", "a/b", "../jump"))
 
 
-def swaying():
+def swaying_cylindrical():
     h_map = Cylindrical([*clips(), clips()[0]], R, Z, legs())
     return h_map.with_sway(np.random.default_rng(3).normal(scale=0.01, size=(24, len(h_map.mixtures), 2)))
 
 
-def apart():
+def separate_composite():
     return Composite(*clips(), (1, 2, 3), R, legs(), apart=True).with_share(0.5)
 
 
-def upper_body():
+def upper_body_cylindrical():
     return Cylindrical([*clips(), clips()[0]], R, Z, legs(), upper=(3, 4), legs_of=2).with_share(0.25)
 
 
-@pytest.mark.parametrize("made", [swaying, apart, lifted, upper_body])
-def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
-    haptic_map, path = made(), tmp_path / "map.npz"
+@pytest.mark.parametrize("make_map", [swaying_cylindrical, separate_composite, lifted, upper_body_cylindrical])
+def test_map_round_trips_exactly_through_its_file(make_map, tmp_path):
+    haptic_map, path = make_map(), tmp_path / "map.npz"
     save_map(haptic_map, path)
     again = load_map(path)
     assert type(again) is type(haptic_map)
@@ -71,7 +74,7 @@ def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
         np.testing.assert_array_equal(again.pose(stylus), haptic_map.pose(stylus))
 
 
-def test_a_damaged_file_is_refused_by_name(tmp_path):
+def test_damaged_map_file_is_refused_by_name(tmp_path):
     whole, damaged = tmp_path / "whole.npz", tmp_path / "damaged.npz"
     save_map(lifted(), whole)
     data, rng = whole.read_bytes(), np.random.default_rng(1)
@@ -85,7 +88,7 @@ def test_a_damaged_file_is_refused_by_name(tmp_path):
         flipped = bytearray(data)
         flipped[at : at + 64] = rng.bytes(64)
         damaged.write_bytes(bytes(flipped))
-        # Padding of the archive may be anything; what is read is whole, or is refused.
+        # Damage in the padding of the archive is harmless: the map is either read completely or refused.
         try:
             again = load_map(damaged)
         except SimError:
@@ -93,7 +96,7 @@ def test_a_damaged_file_is_refused_by_name(tmp_path):
         np.testing.assert_array_equal(again.compiled().params, lifted().compiled().params)
 
 
-def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
+def test_file_of_another_content_is_refused(tmp_path):
     path = tmp_path / "other.npz"
     write_arrays(path, "RiverBundle", {"one": np.zeros(3)})
     with pytest.raises(SimError, match=r"other\.npz: holds a RiverBundle; expected a map: one of Cylindrical, Comp"):
@@ -111,7 +114,7 @@ def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("key", ["clip/walk/fps", "closed/a/b", "sites", "limb/1/axis", "margin", "angles/../jump"])
-def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
+def test_map_file_with_missing_or_wrong_array_is_refused(key, tmp_path):
     path, arrays = tmp_path / "map.npz", lifted().arrays()
     del arrays[key]
     write_arrays(path, "Lifted", arrays)
@@ -127,7 +130,7 @@ def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
         load_map(path)
 
 
-def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
+def test_map_file_of_another_format_version_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "map.npz"
     monkeypatch.setattr("experiments.files.map_files.VERSION", 2)
     write_arrays(path, "Lifted", {})
@@ -136,7 +139,7 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
         load_map(path)
 
 
-def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
+def test_run_takes_map_and_clips_from_a_file(tmp_path):
     path = tmp_path / "map.npz"
     save_map(lifted(), path)
     session = wire(run_config(map=str(path), seconds=1.0))
@@ -145,7 +148,7 @@ def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
     assert any("clips are those of the map: walk, a/b" in remark for remark in session.remarks)
 
 
-def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
+def test_map_with_another_pose_size_is_refused(tmp_path):
     path = tmp_path / "map.npz"
     small = [(np.ascontiguousarray(poses[:, :19]), fps) for poses, fps in clips()]
     save_map(Cylindrical([*small, small[0]], R, Z), path)
@@ -154,23 +157,23 @@ def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_path, capsys):
+def test_map_file_is_certified_along_all_curves_with_its_clips(tmp_path, capsys):
     path = tmp_path / "map.npz"
     save_map(lifted(), path)
     command = ["certify", "--map", str(path), "--no-hand", "--json", "--out", str(tmp_path)]
     assert main(command) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {name for name in told if name.startswith("stability")} == {
+    result = json.loads(capsys.readouterr().out)
+    assert {name for name in result if name.startswith("stability")} == {
         "stability", "stability_a/b", "stability_../jump",
     }  # fmt: skip
-    assert told["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
+    assert result["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
     assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
     assert main([*command, "--curve", "a/b", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: curve;" in capsys.readouterr().err
     assert main([*command, "--curve", "hop"]) == 2
 
 
-def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_path, capsys):
+def test_run_with_changed_map_file_is_not_reproduced(tmp_path, capsys):
     path, folder = tmp_path / "map.npz", tmp_path / "run"
     folder.mkdir()
     save_map(lifted(), path)
@@ -179,12 +182,26 @@ def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_
     groups = {"ticks": Group(1000.0, {"t": ()}), "frames": Group(100.0, {"t": ()})}
     with Recorder(folder / RECORDING, to_dict(config), 1, groups, static) as recorder:
         recorder.append("ticks", {"t": np.zeros(1)})
-    save_map(swaying(), path)
+    save_map(swaying_cylindrical(), path)
     assert main(["reproduce", str(folder)]) == 2
-    told = capsys.readouterr().err
-    assert f"{path}: the map has changed since the run was recorded" in told
-    assert map_digest(path)[:12] in told
-    assert str(static["map_sha256"])[:12] in told
+    stderr = capsys.readouterr().err
+    assert f"{path}: the map has changed since the run was recorded" in stderr
+    assert map_digest(path)[:12] in stderr
+    assert str(static["map_sha256"])[:12] in stderr
     path.unlink()
     assert main(["reproduce", str(folder)]) == 2
     assert "No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", ["noise", "pickled", "text"])
+def test_non_map_file_is_refused_without_mentioning_pickle(
+    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "map.npz"
+    if content == "pickled":
+        np.savez(path, version=np.array([1, None], dtype=object), kind="Lifted", keys=[])
+    else:
+        path.write_bytes(random.Random(1).randbytes(3000) if content == "noise" else b"hello")
+    stderr = refused(["run", "--map", str(path), "--out", str(tmp_path / "run")], capsys)
+    assert stderr.endswith("is no file of a map, or damaged; expected what hvf lift writes\n")
+    assert "pickle" not in stderr

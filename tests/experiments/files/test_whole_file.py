@@ -1,4 +1,4 @@
-"""A file that is being written is not seen, and what interrupts it leaves what was there."""
+"""Atomic writing of files: an unfinished file is never visible, and an interrupt keeps the old content."""
 
 import errno
 from pathlib import Path
@@ -15,7 +15,7 @@ from experiments.files.whole_file import whole_file
 from experiments.lifting import lift_file
 
 
-def test_a_file_is_there_once_it_is_closed(tmp_path: Path) -> None:
+def test_file_appears_only_once_closed(tmp_path: Path) -> None:
     path = tmp_path / "map.npz"
     path.write_bytes(b"old")
     with whole_file(path) as file:
@@ -31,7 +31,7 @@ def _plain(path: Path) -> Path:
     return path
 
 
-def test_a_link_to_a_file_stays_one(tmp_path: Path) -> None:
+def test_symbolic_link_is_preserved(tmp_path: Path) -> None:
     path, link = _plain(tmp_path / "device.json"), tmp_path / "link.json"
     link.symlink_to(path)
     save_device({"format": 1}, link)
@@ -47,7 +47,7 @@ def _interrupted(path: Path, what: Any) -> None:
 
 @pytest.mark.parametrize("what", [KeyboardInterrupt, MemoryError, OSError(errno.ENOSPC, "No space left on device")])
 @pytest.mark.parametrize("before", [None, b"old"])
-def test_what_interrupts_a_file_leaves_what_was_there(tmp_path: Path, before: bytes | None, what: Any) -> None:
+def test_interrupted_write_keeps_the_old_content(tmp_path: Path, before: bytes | None, what: Any) -> None:
     path = tmp_path / "map.npz"
     if before is not None:
         path.write_bytes(before)
@@ -56,7 +56,7 @@ def test_what_interrupts_a_file_leaves_what_was_there(tmp_path: Path, before: by
     assert [entry.read_bytes() for entry in tmp_path.iterdir()] == ([] if before is None else [before])
 
 
-def test_an_archive_that_is_interrupted_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_archive_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -66,7 +66,7 @@ def test_an_archive_that_is_interrupted_is_not_there(tmp_path: Path, monkeypatch
     assert not list(tmp_path.iterdir())
 
 
-def test_a_lift_that_is_interrupted_leaves_nothing(
+def test_interrupted_lift_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupted(*_: object) -> None:

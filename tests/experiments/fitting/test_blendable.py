@@ -1,4 +1,4 @@
-"""What cannot be blended, or is off its pace, is said before a run, on every map."""
+"""Remarks before a run on clips that cannot be blended or are off their pace, for every kind of map."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,16 +20,16 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 
 
-def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
+def test_clips_that_turn_over_or_fly_are_reported() -> None:
     walk, jump, flip = embedded("walk"), embedded("jump"), embedded("backflip")
     assert not_blendable((walk, walk)) == not_blendable((flip, flip)) == ()
-    said = not_blendable((walk, flip, jump))
-    assert len(said) == 2
-    assert said[0].startswith("backflip turns over")
-    assert said[1].startswith("jump flies for 0.")
+    remarks = not_blendable((walk, flip, jump))
+    assert len(remarks) == 2
+    assert remarks[0].startswith("backflip turns over")
+    assert remarks[1].startswith("jump flies for 0.")
 
 
-def test_a_mean_of_clips_wants_them_near_their_own_pace_and_nearer_where_one_flies() -> None:
+def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
     walk, angry, run = embedded("walk"), embedded("angry"), embedded("run")
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in (walk, angry, run)]
     slower = replace(loops[1], duration=0.8 * loops[0].duration)
@@ -39,16 +39,16 @@ def test_a_mean_of_clips_wants_them_near_their_own_pace_and_nearer_where_one_fli
     assert not keeps_pace((walk, angry), (loops[0], slowest), loops[0].duration)
 
 
-def test_a_lap_is_timed_by_the_first_clip_that_stays_on_the_floor() -> None:
+def test_lap_is_timed_by_the_first_grounded_clip() -> None:
     run, walk, cheer = embedded("run"), embedded("walk"), embedded("cheer")
     assert [grounded(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
-    # At this lap the cheer is off its pace, so nothing but arms is blended, and each goes at its own.
-    made = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
-    assert made.haptic_map.legs_of == 1
-    assert not any("run at" in remark or "walk at" in remark for remark in made.remarks)
+    # At this lap the cheer is off its pace, so only arms are blended, and each clip keeps its own pace.
+    parts = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
+    assert parts.haptic_map.legs_of == 1
+    assert not any("run at" in remark or "walk at" in remark for remark in parts.remarks)
 
 
-def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace() -> None:
+def test_map_remarks_name_flying_and_off_pace_clips() -> None:
     config = run_config(map="composite", mode="follow", clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
     flies, paced = map_parts(config, figure_model()).remarks
     assert flies.startswith("jump flies for 0.")
@@ -64,7 +64,7 @@ def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace() -> None:
         (("squat_dance", "cheer", "walk"), 1.3, 3, (0.92, 0.77, 0.85)),
     ],
 )
-def test_clips_of_rivers_are_played_in_the_fewest_laps_that_keep_their_pace(clips, lap, laps, paces) -> None:
+def test_river_clips_use_the_fewest_laps_that_keep_pace(clips, lap, laps, paces) -> None:
     config = run_config(map="rivers", mode="rivers", clips=clips, lap=lap, seconds=1.0)
     parts = map_parts(config, figure_model())
     assert parts.haptic_map.laps == laps
@@ -73,14 +73,14 @@ def test_clips_of_rivers_are_played_in_the_fewest_laps_that_keep_their_pace(clip
     assert any("a round of the clips takes" in remark for remark in parts.remarks) == (laps > 1)
 
 
-def test_rivers_whose_clips_no_round_keeps_at_their_pace_say_so() -> None:
+def test_rivers_without_a_matching_period_are_reported() -> None:
     config = run_config(map="rivers", mode="rivers", clips=("spin", "angry", "squat_dance"), lap=0.5, seconds=1.0)
     parts = map_parts(config, figure_model())
     assert parts.haptic_map.laps == 4
     assert any("4 laps of 0.5 s play spin at" in remark for remark in parts.remarks)
 
 
-def test_the_lap_of_a_run_is_not_advised_to_it() -> None:
+def test_current_lap_is_not_advised() -> None:
     clips = embedded("angry"), embedded("jump")
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
     lap = natural_lap(loops)
@@ -88,34 +88,36 @@ def test_the_lap_of_a_run_is_not_advised_to_it() -> None:
     assert off_pace(clips, in_step(loops, lap), lap, 1, 0)[0].endswith("; no lap suits them all better")
 
 
-def test_one_lap_is_advised_to_a_run() -> None:
+def test_run_gets_one_lap_advice() -> None:
     session = wire(run_config(map="composite", figure="none", clips=("walk", "cheer", "cheer"), lap=1.2, seconds=1.0))
     assert sum("--lap" in remark for remark in session.remarks) == 1
 
 
-def test_a_lifted_map_names_what_lies_next_to_no_motion(tmp_path: Path) -> None:
+def test_lifted_map_remarks_name_clips_that_turn_over(tmp_path: Path) -> None:
     clips = [embedded(name) for name in ("walk", "backflip")]
     angles = [2.0 * np.pi * np.linspace(0.0, 1.0, clip.n_frames) for clip in clips]
     sites = np.tile([[0.045, 0.0], [0.055, 0.0]], (16, 1, 1))
-    made = Lifted([(clip.poses, clip.fps) for clip in clips], [True] * 2, angles, sites, names=["walk", "backflip"])
-    save_map(made, tmp_path / "map.npz")
+    haptic_map = Lifted(
+        [(clip.poses, clip.fps) for clip in clips], [True] * 2, angles, sites, names=["walk", "backflip"]
+    )
+    save_map(haptic_map, tmp_path / "map.npz")
     remarks = map_parts(run_config(map=str(tmp_path / "map.npz"), seconds=1.0), figure_model()).remarks
     assert any(remark.startswith("backflip turns over") for remark in remarks)
     assert not any("walk" in remark and "flies" in remark for remark in remarks)
 
 
-def test_a_round_of_two_laps_bounds_the_hand_as_one_does_in_half_of_the_lap_each() -> None:
+def test_two_lap_period_scales_admissible_speeds_like_one_lap() -> None:
     shares = []
     for lap in (2.4, 1.2):
         config = run_config(map="rivers", mode="rivers", clips=("walk", "jump", "walk"), lap=lap, seconds=1.0)
         parts = map_parts(config, figure_model())
-        made = parts.haptic_map
-        assert isinstance(made, RiverClips)
-        assert made.laps == round(2.4 / lap)
-        speeds = speeds_along(parts, made.curves[1], 1)
+        haptic_map = parts.haptic_map
+        assert isinstance(haptic_map, RiverClips)
+        assert haptic_map.laps == round(2.4 / lap)
+        speeds = speeds_along(parts, haptic_map.curves[1], 1)
         # At the clip's own pace the hand is admitted; a flight bounds it from below.
         assert (speeds[:, 0].max() * lap, speeds[:, 1].min() * lap) == pytest.approx(
-            (1.03 * made.curves[1].length, 1.04 * made.curves[1].length), rel=0.02
+            (1.03 * haptic_map.curves[1].length, 1.04 * haptic_map.curves[1].length), rel=0.02
         )
         shares.append(np.mean(speeds[:, 0] > 0.0))
     # The flight lasts as long, of a lap half as long.
@@ -123,7 +125,7 @@ def test_a_round_of_two_laps_bounds_the_hand_as_one_does_in_half_of_the_lap_each
 
 
 @pytest.mark.parametrize(("kind", "lap"), [("composite", 4.8), ("cylindrical", 4.0)])
-def test_the_advised_lap_keeps_the_pace_of_the_clip_whose_legs_play(kind: str, lap: float) -> None:
+def test_advised_lap_keeps_pace_of_the_leg_clip(kind: str, lap: float) -> None:
     """Two jumps of 2.4 s: a composite has the legs of its first clip, a cylinder those of one that does not fly."""
     config = run_config(map=kind, figure="none", clips=("jump", "ginga", "angry"), lap=1.4, seconds=1.0)
     assert any(f"--lap {lap:.1f} suits them best" in remark for remark in map_parts(config, figure_model()).remarks)

@@ -1,4 +1,4 @@
-"""Blends of the embedded clips: feet that stand do not slide nor sink, and the floor can give what they ask for."""
+"""Blends of the embedded clips: standing feet neither slide nor sink, and the floor can provide the needed forces."""
 
 from functools import cache
 
@@ -20,11 +20,11 @@ CONFIG = run_config(seconds=1.0)
 FIGURE_CLIPS = Cylindrical().clips
 STANDING = ("walk", "cheer", "angry", "squat_dance")
 STEPPING = (("walk", "run"), ("ginga", "walk"))
-ALIKE = (("cheer", "angry"), ("cheer", "ginga"))  # blended as a whole, legs and all
+SIMILAR = (("cheer", "angry"), ("cheer", "ginga"))  # blended as a whole, legs and all
 SLOWER = (("ginga", "cheer", "walk", "angry"), ("ginga", "walk", "run", "spin"))
 ROWS = 160
 MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
-MANY = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
+DENSE_MIXTURES = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
 
 
 @cache
@@ -32,12 +32,12 @@ def map_of(clips):
     return wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
 
 
-def slower(values):
+def slow_params(values):
     return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 def laps(h_map, r, z, rows=ROWS, count=1.0):
-    """Poses of a hand that goes round evenly, at a place of the half plane in units of the reach."""
+    """Poses for a hand on a circle at constant speed, at (r, z) in units of the reach."""
     angles = 2 * np.pi * (np.arange(int(rows * count)) + 0.5) / rows
     reach = CONFIG.map.reach
     radius = CONFIG.map.around.radius + r * reach
@@ -59,7 +59,7 @@ def soles(poses):
 
 
 def slide(places):
-    """Largest way over the floor of a sphere while it touches, from where it came down [m]."""
+    """Largest distance over the floor of a sphere in contact from its touch-down [m]."""
     worst, start = 0.0, [None] * places.shape[1]
     for frame in places:
         for k, place in enumerate(frame):
@@ -71,23 +71,23 @@ def slide(places):
     return worst
 
 
-@pytest.mark.parametrize("clips", ALIKE)
-def test_clips_that_move_alike_are_blended_legs_and_all(clips):
+@pytest.mark.parametrize("clips", SIMILAR)
+def test_similar_clips_are_blended_including_legs(clips):
     assert map_of(clips).upper == ()
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slower((STANDING, *STEPPING, *ALIKE, *SLOWER))])
-def test_feet_of_in_betweens_do_not_slide_nor_sink(clips):
-    for r, z in MANY:
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slow_params((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
+def test_in_between_feet_neither_slide_nor_sink(clips):
+    for r, z in DENSE_MIXTURES:
         places = soles(laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.02, (r, z)
         assert places[..., 2].min() > -0.007, (r, z)
 
 
 @pytest.mark.parametrize(
-    "clips", [("walk", "angry", "cheer"), *slower([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
+    "clips", [("walk", "angry", "cheer"), *slow_params([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
 )
-def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
+def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
     h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
     places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
     for feet in places:
@@ -95,9 +95,9 @@ def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
         np.testing.assert_allclose(feet, places[0], atol=1e-9)
 
 
-# The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
-@pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
-def test_the_floor_gives_in_betweens_what_they_ask_for(clips, most, usual):
+# The walk's legs carry the arms of the other three: a mean of all at its pace would lack up to 0.14, 0.04 on average.
+@pytest.mark.parametrize(("clips", "max_share", "mean_share"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
+def test_floor_can_provide_the_forces_of_in_betweens(clips, max_share, mean_share):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
         poses = laps(map_of(clips), r, z, count=1.0 + 4 / ROWS)
@@ -107,5 +107,5 @@ def test_the_floor_gives_in_betweens_what_they_ask_for(clips, most, usual):
         left = residual(demand, floor.grip(demand, soles(q)[..., 2] < PUSHES))[:, :3] / floor.body_weight
         shares.append(float(np.sqrt((left**2).sum(axis=1).mean())))
     # Hicks et al. 2015: good below 5 %; where a walk has just begun to fade, a little more.
-    assert max(shares) < most
-    assert np.mean(shares) < usual
+    assert max(shares) < max_share
+    assert np.mean(shares) < mean_share

@@ -1,4 +1,4 @@
-"""Whose legs carry the arms of others is decided by the physical figure, and what none of them bears is said."""
+"""The choice of the clip whose legs carry the arms of the others, by trials of the physical figure."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from models.mocap.library import embedded
 R, Z, LAP = (0.0227, 0.0727), (-0.025, 0.025), 4.4
 LEGS = figure_legs(figure_model())
 NAMES = ("run", "walk", "cheer", "angry")
-STANDS = np.inf
+NEVER = np.inf
 
 
 @pytest.fixture(scope="module")
@@ -24,79 +24,81 @@ def maps() -> list[Cylindrical]:
     return [Cylindrical(motions, R, Z, LEGS, None, LAP, arms(LEGS), owner) for owner in range(4)]
 
 
-def judged(monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int]) -> list[object]:
-    """Verdicts by whose legs they are and the share of others' arms, and whose legs are sound; what was asked for."""
-    asked: list[object] = []
+def set_verdicts(
+    monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int]
+) -> list[object]:
+    """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials."""
+    trials: list[object] = []
 
-    def verdict(made: Cylindrical, lap: float, parallel: bool) -> Verdict:
-        asked.append((made.legs_of, made.share))
-        return verdicts.get((made.legs_of, made.share), Verdict(0.5, 1.0))
+    def verdict(haptic_map: Cylindrical, lap: float, parallel: bool) -> Verdict:
+        trials.append((haptic_map.legs_of, haptic_map.share))
+        return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
 
     monkeypatch.setattr(rule, "verdict_on", verdict)
-    monkeypatch.setattr(rule, "sound", lambda made, lap, parallel: made.legs_of in fit)
-    return asked
+    monkeypatch.setattr(rule, "sound", lambda haptic_map, lap, parallel: haptic_map.legs_of in fit)
+    return trials
 
 
-def test_legs_are_the_first_that_carry_the_others_well(
+def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, NEVER), (3, 1.0): Verdict(0.01, NEVER)}
+    trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
+    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    assert (best.legs_of, best.share, remarks) == (1, 1.0, ())
+    assert trials == [(0, 1.0), (1, 1.0)]
+
+
+def test_legs_with_least_residual_are_chosen_if_none_bear_well(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
-    asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, told = carried(maps.__getitem__, NAMES, LAP, False)
-    assert (best.legs_of, best.share, told) == (1, 1.0, ())
-    assert asked == [(0, 1.0), (1, 1.0)]
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, NEVER), (3, 1.0): Verdict(0.08, NEVER)}
+    trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
+    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    assert (best.legs_of, best.share, remarks) == (3, 1.0, ())
+    assert trials == [(owner, 1.0) for owner in range(4)]
 
 
-def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
+def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
-    asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, told = carried(maps.__getitem__, NAMES, LAP, False)
-    assert (best.legs_of, best.share, told) == (3, 1.0, ())
-    assert asked == [(owner, 1.0) for owner in range(4)]
+    set_verdicts(monkeypatch, {(1, 1.0): Verdict(0.2, NEVER), (2, 0.25): Verdict(0.08, NEVER)}, {0, 1, 2, 3})
+    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    assert (best.legs_of, best.share, remarks) == (2, 0.25, ())
 
 
-def test_arms_that_no_legs_bear_are_blended_in_by_less(
+def test_sliding_legs_are_chosen_only_as_a_last_resort(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    judged(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
-    best, told = carried(maps.__getitem__, NAMES, LAP, False)
-    assert (best.legs_of, best.share, told) == (2, 0.25, ())
-
-
-def test_legs_that_slide_are_taken_only_where_no_others_stand(
-    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
-    judged(monkeypatch, verdicts, {1, 2, 3})
+    verdicts = {(0, 1.0): Verdict(0.01, NEVER), (1, 0.0): Verdict(0.06, NEVER)}
+    set_verdicts(monkeypatch, verdicts, {1, 2, 3})
     assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 1
-    judged(monkeypatch, {(0, 1.0): Verdict(0.01, STANDS)}, {1, 2, 3})
+    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.01, NEVER)}, {1, 2, 3})
     assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
-def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
-    judged(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
-    best, told = carried(maps.__getitem__, NAMES, LAP, False)
+def test_unbearable_map_is_reported_with_the_best_legs(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    set_verdicts(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
+    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
-    assert told == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
-    judged(monkeypatch, {(1, 0.0): Verdict(0.14, STANDS)}, set())
+    assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
+    set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, NEVER)}, set())
     assert carried(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
         "the physical figure lacks 14 % of weight with the legs of walk"
     )
 
 
 @pytest.mark.parametrize(("parallel", "paces"), [(False, (1.0 / 1.178, 1.0 / 0.822)), (True, (1.0, 1.0))])
-def test_the_hand_that_tries_a_map_sees_all_of_it(
+def test_trial_hand_covers_the_whole_map(
     parallel: bool, paces: tuple[float, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places: list[np.ndarray] = []
 
-    def seen(made: Cylindrical, points: np.ndarray) -> np.ndarray:
+    def record_points(haptic_map: Cylindrical, points: np.ndarray) -> np.ndarray:
         places.append(points)
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
-    monkeypatch.setattr(rule, "map_poses", seen)
+    monkeypatch.setattr(rule, "map_poses", record_points)
     toured(maps[1], LAP, parallel)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
@@ -109,7 +111,7 @@ def test_the_hand_that_tries_a_map_sees_all_of_it(
 
 
 @pytest.mark.slow
-def test_a_walk_carries_arms_that_throw_a_run_down(maps: list[Cylindrical]) -> None:
+def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
     assert sound(maps[1], LAP, False)
     walk, run = verdict_on(maps[1], LAP, False), verdict_on(maps[0], LAP, False)
     assert walk.bearable

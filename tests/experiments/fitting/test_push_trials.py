@@ -1,4 +1,4 @@
-"""A lifted map whose hand is pushed off its curve: how much of it the physical figure follows, and what is said."""
+"""Trials of a lifted map with a hand pushed off its curve: what the physical figure follows, and the remarks."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,58 +21,58 @@ from models.mocap.motion.clip import pose_difference
 
 @pytest.fixture(scope="module")
 def lifted() -> Lifted:
-    # So narrow that a push reaches the other curve's clip.
+    # Narrow, so that a push reaches the clip of the other curve.
     return lift_clips(("squat_dance", "cheer"), Room((0.04, 0.06), (-0.01, 0.01))).haptic_map
 
 
-def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
-    shown = push_trials.toured(lifted, curve, True).poses
+    pushed = push_trials.toured(lifted, curve, True).poses
     monkeypatch.setattr(push_trials, "_PUSH_OFFSET", 0.0)
-    alone = push_trials.toured(lifted, curve, True).poses
-    apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
-    times = np.arange(len(shown)) / 120.0
-    assert apart[times < 1.69].max() < 1e-9
-    assert apart[(times > 2.1) & (times < 4.7)].min() > 1e-3
-    assert apart.max() > 0.05
+    unpushed = push_trials.toured(lifted, curve, True).poses
+    difference = np.abs(pose_difference(unpushed, pushed)[:, 6:]).max(axis=1)
+    times = np.arange(len(pushed)) / 120.0
+    assert difference[times < 1.69].max() < 1e-9
+    assert difference[(times > 2.1) & (times < 4.7)].min() > 1e-3
+    assert difference.max() > 0.05
 
 
-def test_a_hand_whose_field_does_not_keep_its_pace_is_late_outside_and_early_inside(lifted: Lifted) -> None:
+def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    late = np.arange(360) / 120.0 - push_trials._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
-    assert np.abs(late[:61]).max() < 1e-12
+    lateness = np.arange(360) / 120.0 - push_trials._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    assert np.abs(lateness[:61]).max() < 1e-12
     # On radii of 40 to 60 mm.
-    assert 8.0 / 68.0 < late[180] < 8.0 / 48.0
-    assert late[359] < late[240]
+    assert 8.0 / 68.0 < lateness[180] < 8.0 / 48.0
+    assert lateness[359] < lateness[240]
 
 
 FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
-WHOLE = "pushed off its curve to those beside it, the physical figure {} with the whole map"
+WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure {} with the whole map"
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "legs", "share", "said"),
+    ("verdicts", "legs", "share", "expected"),
     [
         ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
-        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE.format("falls at 3.0 s"),)),
+        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
         (
             {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
-            1, 0.5, (WHOLE.format("lacks 20 % of weight"),),
+            1, 0.5, (WHOLE_MAP_REMARK.format("lacks 20 % of weight"),),
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.09, np.inf), 0.5: Verdict(0.08, np.inf), 0.25: Verdict(0.1, np.inf),
              0.0: Verdict(0.1, np.inf)},
-            1, 0.5, (WHOLE.format("falls at 3.0 s"),),
+            1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),),
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
-            1, 0.5, (WHOLE.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
+            1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
         ),
     ],
 )  # fmt: skip
-def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it_bears(
-    verdicts: dict[str | float, Verdict], legs: int | None, share: float, said: tuple[str, ...], lifted: Lifted,
+def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
+    verdicts: dict[str | float, Verdict], legs: int | None, share: float, expected: tuple[str, ...], lifted: Lifted,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     def tried(module: str, show: Callable[[], Lifted], *_: object) -> Verdict:
@@ -82,33 +82,31 @@ def test_the_figure_keeps_its_clips_legs_and_the_most_of_the_others_arms_that_it
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(push_trials, "tried", tried)
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: True)
-    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
-    assert (part.legs_of, part.share, told) == (legs, share, said)
+    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    assert (part.legs_of, part.share, remarks) == (legs, share, expected)
 
 
-def test_where_feet_skate_on_the_whole_map_the_figure_keeps_its_clips_legs_though_it_would_bear_it(
-    lifted: Lifted, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(push_trials, "tried", lambda *_: Verdict(0.01, np.inf))
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
-    part, told = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
-    assert "feet skate" in told[0]
+    assert "feet skate" in remarks[0]
 
 
-def test_legs_of_a_pushed_figure_are_its_own_clips_and_do_not_slide(lifted: Lifted) -> None:
+def test_legs_of_pushed_figure_equal_its_own_clip(lifted: Lifted) -> None:
     curve = lifted.curve(1)
-    kept = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
-    alone = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
-    pushed, own = (push_trials.toured(part, curve, True).poses for part in (kept, alone))
-    apart = np.abs(pose_difference(pushed, own))
+    with_arms = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
+    without_arms = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
+    pushed, own = (push_trials.toured(part, curve, True).poses for part in (with_arms, without_arms))
+    difference = np.abs(pose_difference(pushed, own))
     upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
-    assert apart[:, upper].max() > 0.01
-    assert np.delete(apart, upper, axis=1).max() < 1e-6
+    assert difference[:, upper].max() > 0.01
+    assert np.delete(difference, upper, axis=1).max() < 1e-6
 
 
-def test_a_curve_plays_its_clip_at_that_clips_pace_and_nobody_is_told_of_a_lap(lifted: Lifted, tmp_path: Path) -> None:
+def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_path: Path) -> None:
     save_map(lifted, tmp_path / "map.npz")
     parts = map_parts(run_config(map=str(tmp_path / "map.npz"), curve="cheer"), figure_model())
     assert parts.lap_seconds == parts.curve.duration == pytest.approx(lifted.curve(1).duration)

@@ -1,4 +1,4 @@
-"""What the keys of who stands beside a device do: Enter arms, and lets go; nothing that was typed before counts."""
+"""Keys of the operator beside a device: Enter arms and disarms; keys typed earlier are ignored."""
 
 import errno
 import os
@@ -17,11 +17,11 @@ from sim.hardware.controls import RecorderStatus, RunStatus
 from sim.hardware.gated_servo import ROW_SIZE, columns
 
 ROW = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
-Script = dict[int, Callable[["Stand"], object]]
+Script = dict[int, Callable[["ScriptedRun"], object]]
 
 
-class Stand:
-    """A run without processes: what is asked for happens at once; the script has what else happens, by poll."""
+class ScriptedRun:
+    """A run without processes: requests take effect at once, and a script has further events by poll number."""
 
     def __init__(self, script: Script):
         self.script, self.looks, self.asked = script, 0, list[int]()
@@ -44,8 +44,8 @@ class Stand:
 
 
 @pytest.fixture
-def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
-    """A terminal in place of this one; types into it."""
+def type_keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
+    """A pseudo-terminal as stdin; the function types into it."""
     ours, theirs = os.openpty()
     with open(theirs, encoding="utf-8") as terminal:
         monkeypatch.setattr(sys, "stdin", terminal)
@@ -53,59 +53,67 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]
     os.close(ours)
 
 
-def test_a_recording_that_has_ended_is_said_once_and_with_its_reason(keys, capsys) -> None:
-    stand, console = Stand({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
+def test_end_of_recording_is_reported_once_with_its_reason(type_keys, capsys) -> None:
+    stand, console = ScriptedRun({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
-    said = capsys.readouterr().out
-    assert said.count("The recording has ended (No space left on device) after 700 ticks") == 1
+    stdout = capsys.readouterr().out
+    assert stdout.count("The recording has ended (No space left on device) after 700 ticks") == 1
 
 
-def _fills_the_disk(stand: Stand) -> None:
+def _fills_the_disk(stand: ScriptedRun) -> None:
     stand.recorded = RecorderStatus(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
 
 
-def asked(script: Script, arm: bool = False) -> list[int]:
-    """What is asked of a run that the script ends with Ctrl-C, if with nothing else."""
-    stand = Stand(script | {30: _interrupt})
+def requests_of(script: Script, arm: bool = False) -> list[int]:
+    """Requests to a run that ends with Ctrl-C, unless the script ends it before."""
+    stand = ScriptedRun(script | {30: _interrupt})
     attend(stand, 60.0, SimpleNamespace(arm=arm, dead_man=True), Console(quiet=True))  # type: ignore[arg-type]
     return stand.asked
 
 
-def _interrupt(stand: Stand) -> None:
+def _interrupt(stand: ScriptedRun) -> None:
     raise KeyboardInterrupt
 
 
 @pytest.mark.slow
-def test_enter_arms_and_another_lets_go(keys) -> None:
-    assert asked({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
-    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
-    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
+def test_enter_toggles_arming(type_keys) -> None:
+    assert requests_of({3: lambda _: type_keys(b"\n")}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: lambda _: type_keys(b"\n")}) == [ARM, DISARM, DISARM]
+    assert (
+        requests_of({3: lambda _: type_keys(b"\n"), 6: lambda _: type_keys(b"\n"), 9: lambda _: type_keys(b"\n")})[2]
+        == ARM
+    )
 
 
-def test_what_was_typed_before_the_question_arms_nothing(keys) -> None:
-    keys(b"\n\n")
-    assert asked({}) == [DISARM]
+def test_keys_typed_before_the_prompt_are_ignored(type_keys) -> None:
+    type_keys(b"\n\n")
+    assert requests_of({}) == [DISARM]
 
 
-def test_an_enter_that_was_meant_for_a_force_clears_no_fault(keys) -> None:
-    def typed_and_fails(stand: Stand) -> None:
-        keys(b"\n")
+def test_enter_typed_before_a_fault_does_not_clear_it(type_keys) -> None:
+    def typed_and_fails(stand: ScriptedRun) -> None:
+        type_keys(b"\n")
         stand.fails()
 
-    assert asked({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
 
 
-def test_a_fault_is_cleared_by_an_enter_after_it(keys) -> None:
-    assert asked({3: lambda _: keys(b"\n"), 6: Stand.fails, 9: lambda _: keys(b"\n")}) == [ARM, CLEAR, ARM, DISARM]
+def test_enter_after_a_fault_clears_it(type_keys) -> None:
+    assert requests_of({3: lambda _: type_keys(b"\n"), 6: ScriptedRun.fails, 9: lambda _: type_keys(b"\n")}) == [
+        ARM,
+        CLEAR,
+        ARM,
+        DISARM,
+    ]
 
 
-def test_the_end_of_the_input_ends_the_run_and_is_no_enter(keys) -> None:
-    stand = Stand({3: lambda _: keys(b"\x04")})
+def test_end_of_input_ends_the_run_without_arming(type_keys) -> None:
+    stand = ScriptedRun({3: lambda _: type_keys(b"\x04")})
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
     assert stand.asked == [DISARM]
     assert stand.looks < 10
 
 
-def test_with_nobody_at_the_keys_a_fault_ends_the_run(keys) -> None:
-    keys(b"\n")
-    assert asked({4: Stand.fails}, arm=True) == [ARM]
+def test_unattended_run_ends_at_a_fault(type_keys) -> None:
+    type_keys(b"\n")
+    assert requests_of({4: ScriptedRun.fails}, arm=True) == [ARM]

@@ -1,4 +1,4 @@
-"""The folder of a hardware run, and its summary: one run at a time, and no more than what is known of it."""
+"""The folder and summary of a hardware run: one run at a time, and unknown values are marked as unknown."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -35,8 +35,8 @@ def record(out: Path, ticks: int) -> None:
             recorder.append("ticks", {"state": np.zeros(ticks)})
 
 
-def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
-    """A run that Ctrl-C ends once it has made its recording, or before, with so many ticks."""
+def interrupted_run(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
+    """A run that Ctrl-C ends, with a recording of so many ticks; None: before it has one."""
     with run_folder(options(out, overwrite)):
         if ticks is not None:
             record(out, ticks)
@@ -45,7 +45,7 @@ def stopped(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool
         raise KeyboardInterrupt
 
 
-def test_no_other_run_is_written_into_it_meanwhile(tmp_path: Path) -> None:
+def test_concurrent_run_into_the_folder_is_refused(tmp_path: Path) -> None:
     with run_folder(options(tmp_path)):
         record(tmp_path, 3)
         with pytest.raises(SimError, match="another run is being written into it"):
@@ -60,39 +60,39 @@ def test_no_other_run_is_written_into_it_meanwhile(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ticks", [None, 0])
-def test_a_run_that_recorded_nothing_leaves_nothing(tmp_path: Path, ticks: int | None) -> None:
+def test_run_without_ticks_leaves_no_folder(tmp_path: Path, ticks: int | None) -> None:
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        stopped(out, ticks)
+        interrupted_run(out, ticks)
     assert not out.exists()
 
 
-def test_what_is_of_somebody_else_stays(tmp_path: Path) -> None:
+def test_foreign_files_are_kept(tmp_path: Path) -> None:
     (tmp_path / "figures").mkdir()
-    for mine in (tmp_path / "notes.txt", tmp_path / "figures" / "mine.tex"):
-        mine.write_text("mine")
+    for file in (tmp_path / "notes.txt", tmp_path / "figures" / "mine.tex"):
+        file.write_text("mine")
     with pytest.raises(KeyboardInterrupt):
-        stopped(tmp_path, 0, overwrite=True)
+        interrupted_run(tmp_path, 0, overwrite=True)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["figures", "mine.tex", "notes.txt"]
 
 
 @pytest.mark.parametrize("damaged", [False, True])
-def test_what_was_recorded_until_an_interrupt_or_cannot_be_read_is_kept(tmp_path: Path, damaged: bool) -> None:
+def test_interrupted_or_damaged_recording_is_kept(tmp_path: Path, damaged: bool) -> None:
     with pytest.raises(KeyboardInterrupt):
-        stopped(tmp_path, 3, damaged=damaged)
+        interrupted_run(tmp_path, 3, damaged=damaged)
     assert {path.name for path in tmp_path.iterdir()} == {"run.h5", "config.json"}
 
 
 @pytest.mark.parametrize("ticks", [None, 0])
-def test_of_a_servo_that_was_killed_nothing_is_told_that_is_not_known(tmp_path: Path, ticks: int | None) -> None:
+def test_outcome_of_killed_servo_marks_unknown_values(tmp_path: Path, ticks: int | None) -> None:
     if ticks is not None:
         record(tmp_path, ticks)
     ready = Ready(DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True), 1e-3, [])
     row = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
     last = RunStatus(False, State.ACTIVE, Fault.NONE, 0.0, row, None)
     outcome = outcome_of(tmp_path / "run.h5", ready, None, last)
-    said = "\n".join(outcome.lines())
-    assert "the servo was gone before it told how long they took" in said
-    assert "By how much the servo grew is not known" in said
-    told = outcome.to_json()
-    assert [told[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4
+    text = "\n".join(outcome.lines())
+    assert "the servo was gone before it told how long they took" in text
+    assert "By how much the servo grew is not known" in text
+    values = outcome.to_json()
+    assert [values[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4

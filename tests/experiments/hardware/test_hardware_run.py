@@ -1,4 +1,4 @@
-"""What a person meets who runs a device: permits, one line where something is wrong, a folder with what happened."""
+"""`hvf hardware run`, calibrate and identify: permits, refusals in one line, device files, and recordings."""
 
 import json
 import re
@@ -57,34 +57,34 @@ def found(**values: float) -> Identified:
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(["hardware", *arguments]) == 2
-    said = capsys.readouterr()
-    assert said.err.count("\n") == 1
-    return said.err
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    return captured.err
 
 
-def test_nobody_at_the_terminal_and_no_arm_is_refused(tmp_path: Path, capsys) -> None:
+def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -> None:
     assert "expected --arm" in refused(capsys, "run", "--out", str(tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 
-def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
+def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
-    said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
-    assert "expected --certificate" in said
+    stderr = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
+    assert "expected --certificate" in stderr
 
 
 @pytest.mark.parametrize(
     "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
 )
-def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
-    said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
-    assert limit[0] in said
-    assert "on a real device" in said
+def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
+    stderr = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
+    assert limit[0] in stderr
+    assert "on a real device" in stderr
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("option", "message"),
     [(("--user", "push"), "on a device: whoever holds the stylus is the hand"),
      (("--person", "median"), "on a device: whoever holds the stylus is the hand"),
      (("--figure", "physical"), "on a device: its figure is the animation"),
@@ -92,23 +92,23 @@ def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: P
      (("--mass", "60.0"), "on a device: its figure is the animation"),
      (("--delay", "5"), "without --certificate"), (("--emulate", "x.json", "--device", "hid"), "with --device hid")],
 )  # fmt: skip
-def test_what_changes_nothing_on_a_device_is_refused_by_name(tmp_path: Path, capsys, given, says) -> None:
-    said = refused(capsys, "run", "--arm", *given, "--out", str(tmp_path / "run"))
-    assert f"{given[0]} {given[1]} has no meaning {says}" in said
+def test_options_without_effect_on_a_device_are_refused_by_name(tmp_path: Path, capsys, option, message) -> None:
+    stderr = refused(capsys, "run", "--arm", *option, "--out", str(tmp_path / "run"))
+    assert f"{option[0]} {option[1]} has no meaning {message}" in stderr
     assert not (tmp_path / "run").exists()
 
 
-def test_an_emulated_device_is_silent_for_some_seconds_at_most(tmp_path: Path, capsys) -> None:
-    said = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
-    assert "--silence is 2e+06; expected at most 5000 periods" in said
+def test_excessive_silence_limit_is_refused(tmp_path: Path, capsys) -> None:
+    stderr = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
+    assert "--silence is 2e+06; expected at most 5000 periods" in stderr
 
 
-def test_a_folder_that_holds_a_run_is_kept(tmp_path: Path, capsys) -> None:
+def test_folder_with_a_run_is_kept_without_overwrite(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
     assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
 
 
-def test_a_certificate_of_something_else_arms_nothing(tmp_path: Path) -> None:
+def test_certificate_of_other_inputs_does_not_arm(tmp_path: Path) -> None:
     with pytest.raises(CertificateError, match="expected a certificate"):
         verified(tmp_path / "certificate.json", RunConfig(), 0.0)
     (tmp_path / "certificate.json").write_text(json.dumps({"inputs": "0" * 16, "parts": {}}))
@@ -116,12 +116,12 @@ def test_a_certificate_of_something_else_arms_nothing(tmp_path: Path) -> None:
         verified(tmp_path, RunConfig(), 0.0)
 
 
-def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: Path, monkeypatch) -> None:
-    for outcome, says in (("unknown", "stability is unknown"), ("certified", "")):
+def test_unknown_or_smaller_delay_certificate_does_not_arm(tmp_path: Path, monkeypatch) -> None:
+    for outcome, message in (("unknown", "stability is unknown"), ("certified", "")):
         certificate = Certificate({"stability": Verdict(outcome, "because")}, "0" * 16)
         monkeypatch.setattr("experiments.hardware.permit.verify_certificate", lambda file, inputs, c=certificate: c)
-        if says:
-            with pytest.raises(SimError, match=says):
+        if message:
+            with pytest.raises(SimError, match=message):
                 verified(tmp_path, RunConfig(), 0.0)
         else:
             assert verified(tmp_path, RunConfig(), 0.0) is certificate
@@ -132,7 +132,7 @@ def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: 
     assert verified(tmp_path, config, 1e-3)
 
 
-def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog_is_announced() -> None:
+def test_device_without_motors_or_calibration_is_refused() -> None:
     assert check_device(KNOWN, None) == []
     assert "no watchdog" in check_device(KNOWN._replace(watchdog=False), None)[0]
     assert "no Phantom by build" in check_device(KNOWN._replace(own_weight=True), None)[0]
@@ -143,7 +143,7 @@ def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog
         check_device(KNOWN._replace(forces=False), None)
 
 
-def test_a_calibration_is_of_one_device_and_outlives_no_power_up_of_encoders_that_forget() -> None:
+def test_calibration_is_valid_for_one_device_and_one_power_up() -> None:
     forgets = KNOWN._replace(calibrated=False, serial="7", power_up=3)
     assert check_device(forgets, Calibration("arm", "7", 3)) == []
     assert check_device(forgets._replace(calibrated=True, power_up=4), Calibration("arm", "7", 3)) == []
@@ -153,7 +153,7 @@ def test_a_calibration_is_of_one_device_and_outlives_no_power_up_of_encoders_tha
         check_device(forgets, Calibration("arm", "8", 3))
 
 
-def test_a_device_file_comes_back_as_it_was_and_changes_simulation_and_certificate(tmp_path: Path) -> None:
+def test_device_file_round_trips_and_changes_linkage_and_certificate(tmp_path: Path) -> None:
     file = tmp_path / "device.json"
     save_device(identified_json(found(coulomb2=0.02, offset3=-0.01, viscous1=-1e-6), ["a"], {}), file)
     linkage = linkage_from(read_device_file(file))
@@ -164,68 +164,68 @@ def test_a_device_file_comes_back_as_it_was_and_changes_simulation_and_certifica
     assert certificate_inputs(config, 0.0, HandRange(), 1.0)["device"] != plain["device"]
 
 
-def test_identify_and_calibrate_leave_in_a_device_file_what_the_other_found(tmp_path: Path) -> None:
+def test_identify_and_calibrate_keep_each_others_results(tmp_path: Path) -> None:
     calibrated = calibrated_json([0.01, -0.02, 0.03], [1e-4] * 3, KNOWN, {})
-    both = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
-    assert linkage_from(both).offset == pytest.approx((0.01, -0.019, 0.028))
-    assert both["calibration"] == {"name": "arm", "serial": "", "power_up": 0}
-    again = calibrated_json([0.0, 0.0, 0.5], [1e-4] * 3, KNOWN, both)
+    identified = identified_json(found(coulomb1=0.02, offset2=0.001, offset3=-0.002), ["a"], calibrated)
+    assert linkage_from(identified).offset == pytest.approx((0.01, -0.019, 0.028))
+    assert identified["calibration"] == {"name": "arm", "serial": "", "power_up": 0}
+    again = calibrated_json([0.0, 0.0, 0.5], [1e-4] * 3, KNOWN, identified)
     assert linkage_from(again).offset == (0.0, 0.0, 0.5)
-    assert linkage_from(again).coulomb == linkage_from(both).coulomb
+    assert linkage_from(again).coulomb == linkage_from(identified).coulomb
     save_device(again, tmp_path / "device.json")
     assert read_device_file(tmp_path / "device.json") == again
     config = RunConfig(device=Phantom(device_file=str(tmp_path / "device.json")))
-    save_device(both, tmp_path / "other.json")
+    save_device(identified, tmp_path / "other.json")
     other = RunConfig(device=Phantom(device_file=str(tmp_path / "other.json")))
     of, of_other = (certificate_inputs(c, 0.0, HandRange(), 1.0)["device"] for c in (config, other))
-    assert of == of_other  # where the zero is changes no verdict
+    assert of == of_other  # the encoder offset changes no verdict
 
 
 @pytest.mark.parametrize(
-    ("changed", "says"),
+    ("changed", "message"),
     [({"mode": Follow(stiffness=400.0)}, r"certifies another field or device: stiffness 300.0 \(here 400.0\)"),
      ({"clock": Clock(servo_period=0.002)}, r"servo_period 0.001 \(here 0.002\)"),
      ({"device": Phantom(cutoff=90.0)}, r"cutoff 150.0 \(here 90.0\)")],
 )  # fmt: skip
-def test_a_certificate_of_another_field_says_which_option_differs(tmp_path: Path, changed, says) -> None:
+def test_certificate_of_another_field_names_the_differing_option(tmp_path: Path, changed, message) -> None:
     config = resolved(RunConfig())
     inputs = certificate_inputs(config, 0.0, HandRange(), HAND_PUSH)
     certificate = Certificate({"stability": Verdict("certified", "it is")}, hash_of(inputs), hashes_of(inputs))
     (tmp_path / "certificate.json").write_text(json.dumps(certificate.to_json()))
     (tmp_path / OPTIONS).write_text(json_text(certified_options(config, 0.0, HandRange(), HAND_PUSH)))
     assert verified(tmp_path, config, 0.0).inputs == certificate.inputs
-    with pytest.raises(ChangedInputs, match=says) as refused:
+    with pytest.raises(ChangedInputs, match=message) as refused:
         verified(tmp_path, resolved(replace(RunConfig(), **changed)), 0.0)
     assert "\n" not in str(refused.value)
 
 
-def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_said(tmp_path: Path, capsys) -> None:
+def test_calibration_finds_hidden_offset_and_keeps_file_content(tmp_path: Path, capsys) -> None:
     hidden = {"format": "hvf-device-1", "offset": {"value": [0.02, -0.03, 0.015]}}
     file, other = tmp_path / "device.json", tmp_path / "hidden.json"
     save_device(hidden, other)
     save_device({"format": "hvf-device-1", "delay": {"value": [1e-4], "margin": [1e-5]}}, file)
     arguments = ["calibrate", "--emulate", str(other), "--out", str(file), "--seconds", "0.2"]
     assert main(["hardware", *arguments, "--pose", "0.1", "-0.2", "0.3"]) == 0
-    told = read_device_file(file)
-    margin = np.array(told["offset"]["margin"])
-    assert np.all(np.abs(np.array(told["offset"]["value"]) - [0.02, -0.03, 0.015]) <= margin)
+    content = read_device_file(file)
+    margin = np.array(content["offset"]["margin"])
+    assert np.all(np.abs(np.array(content["offset"]["value"]) - [0.02, -0.03, 0.015]) <= margin)
     assert margin.max() < 5e-4
-    assert told["delay"]["value"] == [1e-4]
-    assert told["calibration"]["name"] == "emulated Phantom"
+    assert content["delay"]["value"] == [1e-4]
+    assert content["calibration"]["name"] == "emulated Phantom"
     assert "--overwrite" in refused(capsys, *arguments)
     capsys.readouterr()
     assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == read_device_file(file)
 
 
-def test_a_fixture_holds_the_stylus_at_its_pose_without_sagging() -> None:
+def test_fixture_holds_the_stylus_without_sagging() -> None:
     device = Fixture((0.5, 0.9, 0.2), Linkage())
     for _ in range(200):
         device.write(np.zeros(3), False)
     np.testing.assert_allclose(device.port.qpos[list(device.port.arm_q)], [0.5, 0.9, 0.2], atol=1e-8)
 
 
-def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
+def test_moving_stylus_is_refused_for_calibration() -> None:
     device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)
     for _ in range(50):  # it falls
         device.write(np.zeros(3), False)
@@ -241,33 +241,31 @@ def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
      '{"format": "hvf-device-1", "viscous": {"value": [Infinity, 0, 0]}}',
      '{"format": "hvf-device-1", "delay": {"value": [NaN]}}'],
 )  # fmt: skip
-def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -> None:
+def test_invalid_device_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "device.json").write_text(text)
     with pytest.raises(SimError, match="expected what hvf hardware identify or calibrate writes"):
         read_device_file(tmp_path / "device.json")
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
+    ("content", "message"),
     [('{"format": "hvf-device-1", "delay": {"value": [0.5]}}', "a delay of 0.5 s; expected at most"),
      ('{"format": "hvf-device-1", "offset": {"value": [0.1, 0, 0]}}', "is not calibrated"),
      ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
 )  # fmt: skip
-def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_was(
-    tmp_path: Path, capsys, content, says
-) -> None:
-    file, kept = tmp_path / "device.json", tmp_path / "run" / "kept"
-    kept.parent.mkdir()
-    kept.write_text("")
+def test_invalid_emulated_device_is_refused_and_the_folder_unchanged(tmp_path: Path, capsys, content, message) -> None:
+    file, old_file = tmp_path / "device.json", tmp_path / "run" / "kept"
+    old_file.parent.mkdir()
+    old_file.write_text("")
     if content is not None:
         file.write_text(content)
-    assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
-    assert list(kept.parent.iterdir()) == [kept]
+    assert message in refused(
+        capsys, "run", "--arm", "--emulate", str(file), "--out", str(old_file.parent), "--overwrite"
+    )
+    assert list(old_file.parent.iterdir()) == [old_file]
 
 
-def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_again_or_drawn(
-    tmp_path: Path, capsys
-) -> None:
+def test_device_recording_is_certified_but_not_reproduced_or_drawn(tmp_path: Path, capsys) -> None:
     config = run_config(figure="none", seconds=1.0)
     static = {"curve": [[0.0, 0.0, 0.0]], "clip_names": "", "clip_fps": np.zeros(0)}
     channels = {"ticks": Group(1e3, {"t": (), "clock": ()})}
@@ -279,13 +277,13 @@ def test_a_recording_of_a_device_is_certified_by_its_configuration_and_not_run_a
         assert "is of a device" in capsys.readouterr().err
 
 
-def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> None:
+def test_identify_refuses_folders_without_a_hardware_run(tmp_path: Path, capsys) -> None:
     assert "expected folders" in refused(capsys, "identify", "--out", str(tmp_path / "device.json"))
     (tmp_path / "device.json").write_text("{}")
     assert "--overwrite" in refused(capsys, "identify", str(tmp_path), "--out", str(tmp_path / "device.json"))
 
 
-def test_the_diagram_of_the_documents_is_the_table() -> None:
+def test_state_diagram_in_docs_matches_transition_table() -> None:
     picture = (Path(__file__).parents[3] / "docs" / "pictures" / "gate-states.svg").read_text(encoding="utf-8")
     shown = {edge.replace("&gt;", ">") for edge in re.findall(r'data-edge="([^"]*)"', picture)}
     edges = {f"{a.name} --> {b.name}: {event.name}".lower() for (a, event), b in TRANSITIONS.items()}
@@ -293,17 +291,17 @@ def test_the_diagram_of_the_documents_is_the_table() -> None:
 
 
 @pytest.mark.processes
-def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tmp_path: Path, capsys) -> None:
+def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",
                  "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
-    for _ in range(3):  # a machine that is too busy for the device is no failure of ours
+    for _ in range(3):  # retried, for a busy machine misses deadlines
         code = main([*arguments, "--overwrite"])
-        said = capsys.readouterr().out
-        if "no new reading" not in said:
+        stdout = capsys.readouterr().out
+        if "no new reading" not in stdout:
             break
-    assert code == 0, said
-    assert "mm RMS from the curve" in said
+    assert code == 0, stdout
+    assert "mm RMS from the curve" in stdout
     summary = json.loads((out / "summary.json").read_text())
     assert summary["ticks"] > 500
     assert summary["active"] > 1.0
@@ -314,9 +312,7 @@ def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tm
 
 
 @pytest.mark.processes
-def test_hidden_numbers_are_calibrated_recorded_and_identified_from_the_command_line(
-    tmp_path: Path, monkeypatch
-) -> None:
+def test_hidden_device_parameters_are_identified_from_the_command_line(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     hidden = {
         "coulomb": [0.012, 0.009, 0.011], "viscous": [0.001, 0.0012, 0.0009], "inertia": [3e-4, 1e-4, 8e-5],
@@ -331,9 +327,9 @@ def test_hidden_numbers_are_calibrated_recorded_and_identified_from_the_command_
     for lap in ("4", "2.5"):
         assert main(["hardware", *run, "--device-file", "device.json", "--lap", lap, "--out", f"runs/{lap}"]) in (0, 1)
     assert main(["hardware", "identify", "runs/4", "runs/2.5", "--out", "found.json"]) == 0
-    told = read_device_file(Path("found.json"))
+    found = read_device_file(Path("found.json"))
     for name, value in hidden.items():
-        assert np.all(np.abs(np.array(told[name]["value"]) - value) <= np.array(told[name]["margin"])), name
-    linkage = linkage_from(told)
+        assert np.all(np.abs(np.array(found[name]["value"]) - value) <= np.array(found[name]["margin"])), name
+    linkage = linkage_from(found)
     assert linkage_of(Phantom(device_file="found.json")) == linkage
     assert main(["run", "--figure", "none", "--seconds", "1", "--device-file", "found.json", "--out", "runs/sim"]) == 0

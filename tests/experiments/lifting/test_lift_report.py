@@ -1,11 +1,11 @@
-"""What `hvf lift` says of a map."""
+"""The report of `hvf lift`."""
 
 from controllers.haptic_map.lifting.room import Room
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.lift_report import report_lift
 
 
-def test_in_betweens_that_are_no_motion_are_named_with_what_a_run_does_about_them() -> None:
+def test_implausible_in_betweens_are_named_in_the_report() -> None:
     report = report_lift(lift_clips(["walk", "run"], Room()), 1)
     assert "No motion half way" not in str(report)
     (pair,) = report.quality.between

@@ -1,4 +1,4 @@
-"""How maps are measured: on maps whose separation, conditioning and smoothness are known in closed form."""
+"""Measures of map quality on maps whose separation, conditioning and smoothness are known in closed form."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ STANDING = Clip(np.tile(rest_pose(), (60, 1)), 60.0, "standing")
 
 
 class KnownMap:
-    """A map whose figure stands still, and whose derivative is what a function of the stylus position says."""
+    """A map of one constant pose, whose derivative is a given function of the stylus position."""
 
     def __init__(self, derivative):
         self.derivative, self.seen = derivative, []
@@ -57,7 +57,7 @@ def measured(known):
     return measure_map(known, (STANDING,), np.random.default_rng(3))
 
 
-def test_a_body_weight_is_what_the_mass_matrix_says():
+def test_joint_weights_match_the_mass_matrix():
     model = figure_model()
     data = mujoco.MjData(model)
     data.qpos = rest_pose()
@@ -71,16 +71,16 @@ def test_a_body_weight_is_what_the_mass_matrix_says():
     np.testing.assert_allclose(body_weights(), np.sqrt(moments / total), rtol=1e-9)
 
 
-def test_separation_is_the_least_distance_at_one_angle():
+def test_separation_is_the_least_distance_at_equal_angles():
     angles = TURN * np.arange(SAMPLES) / SAMPLES
     fixed = np.tile([0.05, 0.0], (SAMPLES, 1))
-    # Nearest at 90°, where the other is at (0.062, 0.005); at other angles it comes as near as 12 mm to no avail.
+    # Nearest at 90°, where the other is at (0.062, 0.005); smaller distances between different angles do not count.
     other = np.stack([0.072 - 0.01 * np.sin(angles), 0.005 * np.ones(SAMPLES)], axis=1)
     quality = measured(layout(lambda p: rows(np.eye(3), np.zeros((3, 3))), np.stack([fixed, other], axis=1)))
     assert quality.separation == pytest.approx(np.hypot(0.012, 0.005), rel=1e-9)
 
 
-def test_conditioning_counts_joints_by_how_far_they_move_the_body():
+def test_conditioning_weights_joints_by_body_motion():
     weight = body_weights()[ELBOW]
     # A millimetre along each of three axes moves the body by 1, 2 and 5: two of the root's, one of the elbow's.
     turns = np.zeros((3, 3))
@@ -90,7 +90,7 @@ def test_conditioning_counts_joints_by_how_far_they_move_the_body():
         np.testing.assert_allclose(found, 5.0, rtol=1e-9)
 
 
-def test_a_map_that_is_singular_on_some_curves_has_no_condition_there():
+def test_conditioning_is_infinite_on_singular_curves():
     # At the curve at r = 40 mm a move along the radius changes nothing, and at the other two it does.
     def derivative(p):
         out = p / max(np.hypot(p[0], p[1]), 1e-9) * [1.0, 1.0, 0.0]
@@ -103,7 +103,7 @@ def test_a_map_that_is_singular_on_some_curves_has_no_condition_there():
     np.testing.assert_allclose(quality.conditioning_between, 1.0)
 
 
-def test_roughness_is_the_relative_change_of_the_derivative_in_a_millimetre():
+def test_roughness_is_relative_change_of_derivative_per_millimetre():
     # h_* = e^{g z} h_*(0) changes by the share g |n_z| a metre in the direction n, and |n_z| is even in [0, 1].
     g = 40.0
     quality = measured(layout(lambda p: np.exp(g * p[2]) * rows(np.eye(3), np.eye(3)), [[0.04, 0.0], [0.06, 0.01]]))
@@ -112,7 +112,7 @@ def test_roughness_is_the_relative_change_of_the_derivative_in_a_millimetre():
     assert smooth.roughness == (0.0, 0.0)
 
 
-def test_an_in_between_is_half_way_at_the_mean_of_the_paces():
+def test_in_between_is_midway_with_mean_duration():
     known = layout(lambda p: rows(np.eye(3), np.eye(3)), [[0.04, -0.01], [0.07, 0.02]], np.array([2.0, 4.0]))
     clip = in_between(known, 0, 1)
     assert clip.n_frames / clip.fps == pytest.approx(3.0, rel=1e-9)
@@ -124,7 +124,7 @@ def test_an_in_between_is_half_way_at_the_mean_of_the_paces():
 
 
 @pytest.mark.parametrize("start", [0.0, 1.2, 5.0])
-def test_times_of_a_closed_clip_are_where_its_frames_have_the_angle(start):
+def test_lap_times_of_closed_clip_match_frame_angles(start):
     share, duration = np.linspace(0.0, 1.0, 4001), 2.5
     times = lap_times(start + TURN * (share + 0.1 * np.sin(TURN * share)), duration)
 
@@ -135,14 +135,14 @@ def test_times_of_a_closed_clip_are_where_its_frames_have_the_angle(start):
     np.testing.assert_allclose(times, expected, atol=1e-6)
 
 
-def test_an_open_clip_goes_through_its_gap_evenly():
+def test_lap_times_of_open_clip_cross_the_gap_at_constant_rate():
     # 5 rad in 2 s, so the lap takes as long as at that pace.
     times = lap_times(0.5 + 5.0 * np.linspace(0.0, 1.0, 50), 2.0)
     np.testing.assert_allclose(times, 2.0 / 5.0 * np.linspace(0.0, TURN, SAMPLES + 1), atol=1e-12)
 
 
 def moved(**changes):
-    """A figure in rest that is changed, frame by frame: `x`, `z` of the root, `knee` bent."""
+    """Measures of a figure at rest with changes per frame: `x` and `z` of the root, bent `knee`."""
     poses = np.tile(rest_pose(), (60, 1))
     poses[:, 0] += changes.get("x", 0.0)
     poses[:, 2] += changes.get("z", 0.0)
@@ -152,17 +152,17 @@ def moved(**changes):
     return measure_motion(Clip(poses, 60.0, "changed"))
 
 
-def test_what_is_wrong_with_a_motion_is_measured_as_far_as_it_is():
+def test_motion_faults_are_measured_quantitatively():
     still, s = measure_motion(STANDING), np.linspace(0.0, 1.0, 60)
     np.testing.assert_allclose(still, 0.0, atol=1e-3)
     assert moved(x=0.04 * s).slide == pytest.approx(0.04, abs=1e-9)
-    # Out and back: how far it was, not how far it went.
+    # Out and back: the largest distance counts, not the path length.
     assert moved(x=0.04 * np.sin(TURN * s)).slide == pytest.approx(0.04, rel=1e-2)
-    # What moves above the floor does not slide.
+    # A foot above the floor does not slide.
     assert moved(x=0.04 * s, z=0.0045).slide == 0.0
     assert moved(z=-0.01).penetration == pytest.approx(still.penetration + 0.01, abs=1e-9)
-    most = joint_range()[JOINTS.index("left_knee"), 1, 1]
-    assert moved(knee=most + 0.2 * s, z=0.5).limits == pytest.approx(0.2, abs=1e-9)
+    limit = joint_range()[JOINTS.index("left_knee"), 1, 1]
+    assert moved(knee=limit + 0.2 * s, z=0.5).limits == pytest.approx(0.2, abs=1e-9)
     poses = np.tile(STANDING.poses[0], (10, 1))
     elbow = 7 + 4 * JOINTS.index("left_elbow")
     # Bent by 155° and twisted by 100° it is within its range, though the shorter rotation vector is not.

@@ -18,28 +18,28 @@ from sim.errors import SimError
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 1.0, 2.6])
-def test_the_outline_of_the_figure_at_rest_is_as_high_as_it_and_as_wide_as_its_arms(azimuth: float) -> None:
+def test_outline_of_figure_at_rest_has_its_height_and_arm_span(azimuth: float) -> None:
     corners = np.concatenate([outline.corners for outline in Silhouettes().outlines(rest_pose(), azimuth)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     assert low[1] == pytest.approx(0.0, abs=2e-3)
     assert high[1] == pytest.approx(1.75, abs=0.03)
-    # Along the arms nothing of their span of 1.8 m is seen, across them all of it.
+    # Seen along the arms their span of 1.8 m vanishes, seen across them all of it is visible.
     assert high[0] - low[0] == pytest.approx(max(0.3, 1.82 * abs(np.cos(azimuth))), abs=0.2)
 
 
-def test_what_is_behind_is_drawn_first() -> None:
-    outlines = Silhouettes().outlines(rest_pose(), 0.5 * np.pi)  # looking to the left: the left arm is further off
+def test_farther_bodies_are_drawn_first() -> None:
+    outlines = Silhouettes().outlines(rest_pose(), 0.5 * np.pi)  # looking to the left: the left arm is farther away
     order = [outline.body for outline in outlines]
     assert order.index("left_hand") < order.index("right_hand")
 
 
-def test_every_figure_says_what_it_is_and_of_which_run() -> None:
+def test_every_drawing_has_a_number_and_its_runs() -> None:
     assert [drawing.number for drawing in DRAWINGS] == list(range(1, 9))
     assert {name for drawing in DRAWINGS for name in drawing.runs} == set(configs())
     assert all(isinstance(config, RunConfig) for config in configs().values())
 
 
-def test_figures_that_are_there_are_not_drawn_over_unasked(tmp_path: Path) -> None:
+def test_existing_figures_are_not_replaced_without_overwrite(tmp_path: Path) -> None:
     (tmp_path / PAGE).write_text("mine")
     with pytest.raises(SimError, match="--overwrite"):
         draw_all(tmp_path, time.perf_counter())
@@ -47,23 +47,23 @@ def test_figures_that_are_there_are_not_drawn_over_unasked(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_all_eight_are_drawn_from_their_runs_as_pdf_and_png(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_eight_figures_are_written_as_pdf_and_png(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         offscreen_backend()
     except NoGraphics as error:
         pytest.skip(str(error))
     monkeypatch.setattr("experiments.paper_figures.draw.DPI", 60)
-    # Faster: nobody looks at the pages of these runs, and their figures are only shown.
+    # Faster: no report pages, and kinematic figures.
     monkeypatch.setattr("experiments.results.pages.report_of.write_report", lambda *_: None)
-    shown = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
-    monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: shown)
+    kinematic = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
+    monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: kinematic)
     files = draw_all(tmp_path, time.perf_counter())
     assert len(files) == 8
     for file in files:
         assert file.stat().st_size > 8_000
         pdf = file.with_suffix(".pdf").read_bytes()
         assert pdf.startswith(b"%PDF")
-        # Vectors: only the rendered figure has a picture in it.
+        # Vector graphics: only the rendered figure contains a raster image.
         assert (b"/Subtype /Image" in pdf) == (file.stem == "figure-7")
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert len(re.findall(r"<figure ", page)) == 8

@@ -1,4 +1,4 @@
-"""How far a motion is from its file, on motions that are, and are made not to be, as the file has them."""
+"""Deviation of a motion from its file, for faithful motions and for ones altered by a known amount."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,7 +38,7 @@ def dance(tmp_path_factory):
 
 
 @pytest.mark.parametrize("rig", RIGS, ids=["plain", "other proportions", "without toes"])
-def test_a_motion_that_was_retargeted_is_as_in_the_file(rig, tmp_path):
+def test_retargeted_motion_deviates_little_from_its_file(rig, tmp_path):
     clip = embedded("squat_dance")
     write_rig(rig, Clip(clip.poses[:60], clip.fps, "dance"), tmp_path / "dance.bvh")
     found = deviation(*read(tmp_path / "dance.bvh"))
@@ -46,14 +46,14 @@ def test_a_motion_that_was_retargeted_is_as_in_the_file(rig, tmp_path):
     assert found.place < 0.01
 
 
-def test_where_on_the_floor_it_is_and_which_way_it_faces_does_not_count(dance):
+def test_deviation_ignores_place_and_heading(dance):
     source, poses = dance
-    there = PlanarDisplacement(3.0, -2.0, 2.5).moved(poses)
-    np.testing.assert_allclose(deviation(source, there)[::2], deviation(source, poses)[::2], atol=1e-6)
+    moved = PlanarDisplacement(3.0, -2.0, 2.5).moved(poses)
+    np.testing.assert_allclose(deviation(source, moved)[::2], deviation(source, poses)[::2], atol=1e-6)
 
 
 @pytest.mark.parametrize("line", [line for line in LINES if "_" in line])
-def test_a_turned_segment_is_found(dance, line):
+def test_turned_segment_is_detected(dance, line):
     """Its joint is turned about an axis across it in more than half of the frames."""
     source, poses = dance
     joint = {"upper_arm": "shoulder", "forearm": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -73,7 +73,7 @@ def test_a_turned_segment_is_found(dance, line):
     assert limb == "foot" or found.place > 0.03
 
 
-def test_a_body_that_leans_and_one_that_is_raised_are_not_as_in_the_file(dance):
+def test_leaning_and_raised_bodies_are_detected(dance):
     source, poses = dance
     lean, raised = poses.copy(), poses.copy()
     lean[:, 3:7] = quaternions.product(quaternions.about_axis(0, np.array(0.1)), lean[:, 3:7])
@@ -85,17 +85,19 @@ def test_a_body_that_leans_and_one_that_is_raised_are_not_as_in_the_file(dance):
 
 
 @pytest.mark.parametrize("pace", [1.0, 0.8])
-def test_a_part_that_comes_from_rest_is_compared_at_the_moments_of_the_file(tmp_path, pace):
+def test_prepared_part_is_compared_at_the_times_of_the_file(tmp_path, pace):
     walk = embedded("walk")
     write_rig(RIGS[0], Clip(walk.poses[: walk.n_frames // 3], walk.fps, "walk"), tmp_path / "walk.bvh")
     clip, report, _ = load(tmp_path / "walk.bvh")
     part = looped(resampled(Clip(clip.poses, pace * clip.fps, "walk"), 120.0), "open")
     assert part.start < -0.2
-    made = SimpleNamespace(clip=part.clip, captured=clip, report=report, looped=part, paced=SimpleNamespace(pace=pace))
-    was, now = deviations(tmp_path / "walk.bvh", made)
+    result = SimpleNamespace(
+        clip=part.clip, captured=clip, report=report, looped=part, paced=SimpleNamespace(pace=pace)
+    )
+    was, now = deviations(tmp_path / "walk.bvh", result)
     assert now.direction == pytest.approx(was.direction, abs=np.deg2rad(0.1))
     assert now.place == pytest.approx(was.place, abs=0.002)
-    late = SimpleNamespace(**vars(made) | {"looped": part._replace(start=part.start + 0.1, end=part.end + 0.1)})
+    late = SimpleNamespace(**vars(result) | {"looped": part._replace(start=part.start + 0.1, end=part.end + 0.1)})
     assert deviations(tmp_path / "walk.bvh", late)[1].direction > np.deg2rad(3.0)
 
 
@@ -106,7 +108,7 @@ def test_a_part_that_comes_from_rest_is_compared_at_the_moments_of_the_file(tmp_
         "snu/backflip.bvh", "snu/dance.bvh", "xia/dme_example.bvh", "quirks/bvh_test3.bvh",
     ],
 )  # fmt: skip
-def test_captures_are_as_in_their_files(name):
+def test_captures_deviate_little_from_their_files(name):
     """Trunk, hips, shoulders, limbs and feet within 2°, joints within 3 cm; 1.8° and 2.9 cm where a floor slopes."""
     if not MOCAP.is_dir():
         pytest.skip("no motion capture at ../shared/mocap")

@@ -1,4 +1,4 @@
-"""Films: from any kind of run, whole or not at all, with nobody seen below the floor."""
+"""Films: of every kind of run, written completely or not at all, with bodies drawn above the floor."""
 
 import json
 import os
@@ -44,8 +44,8 @@ def backend() -> str:
 
 
 @dataclass
-class Told:
-    """What a run of a second did: how deep its figure was under the floor, and how far it went."""
+class RunSpec:
+    """A synthetic run of one second: depth of its figure below the floor, distance travelled, force."""
 
     kind: str = "physical"
     depth: float = 0.0
@@ -54,32 +54,32 @@ class Told:
     complete: bool = True
 
 
-def write_run(folder: Path, told: Told) -> Path:
+def write_run(folder: Path, spec: RunSpec) -> Path:
     """A recording in which the figure stands, or goes along x, and the stylus is pushed."""
-    world = World(kind=told.kind)
+    world = World(kind=spec.kind)
     world.reset(np.zeros(3), rest_pose())
     n, m = round(SECONDS * RATE), round(SECONDS * FRAME_RATE)
     poses = np.tile(rest_pose(), (m, 1))
-    poses[:, 0] = told.travel * np.linspace(0.0, 1.0, m)
-    poses[:, 2] -= told.depth
+    poses[:, 0] = spec.travel * np.linspace(0.0, 1.0, m)
+    poses[:, 2] -= spec.depth
     qpos = np.tile(world.data.qpos, (m, 1))
-    if told.kind == "kinematic":
+    if spec.kind == "kinematic":
         qpos = np.hstack((qpos, poses))
-    elif told.kind == "physical":
+    elif spec.kind == "physical":
         qpos[:, world.pose_at : world.pose_at + N_POSE] = poses
     angle = np.linspace(0.0, 2.0 * np.pi, 241)
     static = {
         "curve": 0.05 * np.column_stack((np.cos(angle) - 1.0, np.sin(angle), 0.0 * angle)), "tube_radius": 0.02,
-        "p_WH": P_WH, "scene": np.array([1.75, 75.0, 1e-3, 1.25e-4]), "figure": told.kind,
+        "p_WH": P_WH, "scene": np.array([1.75, 75.0, 1e-3, 1.25e-4]), "figure": spec.kind,
     }  # fmt: skip
     frames: dict[str, tuple[int, ...]] = {"t": (), "qpos": (qpos.shape[1],)}
     rows = {"t": np.arange(m) / FRAME_RATE, "qpos": qpos}
-    if told.kind != "none":
+    if spec.kind != "none":
         frames["reference"], rows["reference"] = (N_POSE,), poses
     ticks = {
         "t": np.arange(n) / RATE,
         "p": np.zeros((n, 3)),
-        "force": np.tile(told.force * np.array([0.6, -0.8, 0.0]), (n, 1)),
+        "force": np.tile(spec.force * np.array([0.6, -0.8, 0.0]), (n, 1)),
         "user": np.zeros((n, 3)),
     }
     shapes = {"t": (), "p": (3,), "force": (3,), "user": (3,)}
@@ -88,7 +88,7 @@ def write_run(folder: Path, told: Told) -> Path:
     with Recorder(folder / "run.h5", {}, 1, groups, static) as recorder:
         recorder.append("ticks", ticks)
         recorder.append("frames", rows)
-        if told.complete:
+        if spec.complete:
             recorder.close({"lines": []})
             write_bvh(Clip(poses[::5], FRAME_RATE / 5, "default"), folder / "default.bvh")
     return folder
@@ -97,9 +97,9 @@ def write_run(folder: Path, told: Told) -> Path:
 @pytest.mark.parametrize(
     "kind", [*(pytest.param(kind, marks=pytest.mark.slow) for kind in ("physical", "kinematic")), "none"]
 )
-def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, backend: str) -> None:
+def test_every_figure_kind_is_rendered_to_playable_films(kind: str, tmp_path: Path, backend: str) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"
+    run, target = write_run(tmp_path / "run", RunSpec(kind)), tmp_path / "film.mp4"
     render(run, target, SMALL, gif=True)
     frames, seconds = ffmpeg.count_frames_and_secs(str(target))
     assert (frames, seconds) == (10, pytest.approx(1.0, abs=0.11))
@@ -108,10 +108,8 @@ def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, ba
 
 
 @pytest.mark.parametrize("kind", ["physical", "kinematic"])
-def test_nobody_is_drawn_below_the_floor_and_it_is_said_how_deep_they_were(
-    kind: str, tmp_path: Path, backend: str
-) -> None:
-    run = write_run(tmp_path / "run", Told(kind, depth=0.03))
+def test_figures_are_drawn_above_the_floor_and_their_depth_is_reported(kind: str, tmp_path: Path, backend: str) -> None:
+    run = write_run(tmp_path / "run", RunSpec(kind, depth=0.03))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, SMALL, backend)
         frames.frame(5)
@@ -122,8 +120,8 @@ def test_nobody_is_drawn_below_the_floor_and_it_is_said_how_deep_they_were(
         frames.close()
 
 
-def test_a_figure_that_travels_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
-    run = write_run(tmp_path / "run", Told(travel=8.0))
+def test_travelling_figure_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
+    run = write_run(tmp_path / "run", RunSpec(travel=8.0))
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show="stage", ghost="none", width=160, height=120, fps=10.0), backend)
         for row in (0, 5, 9):
@@ -135,8 +133,8 @@ def test_a_figure_that_travels_stays_in_the_picture(tmp_path: Path, backend: str
         frames.close()
 
 
-def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
-    """A frame below its words, as numbers."""
+def rendered(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
+    """A frame without its caption, as integers."""
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, Film(show=show, ghost=ghost, width=320, height=240, fps=10.0), backend)
         picture = frames.frame(3)[60:].astype(np.int64)
@@ -144,12 +142,12 @@ def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
     return picture
 
 
-def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(tmp_path: Path, backend: str) -> None:
-    run, rest = write_run(tmp_path / "run", Told()), write_run(tmp_path / "rest", Told(force=0.0))
+def test_ghost_and_force_arrow_are_drawn_only_if_present(tmp_path: Path, backend: str) -> None:
+    run, rest = write_run(tmp_path / "run", RunSpec()), write_run(tmp_path / "rest", RunSpec(force=0.0))
     for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):
-        red, _, blue = np.moveaxis(drawn(run, "stage", ghost, backend), 2, 0)
+        red, _, blue = np.moveaxis(rendered(run, "stage", ghost, backend), 2, 0)
         assert least <= np.count_nonzero((blue > red + 40) & (red > 90)) <= most, ghost
-    difference = drawn(run, "workspace", "none", backend) - drawn(rest, "workspace", "none", backend)
+    difference = rendered(run, "workspace", "none", backend) - rendered(rest, "workspace", "none", backend)
     changed = np.abs(difference).max(axis=2) > 20
     assert 30 < np.count_nonzero(changed) < 3000
     assert np.count_nonzero(changed & (difference[..., 1] > difference[..., 0])) > 0.8 * np.count_nonzero(
@@ -158,11 +156,11 @@ def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(t
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
+def test_film_of_incomplete_run_is_reported_and_shows_the_edited_animation(
     tmp_path: Path, backend: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    run = write_run(tmp_path / "run", Told(complete=False))
+    run = write_run(tmp_path / "run", RunSpec(complete=False))
     filmed = render(run, tmp_path / "film.mp4", SMALL)
     assert "cut short" in capsys.readouterr().err
     assert any("lowest point of the figure" in line for line in filmed.lines())
@@ -173,7 +171,7 @@ def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
         frames.close()
 
 
-def test_a_film_is_not_replaced_unasked_nor_written_in_a_format_that_is_none(tmp_path: Path) -> None:
+def test_existing_film_or_unknown_format_is_refused(tmp_path: Path) -> None:
     film = tmp_path / "film.mp4"
     film.write_bytes(b"mine")
     with pytest.raises(SimError, match="--overwrite"):
@@ -184,15 +182,13 @@ def test_a_film_is_not_replaced_unasked_nor_written_in_a_format_that_is_none(tmp
 
 
 @pytest.mark.parametrize("wrong", [{"width": 161}, {"height": 20}, {"fps": 0.0}, {"seconds": 0.0}])
-def test_sizes_and_rates_that_make_no_film_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_film_sizes_and_rates_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(SimError, match="expected"):
         Film(**wrong)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("frames", [0, 1])
-def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(
-    frames: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_interrupted_film_keeps_the_old_file(frames: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("imageio_ffmpeg")
     film = tmp_path / "film.mp4"
     film.write_bytes(b"the old one")
@@ -207,31 +203,33 @@ def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(
         stopped()
     assert film.read_bytes() == b"the old one"
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
-    assert capfd.readouterr() == ("", "")  # not a word of ffmpeg's
+    assert capfd.readouterr() == ("", "")  # no output of ffmpeg
 
 
-def _hear() -> None:
-    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+def _default_interrupt() -> None:
+    """Undo the ignored SIGINT that a child of a background shell inherits."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.mark.slow
-def test_ctrl_c_on_the_command_leaves_nothing(tmp_path: Path, backend: str) -> None:
+def test_ctrl_c_on_render_leaves_no_file(tmp_path: Path, backend: str) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    run, film = write_run(tmp_path / "run", Told()), tmp_path / "films" / "film.mp4"
+    run, film = write_run(tmp_path / "run", RunSpec()), tmp_path / "films" / "film.mp4"
     command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear)
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_default_interrupt
+    )
     deadline = time.monotonic() + 60.0
     while not list(film.parent.glob(".*.mp4")) and time.monotonic() < deadline:
         time.sleep(0.1)
     os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=30)[1]
-    assert process.returncode == 130, said
-    assert "Traceback" not in said
+    stderr = process.communicate(timeout=30)[1]
+    assert process.returncode == 130, stderr
+    assert "Traceback" not in stderr
     assert not list(film.parent.iterdir())
 
 
-def test_without_graphics_it_says_in_a_line_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_graphics_backend_is_reported_with_packages_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.render.graphics.OFFSCREEN", ("nothing_of_that_name",))
     with pytest.raises(NoGraphics, match=r"^[^\n]*libegl1[^\n]*libosmesa6[^\n]*$"):
         offscreen_backend()

@@ -1,4 +1,4 @@
-"""The lowest point of what is seen of a body, against the vertices of fine meshes of its geoms."""
+"""The lowest visible point of a body, against the vertices of fine meshes of its geoms."""
 
 import mujoco
 import numpy as np
@@ -22,7 +22,7 @@ _WEDGE = "<mesh name='wedge' vertex='0 0 0  1 0 0  0 1 0  0 0 2'/>"
 
 @pytest.mark.parametrize("kind", _GEOMS)
 @pytest.mark.parametrize("seed", range(3))
-def test_it_is_that_of_the_surface_however_it_is_turned(kind: str, seed: int) -> None:
+def test_lowest_point_matches_the_surface_at_any_orientation(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     q, p = rng.normal(size=4), rng.normal(size=3)
     model = mujoco.MjModel.from_xml_string(
@@ -45,7 +45,7 @@ def test_it_is_that_of_the_surface_however_it_is_turned(kind: str, seed: int) ->
     assert found == pytest.approx(surface[:, 2].min(), abs=expected_error)
 
 
-def test_a_figure_at_rest_stands_on_its_soles_and_its_contact_spheres_are_not_seen() -> None:
+def test_lowest_point_of_figure_at_rest_ignores_contact_spheres() -> None:
     model = figure_model()
     data = mujoco.MjData(model)
     data.qpos[:] = rest_pose()

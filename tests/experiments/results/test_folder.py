@@ -1,16 +1,20 @@
-"""The folder of a run: what is not of a run stays as it is."""
+"""The folder of a run: foreign files are kept, and concurrent runs refused."""
 
+import fcntl
+import os
 from pathlib import Path
 
 import pytest
 
 import hvf
+from experiments.cli import main
 from experiments.results.folder import check_folder, clear_folder
 from sim.errors import SimError
+from tests.experiments.refused_command import refused
 
 
 @pytest.mark.parametrize("name", ["config.json", "report.html", "summary.json", "edited.bvh", "figures/mine.tex"])
-def test_files_of_somebody_else_are_not_replaced_unasked(name: str, tmp_path: Path) -> None:
+def test_foreign_files_are_not_replaced_without_overwrite(name: str, tmp_path: Path) -> None:
     (tmp_path / name).parent.mkdir(exist_ok=True)
     (tmp_path / name).write_text("mine")
     with pytest.raises(SimError, match=rf"holds {name.split('/')[0]} without a run; choose another --out"):
@@ -18,7 +22,7 @@ def test_files_of_somebody_else_are_not_replaced_unasked(name: str, tmp_path: Pa
     check_folder(tmp_path, overwrite=True)
 
 
-def test_a_folder_of_figures_goes_with_its_run_alone(tmp_path: Path) -> None:
+def test_figures_folder_is_removed_only_with_its_run(tmp_path: Path) -> None:
     figures = tmp_path / "figures"
     figures.mkdir()
     (figures / "mine.tex").write_text("mine")
@@ -29,9 +33,28 @@ def test_a_folder_of_figures_goes_with_its_run_alone(tmp_path: Path) -> None:
     assert not figures.exists()
 
 
-def test_a_study_does_not_go_into_a_folder_with_other_results(tmp_path: Path) -> None:
+def test_study_refuses_a_folder_with_other_results(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text("mine")
     study = hvf.Study.load("examples/studies/quick.toml")
     with pytest.raises(SimError, match=r"holds summary\.json, not of a study"):
         study.run(tmp_path)
     assert not (tmp_path / "study.sqlite").exists()
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("runs") / "run"
+    assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(out)]) == 0
+    return out
+
+
+def test_concurrent_run_into_one_folder_is_refused(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    descriptor = os.open(run, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)  # as a run in another process would
+        command = ["run", "--figure", "none", "--seconds", "1", "--out", str(run), "--overwrite"]
+        assert "another run is being written into it" in refused(command, capsys)
+        assert (run / "run.h5").exists()
+    finally:
+        os.close(descriptor)  # as at the end of a process that crashes
+    assert main(command) == 0

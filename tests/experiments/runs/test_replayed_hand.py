@@ -1,4 +1,4 @@
-"""A recorded hand in place of a device: it moves as it was recorded, and what it cannot do is refused by name."""
+"""A recorded hand in place of a device: it moves as recorded, and incompatible options are refused by name."""
 
 import json
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from tests.experiments.runs.test_public_face import CURVE, simulation
+from tests.experiments.runs.test_public_interface import CURVE, simulation
 
-SECONDS = 1.5  # longer than a hand that is let go of takes to settle
+SECONDS = 1.5  # longer than the settling time of a released hand
 HAND = ("t", "p", "quaternion", "v", "omega", "switch")
 DEVICE_ALONE = hvf.Figure(kind="none")
 
@@ -41,14 +41,14 @@ def replayed(recorded: hvf.Run, k_r: float, **parts: Any) -> hvf.Simulation:
     return simulation(follow(k_r), device=hvf.Replay(str(recorded.folder)), **({"figure": DEVICE_ALONE} | parts))
 
 
-def test_in_its_own_field_a_replayed_hand_moves_as_recorded_and_feels_the_same_force(recorded: hvf.Run) -> None:
+def test_replay_in_same_field_reproduces_motion_and_force(recorded: hvf.Run) -> None:
     again = replayed(recorded, 300.0).run(SECONDS)
     for name in (*HAND, "force", "distance"):
         np.testing.assert_array_equal(again.ticks[name], recorded.ticks[name], err_msg=name)
     assert not again.ticks["user"].any()
 
 
-def test_in_another_field_it_moves_the_same_and_the_force_is_the_other_fields(recorded: hvf.Run) -> None:
+def test_replay_in_another_field_changes_only_the_force(recorded: hvf.Run) -> None:
     again = replayed(recorded, 100.0).run(SECONDS)
     np.testing.assert_array_equal(again.ticks["p"], recorded.ticks["p"])
     assert np.abs(again.ticks["force"] - recorded.ticks["force"]).max() > 0.5
@@ -56,22 +56,22 @@ def test_in_another_field_it_moves_the_same_and_the_force_is_the_other_fields(re
     assert f"The hand was that of {recorded.folder} and moved as recorded" in str(again)
 
 
-def test_whose_hand_it_was_is_told_in_every_mode(recorded: hvf.Run) -> None:
+def test_summary_names_the_replayed_recording_in_every_mode(recorded: hvf.Run) -> None:
     summary = replayed(recorded, 100.0).run(SECONDS).summary
     led = SimpleNamespace(lines=lambda: ["The figure was led."])
-    for told in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
-        assert [line for line in told.lines() if line.startswith("The hand was that of")]
-        assert "The figure was led." in told.lines()
+    for variant in (replace(summary, lead=led), replace(summary, editing=led)):  # pyright: ignore[reportArgumentType]
+        assert [line for line in variant.lines() if line.startswith("The hand was that of")]
+        assert "The figure was led." in variant.lines()
 
 
-def test_a_run_begins_where_the_recorded_hand_was(recorded: hvf.Run) -> None:
+def test_replay_begins_at_the_recorded_hand(recorded: hvf.Run) -> None:
     session = replayed(recorded, 300.0).session(SECONDS)
     tip = session.world.data.site("phantom/tip").xpos
     np.testing.assert_allclose(tip - session.static()["p_WH"], recorded.ticks["p"][0], atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", [1, 7])
-def test_a_seed_beside_a_recorded_hand_is_refused(seed: int) -> None:
+def test_seed_with_replay_is_refused(seed: int) -> None:
     with pytest.raises(hvf.ParameterError, match="whatever the seed; leave out the seed, or the replay"):
         run_config(replay="runs/mine", seed=seed)
     with pytest.raises(hvf.ParameterError, match="whatever the seed; leave out the seed, or the replay"):
@@ -79,7 +79,7 @@ def test_a_seed_beside_a_recorded_hand_is_refused(seed: int) -> None:
     assert changed(run_config(seed=7), {"replay": "runs/mine"}).seed == 1
 
 
-def test_a_stepped_simulation_ends_with_the_recorded_hand(recorded: hvf.Run) -> None:
+def test_iterated_replay_ends_with_the_recording(recorded: hvf.Run) -> None:
     assert len(list(replayed(recorded, 300.0))) == len(recorded.ticks["t"])
 
 
@@ -92,7 +92,7 @@ def wired(folder: Path, **parts: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ask", "says"),
+    ("make", "message"),
     [
         (lambda run: wired(run / "nothing"), r"nothing/run.h5: cannot be opened \(there is no such file\)"),
         (lambda run: wired(run, clock=hvf.Clock(servo_period=2e-3)), "recorded every 0.001 s, and the servo runs every "
@@ -110,21 +110,21 @@ def wired(folder: Path, **parts: Any) -> None:
     ids=["no recording", "other period", "too short", "user", "person", "hand of a simulation", "performs", "filter",
          "certified"],
 )  # fmt: skip
-def test_what_a_replayed_hand_cannot_do_is_refused(recorded: hvf.Run, ask: Callable[[Path], None], says: str) -> None:
-    with pytest.raises((hvf.ParameterError, SimError), match=says):
-        ask(recorded.folder)
+def test_options_incompatible_with_replay_are_refused(
+    recorded: hvf.Run, make: Callable[[Path], None], message: str
+) -> None:
+    with pytest.raises((hvf.ParameterError, SimError), match=message):
+        make(recorded.folder)
 
 
-def test_a_refused_run_leaves_its_folder_as_it_was(recorded: hvf.Run, tmp_path: Path) -> None:
+def test_refused_replay_creates_no_folder(recorded: hvf.Run, tmp_path: Path) -> None:
     arguments = ["run", "--figure", "none", "--replay", str(recorded.folder), "--out", str(tmp_path / "run")]
     assert main(arguments) == 2
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow
-def test_a_configured_replay_is_reproduced_while_the_recorded_hand_is_found_as_it_was(
-    recorded: hvf.Run, tmp_path: Path
-) -> None:
+def test_replay_is_reproduced_only_while_its_recording_is_unchanged(recorded: hvf.Run, tmp_path: Path) -> None:
     hand, out = tmp_path / "hand", tmp_path / "out"
     hand.mkdir()
     (hand / "run.h5").write_bytes((recorded.folder / "run.h5").read_bytes())
@@ -143,16 +143,16 @@ def test_a_configured_replay_is_reproduced_while_the_recorded_hand_is_found_as_i
         reproduce(out)
 
 
-def test_a_replay_in_words_takes_the_place_of_the_user_that_a_configuration_has() -> None:
+def test_replay_option_replaces_the_user() -> None:
     config = run_config(user="push", seconds=2.0, cutoff=100.0)
     assert changed(config, {"replay": "runs/mine"}) == run_config(replay="runs/mine", seconds=2.0)
 
 
-def test_a_replay_goes_to_words_and_to_plain_data_and_back() -> None:
+def test_replay_round_trips_through_words_and_dict() -> None:
     config = run_config(mode="bunny", replay="runs/mine")
     assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_dict(RunConfig, to_dict(config), "here") == config
 
 
-def test_a_device_that_does_not_say_what_it_is_is_a_phantom() -> None:
+def test_device_without_kind_is_a_phantom() -> None:
     assert from_dict(RunConfig, {"device": {"cutoff": 90.0}}, "here").device == hvf.Phantom(cutoff=90.0)

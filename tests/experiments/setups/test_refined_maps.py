@@ -1,4 +1,4 @@
-"""What a refined map says before a run."""
+"""Remarks of a refined map before a run."""
 
 from dataclasses import replace
 
@@ -12,19 +12,19 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 
 
-def test_how_a_physical_figure_follows_is_said_of_a_physical_figure_only() -> None:
+def test_tracking_remarks_only_for_a_physical_figure() -> None:
     parts = map_parts(run_config(clips=("walk",), seconds=1.0), figure_model())
     falls = replace(parts, refined=lambda: (parts.haptic_map, ("the physical figure falls",)))
     assert falls.refine(physical=True).remarks == (*parts.remarks, "the physical figure falls")
     assert falls.refine(physical=False).remarks == parts.remarks
 
 
-def test_a_clip_alone_is_tried_where_it_is_not_played_as_it_is_and_what_it_lacks_is_said(
+def test_single_clip_off_its_pace_is_tried_and_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The run has flights; 2.2 s and 1.47 s are whole numbers of its strides, 1.8 s is off both by 20 %."""
     monkeypatch.setattr(leg_choice, "verdict_on", lambda *_: Verdict(0.2, 1.5))
     own = embedded("run").duration
-    for lap, said in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
+    for lap, remarks in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
         parts = map_parts(run_config(clips=("run",) * 4, lap=lap, seconds=1.0), figure_model())
-        assert parts.refine(physical=True).remarks[len(parts.remarks) :] == said
+        assert parts.refine(physical=True).remarks[len(parts.remarks) :] == remarks

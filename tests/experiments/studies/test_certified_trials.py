@@ -1,4 +1,4 @@
-"""Certified rivers in random simulations: nothing diverges, and the experiment notices a river that does."""
+"""Certified rivers in random simulations: nothing diverges, and a river stiffer than certified is detected."""
 
 import numpy as np
 import pytest
@@ -14,22 +14,22 @@ def drawn():
 
 
 @pytest.mark.slow
-def test_hands_let_go_in_a_certified_river_do_not_diverge(drawn, tmp_path, monkeypatch):
+def test_released_hands_in_certified_river_do_not_diverge(drawn, tmp_path, monkeypatch):
     monkeypatch.setattr(certified_trials, "draw_certified", lambda rng: drawn)
     certified_trials.certified_trials(tmp_path, rivers=1, hands=4, seed=3)
     rows = [line.split("|") for line in (tmp_path / "certified.md").read_text().splitlines() if line.startswith("|")]
-    told = {row[1].strip(): (int(row[2]), int(row[3])) for row in rows[2:]}
-    assert told == {"inside the assumptions": (4, 0), "with Coulomb friction and rounding": (4, 0)}
+    counts = {row[1].strip(): (int(row[2]), int(row[3])) for row in rows[2:]}
+    assert counts == {"inside the assumptions": (4, 0), "with Coulomb friction and rounding": (4, 0)}
 
 
 @pytest.mark.slow
-def test_a_river_that_is_no_longer_what_was_certified_is_noticed(drawn):
+def test_trials_detect_a_river_stiffer_than_certified(drawn):
     wild = drawn._replace(river=drawn.river._replace(k_r=60.0 * drawn.river.k_r), radius=0.97)
     rng = np.random.default_rng(5)
     assert all(release(wild, conditions, rng).diverges for conditions in (ASSUMED, EVERYTHING))
 
 
-def test_a_hand_that_friction_holds_is_not_taken_for_one_that_diverges():
+def test_hand_held_by_friction_does_not_count_as_diverging():
     assert not Release(3.0e-3, 3.0e-3 + 2e-5, 5e-5).diverges
     assert Release(3.0e-3, 3.0e-3 + 2e-5, 0.0).diverges
     assert Release(np.inf, np.inf, 5e-5).diverges

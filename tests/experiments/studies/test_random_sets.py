@@ -1,4 +1,4 @@
-"""A random set of captures through the study's own functions: the figure stands and feet stay in place."""
+"""A random set of captures, by the functions of the study: the figure stands and feet stay in place."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ FILES = ("snu/walk.bvh", "xia/strutting_01_000.bvh", "cmu_amc/02_01.amc", "xia/d
 
 @pytest.fixture
 def captures(monkeypatch):
-    """The folder, and a study that takes 6 s a run: a lap, and most of the second one, in which the hand pushes."""
+    """The folder; runs are shortened to 6 s, a lap and most of the second one, in which the hand pushes."""
     if not MOCAP.is_dir():
         pytest.skip("no motion capture at ../shared/mocap")
     monkeypatch.setattr(random_sets, "SECONDS", 6.0)
@@ -24,7 +24,7 @@ def captures(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_random_set_stands_on_the_floor_without_skating(captures):
+def test_random_set_stands_without_skating(captures):
     found = [random_sets.captured(captures, name) for name in FILES]
     assert [one.name for one, _ in found if one.reason or one.alone > RESIDUAL] == []
     chosen = next(random_sets.drawn([clip for _, clip in found], 4, seed=1))
@@ -39,7 +39,7 @@ def test_a_random_set_stands_on_the_floor_without_skating(captures):
     assert "| cylindrical | 1, 0 | 1, " in random_sets.summary([row])[-1]
 
 
-def test_a_walk_that_is_not_prepared_is_beyond_the_bounds(captures):
+def test_unprepared_walk_exceeds_the_bounds(captures):
     walk = load_clip(MOCAP / "snu/walk.bvh")
     found = random_sets.animation_measures(walk.poses, walk.fps)
     assert found["lowest"] < -1.0

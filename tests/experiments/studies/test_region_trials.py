@@ -1,4 +1,4 @@
-"""Simulations from the edge of a certified region: none leaves it, and all end in the ball."""
+"""Simulations from the boundary of a certified region: none leaves it, and all end in the ball."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from experiments.studies.region_trials import HANDS, certified_region, simulate_
 
 
 @pytest.mark.slow
-def test_nothing_that_begins_in_the_region_leaves_it():
+def test_trajectories_from_certified_region_stay_inside():
     river, verdict = certified_region()
     assert verdict.verdict == "certified"
     rng = np.random.default_rng(5)

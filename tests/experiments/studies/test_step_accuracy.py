@@ -1,4 +1,4 @@
-"""What of two courses that differ is another path, and what another time."""
+"""Separation of the difference of two trajectories into path and timing."""
 
 import numpy as np
 
@@ -11,17 +11,17 @@ def circle(t: np.ndarray, radius: float = 0.05) -> np.ndarray:
     return radius * np.column_stack([np.cos(t), np.sin(t), 0.0 * t])
 
 
-def test_a_hand_that_is_late_on_the_same_path_is_not_off_it() -> None:
+def test_time_lag_on_same_path_is_not_off_path() -> None:
     late = circle(T - 1e-3)
     assert np.linalg.norm(late - circle(T), axis=1).min() > 49e-6
     assert np.linalg.norm(off_path(late, circle(T)), axis=1).max() < 1e-7  # 0.5 r dt²
 
 
-def test_a_hand_on_another_path_is_off_it_by_what_lies_between_them() -> None:
+def test_parallel_path_is_off_by_its_distance() -> None:
     for other in (circle(T, 0.05002), circle(T) + np.array([0.0, 0.0, 2e-5])):
         assert np.allclose(np.linalg.norm(off_path(other, circle(T)), axis=1), 2e-5, rtol=1e-6)
 
 
-def test_beside_a_hand_that_stands_still_all_distance_counts() -> None:
+def test_whole_distance_counts_for_a_resting_hand() -> None:
     still = np.zeros((5, 3))
     assert np.array_equal(off_path(still + 3e-6, still), still + 3e-6)

@@ -1,4 +1,4 @@
-"""People against published laws: each number within its published interval, for panels that nothing was tuned on."""
+"""Simulated people against published laws: values within the published intervals, on panels not used for tuning."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ PANELS = (1001, 1002, 1003)
 """Seeds of populations; numbers of people were chosen on those of seeds 1 to 6, 101, 201 and 202."""
 PEOPLE = 6
 HARDLY_VARY = ("power-law", "tremor", "step-response", "grip", "practice", "endurance")
-"""Laws of which one panel of three tells as much as three of six, that take four times as long."""
+"""Laws with so little variance that one panel of three people suffices."""
 
 
 def assert_published(panels: Sequence[Sequence[Law]]) -> None:
@@ -28,7 +28,7 @@ def assert_published(panels: Sequence[Sequence[Law]]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in STUDIES if name not in HARDLY_VARY])
-def test_a_published_law_holds_over_fresh_panels(name: str) -> None:
+def test_published_law_holds_over_fresh_panels(name: str) -> None:
     panels = [user_laws(PEOPLE, seed, (name,))[0].laws for seed in PANELS[:-1]]
     # Between two values that lie in an interval the median of three does, too: the third is not needed.
     if not all(law.least <= law.value <= law.most for panel in panels for law in panel):
@@ -38,12 +38,14 @@ def test_a_published_law_holds_over_fresh_panels(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HARDLY_VARY)
-def test_a_published_law_that_hardly_varies_holds_on_a_fresh_panel(name: str) -> None:
+def test_low_variance_law_holds_on_one_fresh_panel(name: str) -> None:
     assert_published([user_laws(3, PANELS[0], (name,))[0].laws])
 
 
 @pytest.mark.slow
-def test_the_table_and_its_figures_are_written_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_table_and_figures_are_not_replaced_without_overwrite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     command = ["users", "--people", "1", "--laws", "tremor", "--out", str(tmp_path)]
     assert main(command) in (0, 1)
     assert "Tremor: frequency" in capsys.readouterr().out

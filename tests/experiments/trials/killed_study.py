@@ -47,9 +47,9 @@ def start(study: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
 
 
 def finish(driver: subprocess.Popen[bytes]) -> None:
-    """Wait for a driver that is left alone."""
-    _, said = driver.communicate(timeout=1500)
-    assert driver.returncode == 0, said.decode()
+    """Wait for a driver that is not killed."""
+    _, stderr = driver.communicate(timeout=1500)
+    assert driver.returncode == 0, stderr.decode()
 
 
 def workers_of(driver: subprocess.Popen[bytes]) -> list[psutil.Process]:

@@ -1,4 +1,4 @@
-"""Real processes: Dask's workers and scheduler, and drivers, killed at random moments."""
+"""Studies as real processes: workers, scheduler and drivers killed at random moments."""
 
 import socket
 import subprocess
@@ -14,7 +14,7 @@ pytest.importorskip("statsmodels")
 
 
 @pytest.mark.processes
-def test_a_study_whose_driver_and_workers_are_killed_ends_as_the_undisturbed_one_on_one_thread(tmp_path: Path) -> None:
+def test_killed_study_gives_the_table_of_an_undisturbed_one(tmp_path: Path) -> None:
     study = written(tmp_path, repetitions=8)
     killed = killed_at_random(study, tmp_path / "killed", kills=3, seed=int(time.time()))
     assert killed["worker"] >= 1
@@ -25,7 +25,7 @@ def test_a_study_whose_driver_and_workers_are_killed_ends_as_the_undisturbed_one
 
 
 @pytest.mark.processes
-def test_a_lost_scheduler_is_one_line_and_the_study_goes_on_without_it(tmp_path: Path) -> None:
+def test_lost_scheduler_is_one_line_and_the_study_resumes(tmp_path: Path) -> None:
     study = written(tmp_path, repetitions=30)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -44,22 +44,22 @@ def test_a_lost_scheduler_is_one_line_and_the_study_goes_on_without_it(tmp_path:
         while not (database.exists() and database.stat().st_size > 60_000) and time.monotonic() < until:
             time.sleep(0.1)
         scheduler.kill()
-        _, said = driver.communicate(timeout=120)
+        _, stderr = driver.communicate(timeout=120)
     finally:
         for process in (driver, worker, scheduler):
             process.kill()
             process.wait()
-    last = said.decode().strip().splitlines()[-1]
+    last = stderr.decode().strip().splitlines()[-1]
     assert driver.returncode == 2
     assert "the scheduler is lost" in last
     assert "every trial so far is kept" in last
-    assert "Traceback" not in said.decode()
+    assert "Traceback" not in stderr.decode()
     finish(start(study, tmp_path / "out", "--threads", "2"))
     finish(start(study, tmp_path / "one", "--threads", "2"))
     assert (tmp_path / "out" / "trials.csv").read_bytes() == (tmp_path / "one" / "trials.csv").read_bytes()
 
 
-def test_nobody_at_the_address_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scheduler_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     from experiments.trials.design.errors import StudyError
     from experiments.trials.execution import cluster
 
@@ -68,7 +68,7 @@ def test_nobody_at_the_address_is_a_line(monkeypatch: pytest.MonkeyPatch) -> Non
         pass
 
 
-def test_a_worker_with_other_code_or_files_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_worker_with_other_code_or_files_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from experiments.config.part import to_json
     from experiments.config.words import run_config
     from experiments.trials.design.errors import StudyError

@@ -1,3 +1,5 @@
+"""Studies run in this process: tables, resumption, failures, and refused settings."""
+
 import json
 import math
 from pathlib import Path
@@ -19,23 +21,23 @@ pandas = pytest.importorskip("pandas")
 pytest.importorskip("statsmodels")
 
 
-def small(**values: object) -> Study:
-    told: dict[str, object] = {
+def small_study(**values: object) -> Study:
+    defaults: dict[str, object] = {
         "name": "small", "seconds": 0.5, "run": {"figure": "none"}, "factors": {"stiffness": [100, 300]},
         "users": {"number": 3}, "cost": "effort", "measures": ["tracking_error", "effort", "sparc"],
     }  # fmt: skip
-    return Study.of(**(told | values))
+    return Study.of(**(defaults | values))
 
 
 @pytest.mark.slow
-def test_a_study_is_the_same_on_one_thread_on_two_and_when_it_goes_on_where_it_was_left(tmp_path: Path) -> None:
-    one = small().run(tmp_path / "one", threads=1)
-    small().with_users(number=2).run(tmp_path / "grown", threads=2)
-    grown = small().run(tmp_path / "grown", threads=2)
+def test_study_table_is_independent_of_threads_and_resumption(tmp_path: Path) -> None:
+    one = small_study().run(tmp_path / "one", threads=1)
+    small_study().with_users(number=2).run(tmp_path / "grown", threads=2)
+    grown = small_study().run(tmp_path / "grown", threads=2)
     assert (one.ran, grown.ran, one.failed) == (6, 2, 0)
     tables = [(tmp_path / name / "trials.csv").read_bytes() for name in ("one", "grown")]
     assert tables[0] == tables[1]
-    assert small().run(tmp_path / "one").ran == 0
+    assert small_study().run(tmp_path / "one").ran == 0
     assert pandas.read_parquet(tmp_path / "one" / "trials.parquet").equals(one.table)
     assert one.table["user"].value_counts().to_dict() == {0: 2, 1: 2, 2: 2}
     page = (tmp_path / "one" / REPORT).read_text(encoding="utf-8")
@@ -45,34 +47,34 @@ def test_a_study_is_the_same_on_one_thread_on_two_and_when_it_goes_on_where_it_w
     assert json.loads((tmp_path / "one" / SUMMARY).read_text())["trials"] == 6
 
 
-def test_another_study_in_the_folder_is_refused(tmp_path: Path) -> None:
-    changed, whole = small(factors={"stiffness": [100, 400]}), small()
+def test_folder_with_another_study_is_refused(tmp_path: Path) -> None:
+    changed, whole = small_study(factors={"stiffness": [100, 400]}), small_study()
     Database(tmp_path / DATABASE, whole._identity(), "small", "").close()
     with pytest.raises(StudyError, match="holds another study"):
         changed.run(tmp_path, threads=1)
-    assert small(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
+    assert small_study(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
 
 
 @pytest.mark.parametrize(
-    ("fewer", "says"),
+    ("fewer", "message"),
     [({"users": {"number": 2}}, "with 3 users.*those of 2 would"), ({"repetitions": 1}, "with 2 repetitions.*of 1")],
 )
-def test_fewer_users_or_repetitions_than_a_folder_has_are_refused_and_replace_nothing(
-    tmp_path: Path, fewer: dict[str, object], says: str
+def test_fewer_users_or_repetitions_than_stored_are_refused(
+    tmp_path: Path, fewer: dict[str, object], message: str
 ) -> None:
-    whole = small(repetitions=2)
+    whole = small_study(repetitions=2)
     trial = whole.trials[0]
     with Database(tmp_path / DATABASE, whole._identity(), "small", "") as database:
         database.add(Row(trial.key, "failed", "", {}, 0.0, "", ""), {"user": 2, "repetition": 1})
-    with pytest.raises(StudyError, match=says):
-        small(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
+    with pytest.raises(StudyError, match=message):
+        small_study(**({"repetitions": 2} | fewer)).run(tmp_path, threads=1)
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, "study.lock"}
 
 
-def test_a_trial_that_raises_is_a_row_with_its_reason_and_not_an_end(tmp_path: Path) -> None:
+def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
     # A curve that the Phantom does not reach is known only when the run is wired up.
     factors = {"around": {"near": {"radius": 0.0477}, "far": {"radius": 0.4}}}
-    study = small(factors=factors, users={"number": 2})
+    study = small_study(factors=factors, users={"number": 2})
     trials = study.trials
     rows = [perform(Task(trial.key, to_json(trial.config)), Shelf()) for trial in trials]
     states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
@@ -80,9 +82,9 @@ def test_a_trial_that_raises_is_a_row_with_its_reason_and_not_an_end(tmp_path: P
     assert all("reach" in row.reason or "stops" in row.reason for row in rows if row.state == "failed")
 
 
-def test_who_only_traces_expresses_nothing_and_who_exaggerates_tracks_nothing() -> None:
+def test_measures_of_tracing_and_exaggerating_tasks() -> None:
     task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
-    study = small(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
+    study = small_study(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
     rows = {t.meeting.condition.levels["task"]: perform(Task(t.key, to_json(t.config))) for t in study.trials}
     assert {row.state for row in rows.values()} == {"done"}
     for task, nothing, something in (
@@ -93,8 +95,8 @@ def test_who_only_traces_expresses_nothing_and_who_exaggerates_tracks_nothing() 
         assert rows[task].measures[something] > 0.0
 
 
-def test_what_is_wrong_with_the_machine_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    trial = small().trials[0]
+def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial = small_study().trials[0]
 
     def full(*_: object) -> Row:
         raise OSError(28, "No space left on device")
@@ -104,17 +106,17 @@ def test_what_is_wrong_with_the_machine_is_no_row(monkeypatch: pytest.MonkeyPatc
         perform(Task(trial.key, to_json(trial.config)))
 
 
-def test_maps_from_the_shelf_change_nothing() -> None:
-    trials = small().trials[:3]
+def test_shared_maps_do_not_change_the_measures() -> None:
+    trials = small_study().trials[:3]
     shelf = Shelf()
     shared = [perform(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
     alone = [perform(Task(t.key, to_json(t.config)), Shelf()).measures for t in trials]
     assert shared == alone
 
 
-def test_recordings_are_kept_where_they_are_asked_for(tmp_path: Path) -> None:
+def test_recordings_are_stored_at_the_given_url(tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
-    trial = small().trials[0]
+    trial = small_study().trials[0]
     (tmp_path / "kept").mkdir()
     row = perform(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
     with Recording(tmp_path / "kept" / f"{trial.key}.h5") as recording:
@@ -123,33 +125,33 @@ def test_recordings_are_kept_where_they_are_asked_for(tmp_path: Path) -> None:
     assert row.measures == perform(Task(trial.key, to_json(trial.config))).measures
 
 
-def test_a_place_that_cannot_keep_recordings_is_said_before_the_first_trial(tmp_path: Path) -> None:
+def test_invalid_recordings_url_is_refused_before_the_first_trial(tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
     with pytest.raises(StudyError, match=r"recordings = 'nosuch://x'.*a folder, or a URL"):
-        small(recordings="nosuch://x").run(tmp_path / "out")
+        small_study(recordings="nosuch://x").run(tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_condition_is_no_measure_of_ease(tmp_path: Path) -> None:
+def test_condition_measure_is_refused_as_ease(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="ease = 'margin_used' is of a condition"):
-        small(ease="margin_used", measures=[]).run(tmp_path / "out")
+        small_study(ease="margin_used", measures=[]).run(tmp_path / "out")
 
 
-def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
+def test_trial_key_covers_the_smoothness_code() -> None:
     assert smoothness.__name__ in reached_code("experiments.trials.trial.run_trial")
 
 
 @pytest.mark.parametrize(
-    ("threads", "workers", "cluster", "says"),
+    ("threads", "workers", "cluster", "message"),
     [
         (2, 2, None, "threads and workers contradict"),
         (0, None, None, "threads is 0"),
         (None, 0, None, "workers is 0"),
     ],
 )
-def test_where_trials_run_is_one_place_and_a_contradiction_leaves_nothing_behind(
-    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, says: str
+def test_contradictory_executors_are_refused_without_output(
+    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, message: str
 ) -> None:
-    with pytest.raises(ParameterError, match=says):
-        small().run(tmp_path / "out", threads, workers, cluster)
+    with pytest.raises(ParameterError, match=message):
+        small_study().run(tmp_path / "out", threads, workers, cluster)
     assert not (tmp_path / "out").exists()

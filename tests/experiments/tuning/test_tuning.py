@@ -1,3 +1,5 @@
+"""Tuning of gains: search, constraint by certificates, storage, and the result."""
+
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -40,7 +42,7 @@ def tuning(**values: object) -> TuneConfig:
 
 @pytest.fixture
 def certificates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A boundary at 5000 N/m in the place of CasADi's, which takes seconds a candidate."""
+    """A stability boundary at 5000 N/m, in place of certification, which takes seconds per candidate."""
 
     def verdict(config) -> Stability:
         margin = 5000.0 / config.mode.stiffness - 1.0
@@ -56,7 +58,7 @@ def searched(config: TuneConfig, folder: Path, sampler: str = "tpe") -> list[Can
 
 
 @pytest.mark.usefixtures("certificates")
-def test_what_is_refuted_is_never_tried(tmp_path: Path) -> None:
+def test_refuted_candidates_are_never_simulated(tmp_path: Path) -> None:
     found = searched(tuning(), tmp_path)
     refused = [c for c in found if c.values["stiffness"] >= 5000.0]
     assert refused
@@ -66,20 +68,20 @@ def test_what_is_refuted_is_never_tried(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("certificates")
 @pytest.mark.parametrize("sampler", ["tpe", "random"])
-def test_a_search_that_is_stopped_goes_on_as_it_would_have(tmp_path: Path, sampler: str) -> None:
+def test_resumed_search_equals_an_uninterrupted_one(tmp_path: Path, sampler: str) -> None:
     whole = searched(tuning(), tmp_path / "whole", sampler)
     searched(tuning(candidates=4), tmp_path / "stopped", sampler)
-    _begin_one_and_die(tmp_path / "stopped", sampler)
+    _leave_an_unfinished_trial(tmp_path / "stopped", sampler)
     assert searched(tuning(), tmp_path / "stopped", sampler) == whole
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("certificates")
-def test_objectives_of_several_tasks_are_each_of_the_trials_that_have_them(tmp_path: Path) -> None:
+def test_objectives_use_the_tasks_that_provide_them(tmp_path: Path) -> None:
     trade = {"objectives": ["tracking_error", "expressiveness"], "run": {"figure": "kinematic"}, "candidates": 1}
-    both = searched(tuning(tasks=["trace", "exaggerate"], **trade), tmp_path / "both")
-    assert both[0].objectives is not None
-    assert all(value > 0.0 for value in both[0].objectives)
+    candidates = searched(tuning(tasks=["trace", "exaggerate"], **trade), tmp_path / "both")
+    assert candidates[0].objectives is not None
+    assert all(value > 0.0 for value in candidates[0].objectives)
     with pytest.raises(StudyError, match=r"no trial of its users has 'expressiveness'; expected tasks"):
         searched(tuning(**trade), tmp_path / "one")
 
@@ -94,7 +96,7 @@ class _Failing:
 
 
 @pytest.mark.usefixtures("certificates")
-def test_a_candidate_of_which_a_trial_failed_is_not_chosen_for_the_others(tmp_path: Path) -> None:
+def test_candidate_with_a_failed_trial_is_not_chosen(tmp_path: Path) -> None:
     with Database(tmp_path / "tune.sqlite", "identity", "t", "") as database:
         config, storage = tuning(candidates=1, prune=False), storage_of(tmp_path / "journal")
         found = search(config, storage, "identity", Panel(database, _Failing()), "random", lambda n: None)
@@ -103,14 +105,14 @@ def test_a_candidate_of_which_a_trial_failed_is_not_chosen_for_the_others(tmp_pa
 
 
 @pytest.mark.usefixtures("certificates")
-def test_a_search_in_a_database_is_that_of_a_journal_and_goes_on(tmp_path: Path) -> None:
-    whole, kept = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
-    searched(tuning(candidates=2, storage=kept), tmp_path / "database")
-    assert searched(tuning(candidates=5, storage=kept), tmp_path / "database") == whole
+def test_database_search_equals_journal_search_and_resumes(tmp_path: Path) -> None:
+    whole, url = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
+    searched(tuning(candidates=2, storage=url), tmp_path / "database")
+    assert searched(tuning(candidates=5, storage=url), tmp_path / "database") == whole
 
 
 @pytest.mark.parametrize("text", ["root:x:0:0\nme:x:1:1\n", "a line", "[1, 2]\n", "5\n", '{"a": 1}\n'])
-def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(text: str, tmp_path: Path) -> None:
+def test_foreign_file_as_journal_is_refused_and_unchanged(text: str, tmp_path: Path) -> None:
     file = tmp_path / "mine"
     file.write_text(text)
     with pytest.raises(StudyError, match="mine: is no journal of a search, and is left as it is; expected a new file"):
@@ -119,14 +121,14 @@ def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(text: str, tmp_p
     assert file.read_text() == text
 
 
-def test_a_database_that_does_not_answer_is_a_line() -> None:
+def test_unreachable_storage_is_refused_in_one_line() -> None:
     for url in ("nosuch://host/base", "sqlite:////no/such/folder/tune.db"):
         with pytest.raises(StudyError, match="no storage for a search") as raised:
             storage_of(url)
         assert "\n" not in str(raised.value)
 
 
-def test_a_candidate_that_was_given_up_is_not_judged_by_part_of_the_panel() -> None:
+def test_pruned_candidate_has_no_objectives() -> None:
     import optuna
 
     study = optuna.create_study()
@@ -139,7 +141,7 @@ def test_a_candidate_that_was_given_up_is_not_judged_by_part_of_the_panel() -> N
     assert (found.state, found.objectives) == ("given up", None)
 
 
-def _begin_one_and_die(folder: Path, sampler: str) -> None:
+def _leave_an_unfinished_trial(folder: Path, sampler: str) -> None:
     import optuna
 
     optuna.load_study(study_name=f"identity-{sampler}", storage=storage_of(folder / "journal")).ask()
@@ -150,12 +152,12 @@ def _begin_one_and_die(folder: Path, sampler: str) -> None:
     [("refuted", -0.1, True, False), ("unknown", None, False, False), ("unknown", None, True, True),
      ("certified", 0.4, False, False), ("certified", 0.6, False, True)],
 )  # fmt: skip
-def test_a_certificate_is_a_constraint(verdict: str, margin: float | None, allow: bool, allowed: bool) -> None:
+def test_constraint_follows_verdict_and_margin(verdict: str, margin: float | None, allow: bool, allowed: bool) -> None:
     config = tuning(allow_unknown=allow, least_margin=0.5)
     assert (violation_of(config, Stability(verdict, margin, "")) <= 0.0) == allowed  # pyright: ignore
 
 
-def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle() -> None:
+def test_pareto_front_and_its_middle_choice() -> None:
     places = [(1.0, 9.0), (2.0, 3.0), (9.0, 1.0), (3.0, 4.0), (9.0, 9.0)]
     found = [Candidate({"k": float(i)}, place, "certified", 1.0, "tried") for i, place in enumerate(places)]
     assert [c.objectives for c in front(found, ["minimize", "minimize"])] == places[:3]
@@ -166,7 +168,7 @@ def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle(
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"space": {}}, "empty space"),
         ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "stifness is not known"),
@@ -182,25 +184,23 @@ def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle(
         ({"sampler": "cma-es", "objectives": ["tracking_error", "effort"]}, "CMA-ES needs one objective"),
     ],
 )
-def test_a_tuning_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
-    with pytest.raises((StudyError, ParameterError), match=says) as raised:
+def test_contradictory_tuning_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
+    with pytest.raises((StudyError, ParameterError), match=message) as raised:
         check_tuning(tuning(**values))
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("name", ["tune", "trade"])
-def test_the_shipped_tunings_can_be_read(name: str) -> None:
+def test_example_tunings_can_be_read(name: str) -> None:
     assert read_tuning(EXAMPLES / f"{name}.toml").candidates >= 20
 
 
 @pytest.mark.slow
-def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
+def test_stability_of_lead_mode_is_unknown() -> None:
     assert kept_stability(run_config(mode="lead")).verdict == "unknown"
 
 
-def test_a_verdict_without_a_number_is_a_verdict_without_a_margin(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_verdict_without_number_has_no_margin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(governed, "governed_stability", lambda *given: Verdict("unknown", "no boundary was found"))
     found = kept_stability(run_config(figure="none"))
@@ -208,7 +208,7 @@ def test_a_verdict_without_a_number_is_a_verdict_without_a_margin(
 
 
 @pytest.mark.slow
-def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain() -> None:
+def test_cached_verdict_equals_the_computed_one_and_follows_the_gain() -> None:
     soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
     assert (soft.verdict, stiff.verdict) == ("certified", "refuted")
     assert kept_stability(run_config(stiffness=300.0, figure="none")) == soft
@@ -218,18 +218,18 @@ def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain()
 
 
 @pytest.mark.slow
-def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path: Path) -> None:
+def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
     found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
-    taken = load_config(tmp_path / CHOSEN)
-    assert taken.mode.stiffness == found.values["stiffness"]  # pyright: ignore
-    assert kept_stability(taken).verdict == "certified"
+    config_of_run = load_config(tmp_path / CHOSEN)
+    assert config_of_run.mode.stiffness == found.values["stiffness"]  # pyright: ignore
+    assert kept_stability(config_of_run).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_a_search_from_python_goes_on_with_its_own_candidates_only(tmp_path: Path) -> None:
+def test_python_search_resumes_only_its_own_candidates(tmp_path: Path) -> None:
     curve, search = hvf.circle(lap=2.0), hvf.Search(candidates=1, journal=tmp_path / "journal")
     walk, space = hvf.Cylindrical(hvf.clips("walk"), around=curve), {"field.k_r": (100.0, 101.0)}
 
@@ -242,5 +242,5 @@ def test_a_search_from_python_goes_on_with_its_own_candidates_only(tmp_path: Pat
     assert found(8.0, lambda run: 1.0).costs == first.costs == (1.0,)
     assert found(8.0, lambda run: 2.0).costs == (2.0,)
     assert found(9.0, lambda run: 3.0 - 2.0).costs == (1.0,)
-    kept = storage_of(tmp_path / "journal")
-    assert len(kept.get_all_studies()) == 3
+    storage = storage_of(tmp_path / "journal")
+    assert len(storage.get_all_studies()) == 3

@@ -1,4 +1,4 @@
-"""The summary of a field that leads along no curve: nothing is measured from one."""
+"""Summary of a run whose field has no curve: distances from a curve are absent."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def still(hand, k=200.0, b=4.0):
     return (-k * x - b * hand.v[0], -k * y - b * hand.v[1], -k * z - b * hand.v[2])
 
 
-def test_a_push_moves_the_stylus_from_where_it_was_and_no_distance_is_infinite() -> None:
+def test_push_is_measured_from_its_start_if_there_is_no_curve() -> None:
     sim = hvf.Simulation(
         field=still, haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=CURVE), figure=hvf.Figure(kind="none"),
         user=hvf.User(pushes=[PUSH]),

@@ -1,4 +1,4 @@
-"""What is measured of a led run, on motions whose answer is known; and what of a configuration is refused."""
+"""Measures of a led run on motions with known answers, and refused configurations of the lead mode."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def poses_along(places: np.ndarray, aside: float = 0.0, turned: float = 0.0) -> 
 
 
 @pytest.mark.parametrize(("aside", "turned"), [(0.0, 0.0), (0.02, 0.0), (-0.03, np.radians(4.0))])
-def test_how_far_a_figure_is_from_the_way_on_which_it_came(aside: float, turned: float) -> None:
+def test_retrace_measures_distance_and_turn_from_the_outward_path(aside: float, turned: float) -> None:
     measure = _Retrace()
     forth, back = np.arange(0.0, 4.0, 0.01), np.arange(3.5, 0.5, -0.013)
     measure.add(forth[:150], poses_along(forth[:150]), -np.inf)
@@ -54,7 +54,7 @@ def test_how_far_a_figure_is_from_the_way_on_which_it_came(aside: float, turned:
     assert turn == pytest.approx(np.degrees(turned), abs=0.05)
 
 
-def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_it() -> None:
+def test_retrace_compares_with_the_nearest_place_and_heading() -> None:
     measure = _Retrace()
     forth = np.arange(0.0, 4.0, 0.01)
     # The pelvis goes to and fro by 6 cm every 30 cm while it turns by 12°.
@@ -70,12 +70,12 @@ def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_
     assert turn is not None
     assert distance < 0.01
     assert turn < 0.1
-    # Behind where it began there is no way to compare with.
+    # Behind the start there is no outward path to compare with.
     measure.add(np.array([-0.1]), poses_along(np.array([-0.1])), float(forth[-1]))
     assert measure.result() == (distance, turn)
 
 
-def test_a_figure_that_turns_on_the_spot_is_compared_with_the_heading_that_it_had() -> None:
+def test_retrace_of_turn_on_the_spot_uses_the_heading_there() -> None:
     # For 10 cm of its path the pelvis goes on by 1 mm only, and turns by 40°; coming back it is 2 mm behind.
     forth = np.arange(0.0, 2.0, 0.01)
     still = np.clip(forth - 1.0, 0.0, 0.1)
@@ -94,7 +94,7 @@ def test_a_figure_that_turns_on_the_spot_is_compared_with_the_heading_that_it_ha
     assert turn < 0.5
 
 
-def test_how_far_soles_slide_while_they_touch() -> None:
+def test_sole_sliding_is_measured_only_in_contact() -> None:
     measure, standing = Soles(SceneConfig()), rest_pose()
     lowest = Soles(SceneConfig())
     lowest.add(standing[None])
@@ -113,7 +113,7 @@ def test_how_far_soles_slide_while_they_touch() -> None:
     assert hovering.slide == 0.0
 
 
-def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
+def test_leading_path_is_reachable_and_closed() -> None:
     field = leading(Lead(), GAIT)
     path = leading_hand(field).path
     for place in path[::50]:
@@ -125,15 +125,15 @@ def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
     assert field.walking.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
 
 
-@pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
-def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
+@pytest.mark.parametrize(("name", "feet"), [("walk", 2), ("run", 1)])
+def test_led_figure_begins_in_its_largest_support(name: str, feet: int) -> None:
     led, gait = led_map(embedded(name), figure_model())
-    assert gait.support[0] == most
-    assert support_at(gait, np.array([0.0]))[0] == most
+    assert gait.support[0] == feet
+    assert support_at(gait, np.array([0.0]))[0] == feet
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
 
-def test_who_leads_a_clip_that_flies_is_told_so() -> None:
+def test_gait_remarks_for_clips_with_flights() -> None:
     figure = figure_model()
     walk, run = (led_map(embedded(name), figure)[0] for name in ("walk", "run"))
     jerked = embedded("run").poses.copy()
@@ -149,7 +149,7 @@ def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     assert gait_remark("hop", hop, "kinematic") == ()
 
 
-def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clip_that_flies_once_prepared_is_led_as_captured(monkeypatch: pytest.MonkeyPatch) -> None:
     flying, walking = embedded("run"), embedded("walk")
     captured = {name: Clip(clip.poses[1:], clip.fps, name) for name, clip in (("a", flying), ("b", walking))}
     prepared = {"a": flying, "b": walking}
@@ -168,9 +168,9 @@ def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.M
     assert remarks == ()
 
 
-def test_what_leaps_too_far_to_stay_on_the_ground_is_led_by_steps_though_it_closes() -> None:
+def test_clip_with_long_leaps_is_led_by_grounded_steps() -> None:
     run = embedded("run")
-    # Each flight goes 1 m further: a root so low that both feet reached the floor would lie on it.
+    # Each flight is 1 m longer: a root low enough for both feet to reach the floor would lie on it.
     flies = ~contacts(run).planted.any(axis=1)
     far, flights = run.poses.copy(), np.count_nonzero(flies[1:] & ~flies[:-1])
     far[:, 0] += np.cumsum(flies) * flights / flies.sum()
@@ -181,7 +181,7 @@ def test_what_leaps_too_far_to_stay_on_the_ground_is_led_by_steps_though_it_clos
     assert gait.stride < run.displacement.x + flights
 
 
-def test_the_lines_tell_it() -> None:
+def test_lead_summary_lines() -> None:
     summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, 0.2, 0.1, 2.0, 1.0)
     assert summary.lines() == [
         "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
@@ -194,7 +194,7 @@ def test_the_lines_tell_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "message"),
     [
         ({"map": "composite"}, "leave out --map"),
         ({"user": "push"}, "--user push"),
@@ -205,12 +205,12 @@ def test_the_lines_tell_it() -> None:
         ({"leash": -1.0}, "leash is -1; expected 0 N/m or more, and finite"),
     ],
 )
-def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
-    with pytest.raises(ParameterError, match=says):
+def test_invalid_lead_options_are_refused(options: dict, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         wire(run_config(mode="lead", **options))
 
 
-def test_the_scale_that_is_used_is_in_the_resolved_configuration() -> None:
+def test_resolved_configuration_contains_the_floor_scale() -> None:
     config = run_config(mode="lead")
     assert isinstance(config.map, LedMap)
     maps = led_parts(config, config.map, (embedded("walk"),), figure_model())
@@ -219,7 +219,7 @@ def test_the_scale_that_is_used_is_in_the_resolved_configuration() -> None:
     assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).walking.scale)
 
 
-def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:
+def test_command_refuses_a_clip_without_travel(tmp_path, capsys) -> None:
     code = main(["run", "--mode", "lead", "--clips", "cheer", "--out", str(tmp_path / "run")])
     assert code == 2
     assert "hvf: a clip that is led must go somewhere" in capsys.readouterr().err

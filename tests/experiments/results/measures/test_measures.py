@@ -1,4 +1,4 @@
-"""The measures of a run against the same measures taken at once, and against what is put into a recording by hand."""
+"""Measures of a run on a synthetic recording with known values, for any block size."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ def recording_of(path: Path, down: np.ndarray) -> Recording:
     flight = np.zeros(m)
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
-    residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # in the air, where it should stand
+    residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # without contact, where it should stand
     ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user, "force": -user}
     ticks |= {"river": np.full(N, -1.0), "tank": 0.1 - 0.02 * t}
     ticks["tank_scale"] = np.where((t >= 3.0) & (t < 3.1), 0.5, 1.0)
@@ -68,14 +68,14 @@ def summary_of(path: Path, down: np.ndarray | None = None, handled: tuple[tuple[
         )  # fmt: skip
 
 
-def test_a_hand_that_is_never_left_alone_is_not_told_to_have_been(tmp_path: Path) -> None:
+def test_summary_of_hand_never_left_alone(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5")
     never = replace(summary, path=replace(summary.path, deviation_rms_mm=None))
     assert "0.20 mm RMS from the curve when left alone" in summary.lines()[1]
     assert "laps, never left alone." in never.lines()[1]
 
 
-def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
+def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5")
     assert summary.path.deviation_rms_mm == pytest.approx(0.2)
     assert summary.path.laps == pytest.approx((N - 1) * PERIOD / 1.5)
@@ -104,7 +104,7 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
-    # A push of half a second is no shaking.
+    # A push of half a second is not an oscillation.
     assert (summary.oscillation.since, summary.oscillation.share) == (None, 0.0)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
     assert len(summary.lines()) == 9
@@ -114,8 +114,8 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("block", [1, 7, 113, 205])
-def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where a block ends in the middle of a push."""
+def test_measures_do_not_depend_on_block_size(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Including blocks that end in the middle of a push."""
     whole = summary_of(tmp_path / "whole.h5")
     monkeypatch.setattr(measures, "BLOCK_FRAMES", block)
     pieces = summary_of(tmp_path / "pieces.h5")
@@ -131,14 +131,14 @@ def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.Monk
                 assert other == (value if value is None else pytest.approx(value)), name
 
 
-def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
+def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     with recording_of(tmp_path / "run.h5", np.zeros(N // EVERY)) as recording:
         parts = [
             measures.measured(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
             for span in ((0.0, 1.7003), (1.7003, 2.2), (2.2, np.inf))
         ]
     paths = [path for path, *_ in parts]
-    # A part begins with the first frame after its time, and its first tick has no step.
+    # A span begins with the first frame after its start, and its first tick has no step.
     assert [path.laps for path in paths] == pytest.approx([1.709 / 1.5, 0.489 / 1.5, 1.799 / 1.5])
     assert [len(path.pushes) for path in paths] == [0, 1, 1]
     assert paths[1].pushes[0].start == pytest.approx(2.0, abs=0.01)
@@ -149,7 +149,7 @@ def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     assert flights == pytest.approx([0.2, 0.0, 0.0])
 
 
-def test_a_hand_that_does_something_else_does_not_push_and_is_not_left_alone(tmp_path: Path) -> None:
+def test_handled_time_counts_neither_as_push_nor_as_left_alone(tmp_path: Path) -> None:
     whole = summary_of(tmp_path / "whole.h5")
     handled = summary_of(tmp_path / "run.h5", handled=((1.9, 2.6),))
     assert handled.path.pushes == ()
@@ -159,7 +159,7 @@ def test_a_hand_that_does_something_else_does_not_push_and_is_not_left_alone(tmp
     assert f"up to {whole.animation.pushed_deg:.2f}° a joint." in " ".join(handled.lines())
 
 
-def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
+def test_tracing_hand_is_reported(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5", handled=((0.0, np.inf),))
     with Recording(tmp_path / "run.h5") as recording:
         trace = measures.trace_summary(recording)
@@ -173,7 +173,7 @@ def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
     assert not any("push" in line.lower() for line in lines)
 
 
-def test_falls_are_told_and_what_follows_does_not_count_until_the_figure_is_back(tmp_path: Path) -> None:
+def test_falls_are_reported_and_down_time_is_excluded(tmp_path: Path) -> None:
     down = np.zeros(N // EVERY)
     down[150:200], down[200:250] = 1.0, 2.0
     down[380:] = 1.0

@@ -1,3 +1,5 @@
+"""Distances between poses: geodesic, and as seen by segment positions."""
+
 import mujoco
 import numpy as np
 import pytest
@@ -12,21 +14,21 @@ def figure() -> mujoco.MjModel:
 
 
 def poses(figure: mujoco.MjModel, n: int, seed: int) -> np.ndarray:
-    rng, made = np.random.default_rng(seed), np.tile(rest_pose(), (n, 1))
-    for pose in made:
+    rng, result = np.random.default_rng(seed), np.tile(rest_pose(), (n, 1))
+    for pose in result:
         mujoco.mj_integratePos(figure, pose, rng.normal(scale=0.3, size=N_TANGENT), 1.0)
-    return made
+    return result
 
 
-def test_segments_are_where_mujoco_s_own_kinematics_has_them(figure: mujoco.MjModel) -> None:
-    made, data = poses(figure, 5, 1), mujoco.MjData(figure)
-    for pose, places in zip(made, segment_places(made, figure), strict=True):
+def test_segment_places_match_mujoco_kinematics(figure: mujoco.MjModel) -> None:
+    samples, data = poses(figure, 5, 1), mujoco.MjData(figure)
+    for pose, places in zip(samples, segment_places(samples, figure), strict=True):
         data.qpos = pose
         mujoco.mj_kinematics(figure, data)
         np.testing.assert_allclose(places, [data.body(body).xpos for body in BODIES], atol=1e-12)
 
 
-def test_the_geodesic_is_the_length_of_the_tangent_that_leads_there(figure: mujoco.MjModel) -> None:
+def test_geodesic_distance_is_the_norm_of_the_tangent(figure: mujoco.MjModel) -> None:
     start = poses(figure, 1, 2)
     step = np.random.default_rng(3).normal(scale=0.2, size=N_TANGENT)
     end = start.copy()
@@ -35,7 +37,7 @@ def test_the_geodesic_is_the_length_of_the_tangent_that_leads_there(figure: mujo
     assert geodesic_distance(end, start)[0] == pytest.approx(np.linalg.norm(step), rel=1e-9)
 
 
-def test_a_figure_that_is_carried_is_seen_as_far_away_as_it_is_carried(figure: mujoco.MjModel) -> None:
+def test_seen_distance_of_translated_figure_is_the_translation(figure: mujoco.MjModel) -> None:
     start = poses(figure, 3, 4)
     end = start.copy()
     end[:, :3] += [0.03, -0.04, 0.12]

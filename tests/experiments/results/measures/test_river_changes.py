@@ -1,4 +1,4 @@
-"""Changes of river in a recording: told when the trace changes, neither earlier nor twice."""
+"""Switches between rivers in a recording: each is found once, at its first tick."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from experiments.results.measures.changes import RiverChange, river_changes
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
-# The fifth and the last but one have the hand for too short a time.
+# The fifth and the last but one interval are too short to count.
 RIVER = np.repeat([-1.0, 0.0, -1.0, 0.0, 2.0, 1.0, -1.0, 2.0, 0.0, 1.0], [30, 50, 40, 60, 20, 70, 20, 80, 39, 90])
 
 
@@ -20,7 +20,7 @@ def _recorded(path: Path, names: bool) -> Recording:
     return Recording(path)
 
 
-def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_path: Path, monkeypatch) -> None:
+def test_changes_are_found_at_their_first_tick_for_any_block_size(tmp_path: Path, monkeypatch) -> None:
     expected = (
         RiverChange(0.2, "level", "wave"), RiverChange(0.29, "wave", "high"), RiverChange(0.409, "high", "wave"),
     )  # fmt: skip
@@ -31,6 +31,6 @@ def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_pa
     assert expected[0].line() == "t = 0.20 s: level → wave"
 
 
-def test_a_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
+def test_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
     with _recorded(tmp_path / "run.h5", False) as recording:
         assert river_changes(recording) == ()

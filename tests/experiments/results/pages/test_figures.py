@@ -1,4 +1,4 @@
-"""The figures show what was recorded, in the units they name."""
+"""Figures of a run show the recorded values in the stated units."""
 
 import itertools
 import os
@@ -95,7 +95,7 @@ def spans(ax):
     return [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
 
 
-def test_all_figures_are_drawn_into_a_folder_that_is_made(recording, tmp_path):
+def test_all_figures_are_drawn_into_a_new_folder(recording, tmp_path):
     files = draw_figures(recording, tmp_path / "run" / "figures")
     assert [file.name for file in files] == ["path.png", "deviation.png", "forces.png", "torques.png", "figure.png"]
     for file in files:
@@ -104,7 +104,7 @@ def test_all_figures_are_drawn_into_a_folder_that_is_made(recording, tmp_path):
         assert np.ptp(pixels[..., :3]) > 0.5
 
 
-def test_the_path_is_in_millimetres_and_orange_where_the_hand_pushes(recording):
+def test_path_is_in_millimetres_with_pushes_marked(recording):
     above, right = path_figure(recording).axes
     hand = np.array(line(above, "hand").get_data())
     assert np.linalg.norm(hand[:, [100, 600]], axis=0) == pytest.approx([50.0, 60.0])
@@ -115,7 +115,7 @@ def test_the_path_is_in_millimetres_and_orange_where_the_hand_pushes(recording):
     assert np.all(line(right, "hand").get_ydata() == 0.0)
 
 
-def test_what_the_hand_does_and_what_surrounds_the_curve_is_called_as_the_recording_says(tmp_path):
+def test_labels_of_hand_and_tube_come_from_the_recording(tmp_path):
     texts = {"hand_does": "leads", "tube_name": "map's domain"}
     with record(tmp_path / "led.h5", texts=texts) as led:
         drawn = {line.get_label() for line in path_figure(led).axes[0].lines}
@@ -126,7 +126,7 @@ def test_what_the_hand_does_and_what_surrounds_the_curve_is_called_as_the_record
         assert not any("where" in str(line.get_label()) for line in path_figure(alone).axes[0].lines)
 
 
-def test_every_river_is_drawn_by_its_name_and_a_distance_is_said_to_be_from_what_it_is_from(tmp_path):
+def test_rivers_are_drawn_by_name_and_distance_names_its_reference(tmp_path):
     texts = {
         "river_names": "level\nhigh",
         "river_curves": np.stack([CURVE, CURVE + np.array([0.0, 0.0, 0.01])]),
@@ -141,13 +141,13 @@ def test_every_river_is_drawn_by_its_name_and_a_distance_is_said_to_be_from_what
     assert deviation == "distance of the hand from its river"
 
 
-def test_a_curve_without_a_tube_has_none_in_the_figures(tmp_path):
+def test_curve_without_tube_draws_none(tmp_path):
     with record(tmp_path / "led.h5", texts={"tube_radius": 0.0}) as led:
         assert "tube" not in {line.get_label() for line in path_figure(led).axes[0].lines}
         assert len(deviation_figure(led).axes[0].lines) == 1
 
 
-def test_names_of_changes_that_follow_each_other_do_not_lie_on_each_other(tmp_path, monkeypatch):
+def test_names_of_close_changes_do_not_overlap(tmp_path, monkeypatch):
     changes = [RiverChange(t, "", name) for t, name in ((0.5, "wave"), (0.55, "high"), (0.6, "level"), (1.5, "wave"))]
     monkeypatch.setattr(figures, "river_changes", lambda recording: tuple(changes))
     with record(tmp_path / "rivers.h5") as rivers:
@@ -164,7 +164,7 @@ DRAWINGS = (path_figure, deviation_figure, forces_figure, torques_figure, tracki
 
 
 @pytest.mark.parametrize("draw", DRAWINGS, ids=lambda draw: draw.__name__)
-def test_no_legend_lies_on_data_and_no_text_is_cut(draw, recording):
+def test_legends_do_not_cover_data_and_text_is_not_clipped(draw, recording):
     with mpl.rc_context(STYLE):
         figure = draw(recording)
         figure.draw_without_rendering()
@@ -179,7 +179,7 @@ def test_no_legend_lies_on_data_and_no_text_is_cut(draw, recording):
     assert drawn.y1 <= height
 
 
-def test_all_of_the_tube_is_in_view(recording):
+def test_whole_tube_is_in_view(recording):
     figure = path_figure(recording)
     figure.draw_without_rendering()
     for ax in figure.axes:
@@ -189,13 +189,13 @@ def test_all_of_the_tube_is_in_view(recording):
         assert y_low < tube[:, 1].min() - 20.0 < tube[:, 1].max() + 20.0 < y_high
 
 
-def test_where_a_bent_curve_begins_to_be_performed_is_marked(tmp_path):
+def test_start_of_performance_is_marked(tmp_path):
     with record(tmp_path / "bent.h5", summary={"performance": {"start": 1.25}}) as bent:
         for figure in (deviation_figure(bent), tracking_figure(bent)):
             assert all("performed" in [text.get_text() for text in ax.texts] for ax in figure.axes)
 
 
-def test_the_deviation_is_in_millimetres_with_pushes_shaded(recording):
+def test_deviation_is_in_millimetres_with_pushes_shaded(recording):
     full, magnified = deviation_figure(recording).axes
     assert np.max(full.lines[-1].get_ydata()) == pytest.approx(10.0)
     assert spans(full) == [(pytest.approx(0.5), pytest.approx(0.699))]
@@ -208,7 +208,7 @@ def test_forces_are_shown_by_component_and_norm(recording):
     assert np.max(values(hand, "norm")) == pytest.approx(2.0)
 
 
-def test_torques_stand_against_the_limits_of_their_motor(recording, tmp_path):
+def test_torques_are_shown_with_motor_limits(recording, tmp_path):
     axes = torques_figure(recording).axes
     for ax, torque, continuous, peak in zip(axes, (100, -200, 300), (400, 300, 200), (1600, 1200, 800), strict=True):
         assert ax.lines[0].get_ydata()[0] == pytest.approx(torque)
@@ -223,7 +223,7 @@ def test_torques_stand_against_the_limits_of_their_motor(recording, tmp_path):
     assert peaks == pytest.approx([150.0, 200.0, 250.0])
 
 
-def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(recording):
+def test_tracking_figure_units_and_shaded_flights_and_falls(recording):
     axes = tracking_figure(recording).axes
     assert [ax.lines[0].get_ydata()[0] for ax in axes] == pytest.approx([1.0, 2.0, 10.0, 100.0])
     flight, fallen = (1.0, 1.19), (1.5, 1.69)
@@ -233,13 +233,13 @@ def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(r
     assert axes[2].lines[0].get_ydata()[110] == 0.0
 
 
-def test_a_long_recording_is_thinned(tmp_path):
+def test_long_recording_is_thinned(tmp_path):
     with record(tmp_path / "long.h5", n=3 * POINTS + 7) as recording:
         drawn = values(path_figure(recording).axes[0], "hand")
     assert POINTS / 2 < len(drawn) <= POINTS
 
 
-def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
+def test_nothing_is_shaded_without_pushes(tmp_path):
     with record(tmp_path / "calm.h5", pushing=False) as recording:
         full, _ = deviation_figure(recording).axes
         assert spans(full) == []
@@ -247,7 +247,7 @@ def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
 
 
 @pytest.mark.slow
-def test_no_display_is_needed(tmp_path):
+def test_figures_need_no_display(tmp_path):
     record(tmp_path / "run.h5").close()
     script = (
         "import sys; from pathlib import Path; from sim.recording.recording import Recording; "
@@ -256,5 +256,7 @@ def test_no_display_is_needed(tmp_path):
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"} | {"MPLBACKEND": "tkagg"}
-    done = subprocess.run([sys.executable, "-c", script, tmp_path / "run.h5", tmp_path], env=environment, check=False)
-    assert done.returncode == 0
+    completed = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "run.h5", tmp_path], env=environment, check=False
+    )
+    assert completed.returncode == 0

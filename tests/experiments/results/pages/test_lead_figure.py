@@ -1,4 +1,4 @@
-"""The picture of a led run: what is in it, in the units that it names, and nothing on top of it."""
+"""The figure of a led run: contents, units, and no overlapping text."""
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +15,7 @@ TURNED, SECONDS = 4.0, 9.0
 
 @pytest.fixture
 def figure(tmp_path):
-    """A figure that goes 4 m along x in as many seconds and back; a stylus in front of it, at a hundredth."""
+    """A figure that moves 4 m along x in 4 s and back; a stylus in front of it, at a scale of 1:100."""
     t, rows = np.arange(0.0, SECONDS, 1e-3), np.arange(0.0, SECONDS, 1e-2)
     s = np.minimum(t, np.maximum(2.0 * TURNED - t, 0.0))
     poses = np.tile(rest_pose(), (len(rows), 1))
@@ -36,7 +36,7 @@ def figure(tmp_path):
         yield figure
 
 
-def test_ways_speed_and_force_are_in_metres_seconds_and_newtons(figure) -> None:
+def test_paths_speed_and_force_have_si_units(figure) -> None:
     above, moving, feeling = figure.axes
     ways = {line.get_label(): line.get_xdata() for line in above.lines}
     assert (ways["stylus, forth"].min(), ways["stylus, forth"].max()) == pytest.approx((0.5, 4.5))
@@ -50,7 +50,7 @@ def test_ways_speed_and_force_are_in_metres_seconds_and_newtons(figure) -> None:
     assert (above.get_xlabel(), feeling.get_xlabel()) == ("x [m]", "time [s]")
 
 
-def test_shades_are_named_and_the_turn_is_marked(figure) -> None:
+def test_shaded_phases_are_named_and_the_turn_is_marked(figure) -> None:
     _, moving, feeling = figure.axes
     assert {text.get_text() for text in moving.get_legend().get_texts()} == {
         "on two feet",
@@ -60,7 +60,7 @@ def test_shades_are_named_and_the_turn_is_marked(figure) -> None:
     assert all(ax.lines[-1].get_xdata()[0] == pytest.approx(TURNED) for ax in (moving, feeling))
 
 
-def test_no_legend_lies_on_data_and_no_text_is_cut_or_on_another(figure) -> None:
+def test_legends_do_not_cover_data_or_titles_and_text_is_not_clipped(figure) -> None:
     drawn = [ax.get_window_extent() for ax in figure.axes]
     for ax in figure.axes:
         legend = ax.get_legend().get_window_extent()

@@ -1,4 +1,4 @@
-"""Plots of a run's page: their numbers are the recording's, no peak is lost, and a line is where the replay is."""
+"""Plots of a run's page: recorded values with all peaks, and a cursor that follows the replay."""
 
 import json
 import re
@@ -16,7 +16,7 @@ N = 20_000
 
 def section(tmp_path: Path) -> str:
     force, distance = np.zeros((N, 3)), np.linspace(0.0, 0.01, N)
-    force[12_345, 2] = -7.0  # a jolt of one tick
+    force[12_345, 2] = -7.0  # a peak of one tick
     groups = {"ticks": Group(1000.0, {"t": (), "force": (3,), "user": (3,), "distance": ()})}
     with Recorder(tmp_path / "run.h5", {}, 1, groups, {"distance_from": "</script>"}) as recorder:
         rows = {"t": np.arange(N) / 1000.0, "force": force, "user": np.zeros((N, 3)), "distance": distance}
@@ -26,9 +26,9 @@ def section(tmp_path: Path) -> str:
         return plots_html(recording)
 
 
-def test_the_numbers_are_the_recording_s_and_a_jolt_of_one_tick_is_among_them(tmp_path: Path) -> None:
-    made = section(tmp_path)
-    (text,) = re.findall(r'<script type="application/json" id="plot-data">(.*?)</script>', made, re.DOTALL)
+def test_plot_data_matches_recording_including_a_one_tick_peak(tmp_path: Path) -> None:
+    html = section(tmp_path)
+    (text,) = re.findall(r'<script type="application/json" id="plot-data">(.*?)</script>', html, re.DOTALL)
     data = json.loads(text)
     assert (data["start"], data["end"]) == (0.0, pytest.approx(19.999))
     distance, forces = data["plots"]
@@ -38,12 +38,12 @@ def test_the_numbers_are_the_recording_s_and_a_jolt_of_one_tick_is_among_them(tm
     field = np.array(forces["lines"][0]["y"])
     assert field.max() == 7.0
     assert np.argmax(field) / POINTS == pytest.approx(12_345 / N, abs=1.5 / POINTS)
-    assert len(made) < 60_000
-    assert "from </script>" not in made
+    assert len(html) < 60_000
+    assert "from </script>" not in html
 
 
 @pytest.mark.processes
-def test_in_a_browser_the_wheel_zooms_and_the_line_is_where_the_replay_is(tmp_path: Path) -> None:
+def test_browser_wheel_zooms_and_cursor_follows_the_replay(tmp_path: Path) -> None:
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = Path("/usr/bin/chromium")
     if not chromium.exists():

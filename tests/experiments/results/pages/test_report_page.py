@@ -1,4 +1,4 @@
-"""The report is one file that says what happened and asks for nothing else."""
+"""The report of a run is one self-contained file."""
 
 from html.parser import HTMLParser
 
@@ -49,33 +49,33 @@ def write(tmp_path, monkeypatch):
     return write
 
 
-def test_the_replay_is_embedded_unchanged(write):
+def test_replay_is_embedded_unchanged(write):
     assert write().attributes["srcdoc"] == [REPLAY]
 
 
-def test_lines_are_shown_as_text_even_if_they_look_like_markup(write):
+def test_lines_are_escaped(write):
     page = write(lines=("<script>alert(1)</script>", "a & b"))
     assert "script" not in page.tags
     assert {"<script>alert(1)</script>", "a & b"} <= set(page.texts)
 
 
-def test_nothing_is_fetched_from_elsewhere(write):
+def test_page_fetches_nothing(write):
     page = write()
     assert all(value.startswith("data:") for name in ("src", "href") for value in page.attributes[name])
     assert page.attributes["src"] == ["data:image/png;base64,iVBORyBub3QgcmVhbGx5"]
 
 
-def test_what_is_not_drawn_to_scale_is_said(write):
+def test_page_states_what_is_not_to_scale(write):
     assert "drawn with a radius of 15 mm for its 250 mm" in " ".join(write(radius=0.25).texts)
     assert "drawn with a radius" not in " ".join(write(radius=0.002).texts)
     assert "first 60 of 300 seconds" in " ".join(write(radius=0.003).texts)
 
 
-def test_what_surrounds_the_curve_is_called_what_it_is(write):
+def test_page_names_the_tube(write):
     assert "Light blue: the tube around the curve" in " ".join(" ".join(write(radius=0.004).texts).split())
 
 
-def test_each_river_is_named_in_its_colour(write):
+def test_rivers_are_named_in_their_colours(write):
     rivers = {"river_names": "level\nhi & lo", "river_curves": 0.05 * np.ones((2, 3, 1)) * np.eye(3)}
     page = write(radius=0.004, texts=rivers)
     assert "The rivers, each in its tube: level , hi & lo ." in " ".join(" ".join(page.texts).split())
@@ -83,7 +83,7 @@ def test_each_river_is_named_in_its_colour(write):
     assert [f"color:{color}" in styles for color in RIVERS[:3]] == [True, True, False]
 
 
-def test_where_there_is_no_tube_none_is_spoken_of(write):
+def test_page_without_tube_does_not_mention_one(write):
     assert "Light blue" not in " ".join(write(radius=0.0).texts)
 
 

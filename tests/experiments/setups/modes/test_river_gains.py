@@ -1,4 +1,4 @@
-"""Rivers have gains of their own, with which the default hand that pushes goes over from one river into another."""
+"""Default gains of rivers, with which the default push moves the hand from one river into another."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.hand.arm import hand_force
 
-MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s] of what the hand moves, about the Phantom's
+MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s]; mass and friction are about the Phantom's
 CURVE = Trajectory.circle(0.0477, 4.0)
 SECONDS = 4.0
 MAPS = map_parts(run_config(map="composite", clips=("cheer",)), figure_model())
@@ -29,8 +29,8 @@ def parts_with(mode: str = "rivers", user: str = "push", **words: object) -> Par
     return parts_of(resolved(run_config(mode, "composite", user, seconds=SECONDS, **words)), MAPS)
 
 
-def rivers_of_a_hand(parts: Parts) -> np.ndarray:
-    """Which river has the default hand, a mass with friction, at each tick from the beginning of the level river on."""
+def river_at_each_tick(parts: Parts) -> np.ndarray:
+    """River of the default hand, a mass with friction, at each tick; it starts on the level river."""
     assert isinstance(parts.field, HigherOrder)
     program, arm = parts.field.program(), parts.user.compiled()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
@@ -48,7 +48,7 @@ def rivers_of_a_hand(parts: Parts) -> np.ndarray:
     return rivers
 
 
-def test_the_rivers_gains_are_those_of_their_own_options() -> None:
+def test_rivers_and_follow_have_separate_default_gains() -> None:
     for words, expected in (({}, (16.0 / 150.0, 16.0)), ({"stiffness": 120.0, "damping": 12.0}, (0.1, 12.0))):
         field = parts_with(**words).field
         assert isinstance(field, HigherOrder)
@@ -60,7 +60,7 @@ def test_the_rivers_gains_are_those_of_their_own_options() -> None:
         assert (alone.k_r, alone.b_d) == expected
 
 
-def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
+def test_rivers_of_map_files_have_separate_default_gains() -> None:
     for words, expected in (({}, (50.0, 20.0)), ({"stiffness": 40.0, "damping": 10.0}, (40.0, 10.0))):
         mode = resolved(run_config("rivers", "any.npz", "push", **words)).mode
         assert isinstance(mode, Rivers)
@@ -68,7 +68,7 @@ def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
         assert river_time(mode) == pytest.approx(expected[1] / expected[0])
 
 
-def test_follow_keeps_a_pushed_hand_s_pace_on_composites_and_maps_from_a_file_and_else_flows_as_in_the_paper() -> None:
+def test_default_flow_of_follow_depends_on_the_map() -> None:
     assert resolved(run_config("follow", "any.npz")).mode == FollowMode(flow="parallel")
     assert resolved(run_config("follow", "any.npz", flow="curve")).mode == FollowMode(flow="curve")
     assert resolved(run_config("follow")).mode == FollowMode(flow="curve")
@@ -76,15 +76,15 @@ def test_follow_keeps_a_pushed_hand_s_pace_on_composites_and_maps_from_a_file_an
     assert resolved(run_config("follow", "composite", flow="curve")).mode == FollowMode(flow="curve")
 
 
-def test_the_default_push_takes_the_hand_from_the_level_river_into_another_which_keeps_it() -> None:
-    rivers = rivers_of_a_hand(parts_with())
+def test_default_push_moves_the_hand_into_another_river() -> None:
+    rivers = river_at_each_tick(parts_with())
     assert np.all(rivers[:1900] == 0.0)
     assert np.all(rivers[2600:] > 0.0)
     assert np.sum(rivers < 0.0) < 20
 
 
-def test_a_hand_that_does_not_push_stays_and_with_the_gains_of_one_curve_the_push_takes_it_nowhere() -> None:
-    assert np.all(rivers_of_a_hand(parts_with(user="relaxed")) == 0.0)
+def test_hand_stays_in_its_river_without_push_or_with_stiff_gains() -> None:
+    assert np.all(river_at_each_tick(parts_with(user="relaxed")) == 0.0)
     alone = FollowMode()
     stiff = parts_with(stiffness=alone.stiffness, damping=alone.damping)
-    assert not np.all(rivers_of_a_hand(stiff)[2600:] > 0.0)
+    assert not np.all(river_at_each_tick(stiff)[2600:] > 0.0)

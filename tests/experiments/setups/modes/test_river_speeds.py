@@ -1,4 +1,4 @@
-"""Fast and slow rivers hold a hand in spite of noisy encoders; pushes that fit change over, without chatter."""
+"""Fast and slow rivers hold a hand despite encoder noise; default pushes switch rivers without chatter."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ from sim.loop.loop import Loop
 RADIUS = 0.0477
 
 
-def rivers_of_a_hand(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
-    """River that has the hand of the simulated Phantom, at each tick; -1 for none."""
+def river_at_each_tick(lap: float, user: str, seconds: float, **more: str) -> np.ndarray:
+    """River of the hand on the simulated Phantom at each tick; -1 for none."""
     words = {"map": "rivers", "figure": "none", "clips": ("walk",), "lap": lap, "seed": 3, **more}
     session = wire(run_config(mode="rivers", user=user, seconds=seconds, **words))
     log = TrialLog(session.servo, session.world)
@@ -24,25 +24,25 @@ def rivers_of_a_hand(lap: float, user: str, seconds: float, **more: str) -> np.n
     return log.ticks["river"]
 
 
-def test_a_relaxed_hand_stays_on_a_slow_river() -> None:
-    np.testing.assert_array_equal(rivers_of_a_hand(14.0, "relaxed", 4.0), 0.0)
+def test_relaxed_hand_stays_on_a_slow_river() -> None:
+    np.testing.assert_array_equal(river_at_each_tick(14.0, "relaxed", 4.0), 0.0)
 
 
 @pytest.mark.parametrize("lap", [1.5, 4.0, 9.0, 12.5])
-def test_a_default_push_takes_a_hand_into_other_rivers_without_chatter_whatever_their_speed(lap: float) -> None:
-    rivers = rivers_of_a_hand(lap, "push", lap)
+def test_default_push_switches_rivers_without_chatter_at_any_speed(lap: float) -> None:
+    rivers = river_at_each_tick(lap, "push", lap)
     changes = rivers[1:][np.diff(rivers) != 0.0].tolist()
     assert changes in ([1.0], [1.0, 2.0])
 
 
-def test_a_person_who_changes_over_goes_to_the_nearest_other_river() -> None:
-    rivers = rivers_of_a_hand(4.0, "change", 8.0, person="median")
+def test_changing_person_switches_to_the_nearest_river() -> None:
+    rivers = river_at_each_tick(4.0, "change", 8.0, person="median")
     assert rivers[0] == 0.0
     assert rivers[-1] == 1.0
     assert np.mean(rivers < 0.0) < 0.02
 
 
-def test_pushes_across_are_as_measured_at_the_default_lap_and_none_below_what_was_found() -> None:
+def test_push_force_and_duration_scale_with_lap_and_vanish_if_slow() -> None:
     laps = (2.0, 4.0, 8.0, 14.0)
     faster, at_default, slower, slowest = (river_pushes(Trajectory.circle(RADIUS, lap), 30.0) for lap in laps)
     assert (faster[0].seconds, faster[0].force) == pytest.approx((0.15, 2.0 * RIVER_PUSH), rel=1e-3)
@@ -52,19 +52,17 @@ def test_pushes_across_are_as_measured_at_the_default_lap_and_none_below_what_wa
 
 
 @pytest.mark.parametrize(("lap", "margin"), [(2.0, 0.15 * 0.15), (4.0, 0.15 * 0.075), (12.0, LEAST_HYSTERESIS)])
-def test_rivers_let_go_by_a_share_of_their_speed_and_not_by_less_than_the_encoders_noise(
-    lap: float, margin: float
-) -> None:
+def test_hysteresis_is_a_share_of_speed_above_encoder_noise(lap: float, margin: float) -> None:
     choice = default_choice(Rivers(), Trajectory.circle(RADIUS, lap), 0.025)
     assert choice.hysteresis == pytest.approx(margin, rel=2e-3)
 
 
 @pytest.mark.parametrize("name", ["rivers", "cylindrical"])
-def test_rivers_too_slow_for_pushes_are_said_before_the_run(name: str) -> None:
-    def said(lap: float) -> list[str]:
+def test_rivers_too_slow_for_pushes_are_reported(name: str) -> None:
+    def remarks_on_speed(lap: float) -> list[str]:
         config = run_config(mode="rivers", map=name, figure="none", clips=("walk",), lap=lap)
         return [remark for remark in wire(config).remarks if "mm/s" in remark]
 
-    (slow,) = said(21.0)
+    (slow,) = remarks_on_speed(21.0)
     assert slow.startswith("the rivers lead the hand at 14.3 mm/s")
-    assert not said(8.0)
+    assert not remarks_on_speed(8.0)

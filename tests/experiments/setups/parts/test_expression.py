@@ -1,4 +1,4 @@
-"""The figure's gaze and lean: which way it looks, that no joint leaves its range, that the feet stay."""
+"""The figure's gaze and lean: direction, joint ranges, and unmoved feet."""
 
 import mujoco
 import numpy as np
@@ -46,7 +46,7 @@ def placed(pose):
     ("turn", "axis", "sign"),
     [((0.0, 0.0, 0.5), 1, 1.0), ((0.0, 0.5, 0.0), 2, -1.0), ((0.0, 0.0, -0.5), 1, -1.0), ((0.0, -0.5, 0.0), 2, 1.0)],
 )
-def test_it_looks_where_the_stylus_points(figure_map, turn, axis, sign):
+def test_head_looks_where_the_stylus_points(figure_map, turn, axis, sign):
     x = np.array([0.05, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     turned = np.concatenate([x[:3], wxyz(Rotation.from_rotvec(turn))])
     before, after = (placed(figure_map.pose(stylus)).body("head").xmat.reshape(3, 3) for stylus in (x, turned))
@@ -56,7 +56,7 @@ def test_it_looks_where_the_stylus_points(figure_map, turn, axis, sign):
     assert looked[0] == pytest.approx(np.cos(0.5), abs=0.05)
 
 
-def test_it_leans_to_the_side_to_which_the_stylus_rolls_and_its_feet_stay(figure_map):
+def test_trunk_leans_with_stylus_roll_and_feet_stay(figure_map):
     x = np.array([0.05, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     rolled = np.concatenate([x[:3], wxyz(Rotation.from_rotvec([0.6, 0.0, 0.0]))])
     before, after = (placed(figure_map.pose(stylus)) for stylus in (x, rolled))
@@ -69,7 +69,7 @@ def test_it_leans_to_the_side_to_which_the_stylus_rolls_and_its_feet_stay(figure
 
 
 @pytest.mark.parametrize("name", embedded_names())
-def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name):
+def test_joints_stay_in_range_for_any_stylus_orientation(figure_map, name):
     rng = np.random.default_rng(0)
     clip = embedded(name).poses
     poses = clip[rng.integers(len(clip), size=1500)].copy()
@@ -83,7 +83,7 @@ def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name
         assert (vectors < high).all()
 
 
-def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_bent():
+def test_orientation_moment_is_added_only_on_request():
     curve = Trajectory.circle(0.05, 4.0)
     program = Follow(curve, 300.0, 8.0).program()
     for none in (None, OrientationMoment(), run_config().mode.orientation):
@@ -91,7 +91,7 @@ def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_
     damped = run_config(orientation_damping=1e-3).mode.orientation
     assert len(with_moment(program, damped, curve, 0.25).ops) == len(program.ops) + 2
     belongs = "it belongs to --mode follow, --mode bunny, --mode rivers"
-    for options, says in (
+    for options, message in (
         (
             {"mode": "stretch", "orientation_stiffness": 0.1},
             f"--orientation-stiffness has no meaning with --mode stretch; {belongs}",
@@ -99,5 +99,5 @@ def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_
         ({"orientation_stiffness": -0.1}, "orientation_stiffness is -0.1; expected 0 N m/rad or more, and finite"),
         ({"orientation_damping": np.nan}, "orientation_damping is nan; expected 0 N m s/rad or more, and finite"),
     ):
-        with pytest.raises(ParameterError, match=says):
+        with pytest.raises(ParameterError, match=message):
             run_config(**options)

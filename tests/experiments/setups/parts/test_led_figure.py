@@ -1,4 +1,4 @@
-"""Which feet of a capture stand: swings and flights last for some time, and in a flight no foot rests."""
+"""Stances of a capture: least durations of swings and flights, and feet that sink or lift briefly."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ FEET = {"left": np.arange(4), "right": np.arange(4, 8)}
 
 
 def marks(*rests: tuple[str, float, float, float]) -> Contacts:
-    """Contacts of a lap of a second: a foot that rests from a time to another at a height, and is 0.2 m high else."""
+    """Contacts of a lap of 1 s from (foot, start, end, height) of rests; otherwise feet are 0.2 m high."""
     heights, resting = np.full((FRAMES, 10), 0.2), np.zeros((FRAMES, 10), dtype=bool)
     t = np.arange(FRAMES) / FPS
     for foot, start, end, height in rests:
@@ -20,7 +20,7 @@ def marks(*rests: tuple[str, float, float, float]) -> Contacts:
     return Contacts(heights, resting.copy(), resting)
 
 
-def test_a_walk_is_left_as_it_is() -> None:
+def test_stances_of_a_walk_are_unchanged() -> None:
     stands = stances(marks(("left", 0.0, 0.6, 0.0), ("right", 0.5, 1.0, 0.0)), FPS)
     assert stands.shape == (FRAMES - 1, 2)
     np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(60))
@@ -28,7 +28,7 @@ def test_a_walk_is_left_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("gap", [0.02, 0.12])
-def test_a_foot_that_is_up_for_a_moment_stood_all_the_time(gap: float) -> None:
+def test_brief_lift_of_a_foot_counts_as_stance(gap: float) -> None:
     # On one foot alone, and beside the other.
     walk = (("left", 0.0, 0.2, 0.0), ("left", 0.2 + gap, 0.6, 0.0), ("right", 0.1, 0.7, 0.0))
     both = stances(marks(*walk), FPS)
@@ -37,19 +37,19 @@ def test_a_foot_that_is_up_for_a_moment_stood_all_the_time(gap: float) -> None:
     np.testing.assert_array_equal(np.flatnonzero(alone[:, 0]), np.arange(60))
 
 
-def test_who_hops_on_a_foot_and_who_runs_fly() -> None:
+def test_hops_and_runs_have_flights_and_brief_gaps_have_none() -> None:
     hops = stances(marks(("left", 0.0, 0.3, 0.0), ("left", 0.5, 0.8, 0.0)), FPS)
     assert not hops[30:50].any()
     runs = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.4, 0.9, 0.0)), FPS)
     assert not runs[30:40].any()
     assert not runs[90:].any()
-    # Nobody flies from foot to foot for 30 ms.
+    # A gap of 30 ms between the feet is not a flight.
     walks = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.33, 1.0, 0.0)), FPS)
     assert walks.any(axis=1).all()
     np.testing.assert_array_equal(np.flatnonzero(walks[:, 0]), np.arange(33))
 
 
-def test_a_heel_that_sinks_into_the_floor_makes_no_flight_of_the_toes() -> None:
+def test_sinking_heel_causes_no_flight() -> None:
     # 3 cm below the floor for most of its stance, then on it, when the other has not landed yet.
     feet = (("left", 0.0, 0.4, -0.03), ("left", 0.4, 0.55, 0.0), ("right", 0.52, 1.0, 0.0))
     stands = stances(marks(*feet), FPS)

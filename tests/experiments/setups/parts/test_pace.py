@@ -1,4 +1,4 @@
-"""Curves that make up for what the device costs: how much it is, and what speed they ask for."""
+"""Curves that compensate friction and inertia of the device: forces along the curve, and the resulting speed."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from sim.world.world import World, phantom_angles
 CURVE = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01))
 
 
-def test_friction_takes_the_power_that_mujoco_s_joints_lose():
+def test_friction_along_curve_matches_mujoco_joint_losses():
     model = World().model
     dofs = [int(model.joint(PHANTOM + name).dofadr[0]) for name in ("theta1", "theta2", "theta3")]
     phases, step = np.linspace(0.1, 2.0, 7), 1e-5
@@ -31,7 +31,7 @@ def test_friction_takes_the_power_that_mujoco_s_joints_lose():
         assert 0.03 < force < 0.15
 
 
-def test_inertia_along_a_curve_is_what_changes_the_kinetic_energy():
+def test_inertial_force_along_curve_matches_kinetic_energy():
     phases, step = np.linspace(0.1, 2.0, 7), 1e-4
     waved = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01), wave=0.01)
 
@@ -47,7 +47,7 @@ def test_inertia_along_a_curve_is_what_changes_the_kinetic_energy():
 
 
 def _turn_rate(lap: float) -> float:
-    """Of a hand that FOLLOW leads round a circle of 32 mm, over the lap's own, from the third second on."""
+    """Turn rate of a hand led by FOLLOW round a circle of 32 mm, relative to the lap's, after 3 s."""
     session = wire(run_config(radius=0.032, reach=0.01, lap=lap, seconds=5.0, figure="none"))
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(5.0)
@@ -56,37 +56,39 @@ def _turn_rate(lap: float) -> float:
     return float((angle[-1] - angle[0]) / (t[-1] - t[0])) * lap / (2.0 * np.pi)
 
 
-def test_a_hand_that_goes_round_outside_a_bend_keeps_the_curves_angle(monkeypatch):
+def test_hand_outside_a_bend_keeps_the_turn_rate(monkeypatch):
     assert _turn_rate(0.6) == pytest.approx(1.0, abs=0.004)
     monkeypatch.setattr(pace, "_MAX_LENGTHENING", 0.0)
     assert _turn_rate(0.6) < 0.985
 
 
-def test_the_speed_that_is_asked_for_is_that_of_the_curve_and_what_the_device_costs():
+def test_paced_speed_is_curve_speed_plus_device_losses():
     found = paced(CURVE, 8.0, 300.0)
     assert found.periodic
     np.testing.assert_array_equal(found.positions, CURVE.positions)
-    own = np.asarray(CURVE.times)
-    middles = 0.5 * (own[1:] + own[:-1])
-    asked = np.linalg.norm(np.diff(CURVE.point(own), axis=0), axis=1) / np.diff(np.asarray(found.times))
+    times = np.asarray(CURVE.times)
+    middles = 0.5 * (times[1:] + times[:-1])
+    paced_speed = np.linalg.norm(np.diff(CURVE.point(times), axis=0), axis=1) / np.diff(np.asarray(found.times))
     speed = np.linalg.norm(CURVE.velocity(middles), axis=1)
     along, bending = inertia_along(CURVE, middles)
     cost = friction_along(CURVE, middles) + along
-    np.testing.assert_allclose(asked, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
-    # The more a field drags and the stiffer it is, the less the device matters; without a spring no bend is kept.
+    np.testing.assert_allclose(paced_speed, speed * (1.0 + bending / 300.0) + cost / 8.0, rtol=2e-3)
+    # Device losses matter less with more drag and stiffness; without a spring bends are not compensated.
     assert found.duration < paced(CURVE, 80.0, 300.0).duration < paced(CURVE, 80.0, 3000.0).duration < CURVE.duration
     assert paced(CURVE, 80.0, 0.0).duration > paced(CURVE, 80.0, 3000.0).duration
 
 
-def test_an_open_curve_stays_open_and_begins_when_it_did():
-    way = Trajectory([1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]])
-    found = paced(way, 8.0, 300.0)
+def test_open_curve_stays_open_with_same_start():
+    curve = Trajectory(
+        [1.0, 1.5, 2.0, 3.0], [[0.02, 0.0, 0.0], [0.03, 0.01, 0.0], [0.04, 0.01, 0.01], [0.05, 0.0, 0.0]]
+    )
+    found = paced(curve, 8.0, 300.0)
     assert not found.periodic
     assert found.start == 1.0
 
 
 @pytest.mark.parametrize(
-    ("drag", "stiffness", "said"),
+    ("drag", "stiffness", "message"),
     [
         (-1.0, 300.0, "drag must be finite and at least 0 N s/m, got -1"),
         (0, 300.0, "drag must be more than 0 N s/m, got 0"),
@@ -94,11 +96,11 @@ def test_an_open_curve_stays_open_and_begins_when_it_did():
         ("8", 300.0, "drag is '8'; expected a number"),
     ],
 )
-def test_a_drag_that_leads_no_hand_is_told(drag, stiffness, said):
-    with pytest.raises(ParameterError, match=said):
+def test_invalid_drag_or_stiffness_is_refused(drag, stiffness, message):
+    with pytest.raises(ParameterError, match=message):
         paced(CURVE, drag, stiffness)
 
 
-def test_a_curve_out_of_reach_is_told():
+def test_curve_out_of_reach_is_refused():
     with pytest.raises(SimError, match="does not reach"):
         paced(Trajectory.circle(0.9, 2.0), 8.0, 300.0)

@@ -1,3 +1,5 @@
+"""Statistics of a study: effects, intervals, corrections, and the sentences on them."""
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,7 @@ def frame(effect: float, users: int = 16, seed: int = 1, between: bool = False):
 
 
 @pytest.mark.slow
-def test_an_effect_that_is_there_is_found_with_its_size_and_one_that_is_not_is_not() -> None:
+def test_present_effect_is_found_with_its_size_and_absent_one_is_not() -> None:
     found = statistics(frame(-1.0), FACTORS, (), ["tracking_error", "effort"], seed=3)
     (river,) = found.of("tracking_error", "guidance")
     assert river.low < -1.0 < river.high
@@ -44,7 +46,7 @@ def test_an_effect_that_is_there_is_found_with_its_size_and_one_that_is_not_is_n
 
 
 @pytest.mark.slow
-def test_holm_s_correction_is_over_all_contrasts_and_never_makes_one_smaller() -> None:
+def test_holm_correction_covers_all_contrasts() -> None:
     found = statistics(frame(-0.1), FACTORS, (), ["tracking_error", "effort"], seed=3)
     ps = sorted((c.p, c.p_holm) for c in found.contrasts)
     assert len(ps) == 4
@@ -56,21 +58,21 @@ def test_holm_s_correction_is_over_all_contrasts_and_never_makes_one_smaller() -
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_truth_about_as_often_as_they_say_where_users_differ_in_the_effect() -> None:
-    held = np.zeros(2)
+def test_interval_coverage_with_user_specific_effects() -> None:
+    covered = np.zeros(2)
     for seed in range(40):
-        made = frame(-0.2, 12, seed)
-        made["tracking_error"] += (made["guidance"] == "river") * np.random.default_rng(seed).normal(size=12)[
-            made["user"]
+        table = frame(-0.2, 12, seed)
+        table["tracking_error"] += (table["guidance"] == "river") * np.random.default_rng(seed).normal(size=12)[
+            table["user"]
         ]
-        (c,) = statistics(made, {"guidance": FACTORS["guidance"]}, (), ["tracking_error"], 1).contrasts
-        held += [c.low <= -0.2 <= c.high, c.model_low <= -0.2 <= c.model_high]
+        (c,) = statistics(table, {"guidance": FACTORS["guidance"]}, (), ["tracking_error"], 1).contrasts
+        covered += [c.low <= -0.2 <= c.high, c.model_low <= -0.2 <= c.model_high]
     # Of 95 %, less than 33 of 40 has a chance of 1 in 2000; a bootstrap of twelve users is a little narrow. Repetitions
     # taken for users would hold it in 15 of 40.
-    assert np.all(held >= 33)
+    assert np.all(covered >= 33)
 
 
-def test_a_factor_between_users_is_compared_between_them() -> None:
+def test_between_user_factor_is_compared_between_users() -> None:
     found = statistics(frame(-1.0, between=True), FACTORS, ("map",), ["tracking_error"], seed=3)
     (other,) = found.of("tracking_error", "map")
     assert other.users == 16
@@ -78,74 +80,74 @@ def test_a_factor_between_users_is_compared_between_them() -> None:
     assert other.low < 0.0 < other.high
 
 
-def test_effect_sizes_are_the_published_ones() -> None:
+def test_effect_sizes_match_published_formulas() -> None:
     assert cohen_dz(np.array([1.0, 2.0, 3.0])) == pytest.approx(2.0)
     one, other = np.array([2.0, 4.0, 6.0]), np.array([1.0, 3.0, 5.0])
     assert hedges_g(one, other) == pytest.approx(0.5 * (1.0 - 3.0 / 15.0))
 
 
 @pytest.mark.slow
-def test_failed_trials_are_left_out_and_told() -> None:
-    made = frame(-1.0)
-    made.loc[0, ["state", "tracking_error"]] = ["failed", np.nan]
+def test_failed_trials_are_excluded_and_reported() -> None:
+    table = frame(-1.0)
+    table.loc[0, ["state", "tracking_error"]] = ["failed", np.nan]
     study = study_from(
         {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}, "map": {"a": {}, "b": {}}}, "cost": "effort"},
         "",
     )
-    found = statistics(made, FACTORS, (), ["tracking_error", "effort"], 1)
-    said = three_sentences(study, found, made, 1)
-    assert "of which 1 failed" in said[0]
-    assert said[1].startswith("Tracking error, by guidance: lower (better) with river than with none")
-    assert "no difference shown between river and none" in said[2]
+    found = statistics(table, FACTORS, (), ["tracking_error", "effort"], 1)
+    sentences = three_sentences(study, found, table, 1)
+    assert "of which 1 failed" in sentences[0]
+    assert sentences[1].startswith("Tracking error, by guidance: lower (better) with river than with none")
+    assert "no difference shown between river and none" in sentences[2]
 
 
-def test_an_interval_that_excludes_zero_and_shows_no_difference_is_beside_the_corrected_p() -> None:
+def test_interval_without_zero_is_reported_with_corrected_p() -> None:
     contrast = Contrast(
         "effort", "stiffness", "600", "50", 6, 0.4, 0.6, -0.2, -0.304, -0.188, -0.2, -0.2, -0.2, -0.3, -0.1, 0.01,
         0.057, -1.0, 6,
     )  # fmt: skip
     study = study_from({"name": "s", "factors": {"stiffness": [50, 600]}, "cost": "effort"}, "")
-    said = three_sentences(study, Statistics((contrast,), {}, ()), frame(-1.0), 0)[2]
-    assert "no difference shown between 600 and 50" in said
-    assert "-0.304 to -0.188 N² s; p = 0.057 corrected after Holm)" in said
+    sentence = three_sentences(study, Statistics((contrast,), {}, ()), frame(-1.0), 0)[2]
+    assert "no difference shown between 600 and 50" in sentence
+    assert "-0.304 to -0.188 N² s; p = 0.057 corrected after Holm)" in sentence
 
 
-def test_what_is_not_known_is_said_with_its_reason() -> None:
-    made = frame(-1.0)
-    made["effort"], made["sparc"] = 2.0, np.nan
-    told = {
+def test_unknown_effects_are_reported_with_their_reason() -> None:
+    table = frame(-1.0)
+    table["effort"], table["sparc"] = 2.0, np.nan
+    reasons = {
         "expressiveness": "needs a kinematic figure",
         "effort": "the same in all trials",
         "sparc": "no trial has it",
     }
-    for cost, reason in told.items():
+    for cost, reason in reasons.items():
         study = study_from(
             {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}}, "cost": cost, "users": {"number": 1}}, ""
         )
-        found = statistics(made, FACTORS, (), ["effort", "sparc"], 1)
-        first, _, said = three_sentences(study, found, made, 0)
-        assert reason in said
+        found = statistics(table, FACTORS, (), ["effort", "sparc"], 1)
+        first, _, last = three_sentences(study, found, table, 0)
+        assert reason in last
         assert first.startswith("One simulated person met 2 conditions")
 
 
-def test_two_trials_that_differ_are_compared_without_an_interval() -> None:
-    made = frame(-1.0)
-    two = made[(made["user"] == 0) & (made["map"] == "a")].drop_duplicates("guidance")
+def test_two_trials_are_compared_without_an_interval() -> None:
+    table = frame(-1.0)
+    two = table[(table["user"] == 0) & (table["map"] == "a")].drop_duplicates("guidance")
     (river,) = statistics(two, FACTORS, (), ["tracking_error"], 1).contrasts
     assert river.users == 1
     assert np.isnan(river.low)
     assert river.difference == pytest.approx(river.mean - river.reference_mean)
 
 
-def test_repetitions_of_a_user_do_not_count_as_users() -> None:
+def test_repetitions_do_not_count_as_users() -> None:
     # Users differ in what the river does to them; then the model's interval is the paired t test's, not a narrower one.
     from scipy.stats import ttest_rel
 
-    rng, made = np.random.default_rng(5), frame(-0.2)
+    rng, table = np.random.default_rng(5), frame(-0.2)
     own = rng.normal(scale=0.8, size=16)
-    made["tracking_error"] += (made["guidance"] == "river") * own[made["user"]]
-    (river,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
-    means = made.groupby(["user", "guidance"])["tracking_error"].mean().unstack()
+    table["tracking_error"] += (table["guidance"] == "river") * own[table["user"]]
+    (river,) = statistics(table, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+    means = table.groupby(["user", "guidance"])["tracking_error"].mean().unstack()
     paired = ttest_rel(means["river"], means["none"])
     low, high = paired.confidence_interval(0.95)
     assert river.p == pytest.approx(paired.pvalue, rel=0.02)
@@ -154,40 +156,40 @@ def test_repetitions_of_a_user_do_not_count_as_users() -> None:
 
 
 @pytest.mark.parametrize("seed", [2, 4, 10])
-def test_the_model_is_the_paired_t_test_where_users_who_are_worse_are_helped_more(seed: int) -> None:
+def test_model_equals_paired_t_test_for_correlated_effects(seed: int) -> None:
     from scipy.stats import ttest_rel
 
-    made, own = frame(-0.2, users=6, seed=seed), np.random.default_rng(seed).normal(size=6)
-    made["tracking_error"] += (1.0 - 0.25 * (made["guidance"] == "river")) * own[made["user"]]
-    (river,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
-    means = made.groupby(["user", "guidance"])["tracking_error"].mean().unstack()
+    table, own = frame(-0.2, users=6, seed=seed), np.random.default_rng(seed).normal(size=6)
+    table["tracking_error"] += (1.0 - 0.25 * (table["guidance"] == "river")) * own[table["user"]]
+    (river,) = statistics(table, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+    means = table.groupby(["user", "guidance"])["tracking_error"].mean().unstack()
     assert river.p == pytest.approx(ttest_rel(means["river"], means["none"]).pvalue, rel=0.005)
 
 
 @pytest.mark.slow
-def test_an_interaction_is_found_where_it_is_and_not_where_it_is_not() -> None:
-    made = frame(-1.0)
-    made["tracking_error"] += ((made["guidance"] == "river") & (made["map"] == "b")) * 0.8
-    found = statistics(made, FACTORS, (), ["tracking_error", "effort"], 1).interactions
+def test_interaction_is_found_only_where_present() -> None:
+    table = frame(-1.0)
+    table["tracking_error"] += ((table["guidance"] == "river") & (table["map"] == "b")) * 0.8
+    found = statistics(table, FACTORS, (), ["tracking_error", "effort"], 1).interactions
     assert found["tracking_error"] < 1e-4
     assert found["effort"] > 0.05
     between = statistics(frame(-1.0, between=True), FACTORS, ("map",), ["tracking_error"], 1).interactions
     assert between["tracking_error"] > 0.05
 
 
-def test_a_failed_condition_does_not_weigh_against_the_other_level() -> None:
-    # Map b is 5 mm worse; where its trials with the river failed, its trials without it say nothing of the river.
-    made = frame(0.0)
-    made["tracking_error"] += 5.0 * (made["map"] == "b")
-    lost = (made["user"] < 8) & (made["map"] == "b") & (made["guidance"] == "river")
-    made.loc[lost, ["state", "tracking_error"]] = ["failed", np.nan]
-    (river,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+def test_failed_condition_does_not_bias_the_other_level() -> None:
+    # Map b is 5 mm worse; users whose trials of it with the river failed must not bias the effect of the river.
+    table = frame(0.0)
+    table["tracking_error"] += 5.0 * (table["map"] == "b")
+    lost = (table["user"] < 8) & (table["map"] == "b") & (table["guidance"] == "river")
+    table.loc[lost, ["state", "tracking_error"]] = ["failed", np.nan]
+    (river,) = statistics(table, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
     assert abs(river.difference) < 0.3
 
 
-def test_a_factor_may_have_the_name_of_a_function_of_the_formula() -> None:
-    made, renamed = frame(-1.0), frame(-1.0).rename(columns={"map": "C"})
-    (found,) = statistics(made, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
+def test_factor_name_may_equal_a_formula_function() -> None:
+    table, renamed = frame(-1.0), frame(-1.0).rename(columns={"map": "C"})
+    (found,) = statistics(table, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")
     factors = {"guidance": FACTORS["guidance"], "C": FACTORS["map"]}
     (same,) = statistics(renamed, factors, (), ["tracking_error"], 1).of("tracking_error", "guidance")
     assert same == found

@@ -1,3 +1,5 @@
+"""Designs of studies: orders, groups, trial keys, and refused designs."""
+
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +21,7 @@ def study(**values: object):
 
 
 @pytest.mark.parametrize("n", range(2, 9))
-def test_every_condition_stands_in_every_place_and_follows_every_other_one_equally_often(n: int) -> None:
+def test_order_is_balanced_in_positions_and_sequences(n: int) -> None:
     rows = balanced_rows(n)
     places = Counter((place, condition) for row in rows for place, condition in enumerate(row))
     follows = Counter(pair for row in rows for pair in pairwise(row))
@@ -29,33 +31,33 @@ def test_every_condition_stands_in_every_place_and_follows_every_other_one_equal
     assert len(follows) == n * (n - 1)
 
 
-def test_within_users_every_user_meets_every_condition_as_often_as_it_is_repeated() -> None:
-    made = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
-    met = meetings(made)
-    assert len(conditions(made)) == 6
+def test_within_users_every_user_meets_every_condition() -> None:
+    design = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
+    met = meetings(design)
+    assert len(conditions(design)) == 6
     assert set(Counter((m.user, m.number) for m in met).values()) == {2}
     assert all(sorted(m.position for m in met if m.user == user) == list(range(12)) for user in range(7))
 
 
-def test_between_users_a_user_meets_one_level_and_the_groups_are_equally_large() -> None:
-    made = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
-    levels = {user: {m.condition.levels["damping"] for m in meetings(made) if m.user == user} for user in range(9)}
+def test_between_users_groups_are_equal_with_one_level_each() -> None:
+    design = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
+    levels = {user: {m.condition.levels["damping"] for m in meetings(design) if m.user == user} for user in range(9)}
     assert all(len(met) == 1 for met in levels.values())
     assert set(Counter(next(iter(met)) for met in levels.values()).values()) == {3}
 
 
-def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
+def test_more_users_keep_the_trials_of_earlier_ones() -> None:
     few, many = (planned(study(users={"number": number})) for number in (3, 5))
     assert [trial.key for trial in few] == [trial.key for trial in many[: len(few)]]
     assert len({trial.key for trial in many}) == len(many)
 
 
-def test_people_lead_where_the_mode_is_to_lead() -> None:
-    made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
-    assert {trial.config.user.does for trial in planned(made)} == {"lead"}
+def test_people_lead_in_lead_mode() -> None:
+    design = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
+    assert {trial.config.user.does for trial in planned(design)} == {"lead"}
 
 
-def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
+def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
     file, keys = tmp_path / "device.json", set[str]()
     for content in ("{}", '{"identified": {}}'):
         file.write_text(content, encoding="utf-8")
@@ -65,7 +67,7 @@ def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"factors": {}}, "has no factors"),
         ({"factors": {"stiffness": []}}, "'stiffness' has no levels"),
@@ -88,14 +90,14 @@ def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
         ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
     ],
 )  # fmt: skip
-def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
-    with pytest.raises(StudyError, match=says) as raised:
+def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
+    with pytest.raises(StudyError, match=message) as raised:
         planned(study(**values))
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"repetitions": 0}, "repetitions is "),
         ({"order": "random"}, "order is "),
@@ -106,40 +108,40 @@ def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str,
         ({"between": "map"}, "between is 'map'"),
     ],
 )
-def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says: str) -> None:
-    with pytest.raises(ParameterError, match=says) as raised:
+def test_unknown_or_invalid_study_value_is_refused_by_name(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as raised:
         study(**values)
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("levels", "says"),
+    ("levels", "message"),
     [([1, 2, 1], "has level 1 twice"), (3, "'stiffness' is 3; expected a list of values, or a table of levels")],
 )
-def test_levels_that_are_none_or_the_same_are_refused(levels: object, says: str) -> None:
-    with pytest.raises(StudyError, match=says):
+def test_invalid_or_duplicate_levels_are_refused(levels: object, message: str) -> None:
+    with pytest.raises(StudyError, match=message):
         study(factors={"stiffness": levels})
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("values", "message"),
     [
         ({"measures": ["speed"]}, "no measure 'speed'"),
         ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical"),
         ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
     ],
 )
-def test_a_measure_that_nobody_takes_is_refused(values: dict[str, object], says: str) -> None:
-    with pytest.raises(StudyError, match=says):
+def test_unavailable_measure_is_refused(values: dict[str, object], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
         Study(study(**values)).run("nowhere")
 
 
 @pytest.mark.parametrize("path", [p for p in EXAMPLES if "space" not in p.read_text()], ids=lambda path: path.stem)
-def test_the_shipped_studies_can_be_planned(path: Path) -> None:
+def test_example_studies_can_be_planned(path: Path) -> None:
     assert planned(study_from(read_toml(path, "a study"), str(path)))
 
 
-def test_a_file_that_is_no_toml_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_invalid_toml_is_refused_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("name = ]\n", encoding="utf-8")
     with pytest.raises(StudyError, match="line 1"):
         read_toml(tmp_path / "s.toml", "a study")

@@ -1,3 +1,5 @@
+"""The database of a study's trials."""
+
 import sqlite3
 from pathlib import Path
 
@@ -16,7 +18,7 @@ def row(key: str, value: float = 1.0) -> Row:
     return Row(key, "done", "", {"effort": value, "sparc": float("nan")}, 0.5, "here", "processor")
 
 
-def test_rows_come_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_rows_round_trip_exactly(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as database:
         database.add(row("k", 0.1 + 0.2), {"user": 3})
     with opened(tmp_path / "s.sqlite") as database:
@@ -26,7 +28,7 @@ def test_rows_come_back_to_the_last_bit(tmp_path: Path) -> None:
     assert back[:3] == ("k", "done", "")
 
 
-def test_the_table_is_what_the_documents_say(tmp_path: Path) -> None:
+def test_table_has_the_documented_schema(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as database:
         database.add(row("k"), {"user": 3})
     plain = sqlite3.connect(tmp_path / "s.sqlite")
@@ -35,7 +37,7 @@ def test_the_table_is_what_the_documents_say(tmp_path: Path) -> None:
     plain.close()
 
 
-def test_a_second_driver_is_refused_and_the_first_goes_on(tmp_path: Path) -> None:
+def test_second_driver_is_refused_and_the_first_continues(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as first:
         with pytest.raises(StudyError, match="another hvf is writing it"):
             opened(tmp_path / "s.sqlite")
@@ -44,11 +46,11 @@ def test_a_second_driver_is_refused_and_the_first_goes_on(tmp_path: Path) -> Non
         assert again.keys() == {"k"}
 
 
-def test_a_full_disk_is_a_line_and_loses_nothing(tmp_path: Path) -> None:
+def test_full_disk_is_reported_and_keeps_the_rows(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as database:
         database.add(row("first"), {})
         pages = database._db.execute("PRAGMA page_count").fetchone()[0]
-        database._db.execute(f"PRAGMA max_page_count = {pages + 2}")  # SQLite's own refusal of a page that is not there
+        database._db.execute(f"PRAGMA max_page_count = {pages + 2}")  # SQLite refuses further pages, as on a full disk
         with pytest.raises(StudyError, match="the disk is full; every trial so far is kept"):
             database.add(row("large"), {"padding": "x" * 40_000})
     with opened(tmp_path / "s.sqlite") as again:
@@ -56,7 +58,7 @@ def test_a_full_disk_is_a_line_and_loses_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("change", ["version", "study", "other", "none"])
-def test_a_database_that_is_not_of_this_study_is_refused_and_left_alone(tmp_path: Path, change: str) -> None:
+def test_foreign_database_is_refused_and_unchanged(tmp_path: Path, change: str) -> None:
     path = tmp_path / "s.sqlite"
     if change == "none":
         path.write_bytes(b"no database at all, but long enough to be taken for a file" * 4)
@@ -70,8 +72,13 @@ def test_a_database_that_is_not_of_this_study_is_refused_and_left_alone(tmp_path
             plain.execute("PRAGMA user_version = 99")
             plain.close()
     before = path.read_bytes()
-    says = {"version": "of version 99", "study": "holds another study", "other": "something else", "none": "not a data"}
-    with pytest.raises(StudyError, match=says[change]):
+    messages = {
+        "version": "of version 99",
+        "study": "holds another study",
+        "other": "something else",
+        "none": "not a data",
+    }
+    with pytest.raises(StudyError, match=messages[change]):
         opened(path, "b" if change == "study" else "a")
     assert path.read_bytes()[:64] == before[:64]
     if change in ("version", "study"):

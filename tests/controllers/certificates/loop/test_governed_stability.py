@@ -1,0 +1,32 @@
+"""Stability of a loop with a speed governor: certified, refuted, and unknown in between."""
+
+from controllers.certificates.loop.governed import governed_stability, most_drag
+from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River
+from controllers.curves.trajectory import Trajectory
+from experiments.certify.certified_device import phantom_device
+
+CIRCLE = Trajectory.circle(0.0477, 4.0)
+DEVICE = phantom_device()
+
+
+def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
+    return River(law, k_r, b_d, width, curve, DEVICE, Sampling(1e-3))
+
+
+def test_governor_drag_is_certified_by_circle_criterion_or_refuted_if_unstable():
+    hands = [HandImpedance(), HandImpedance(0.1, 2.0, 100.0)]
+    soft, hard, between = (governed_stability(river(), drag, hands) for drag in (8.0, 200.0, 45.0))
+    assert (soft.verdict, hard.verdict, between.verdict) == ("certified", "refuted", "unknown")
+    assert 20.0 < soft.figures["governor_certain"] < 45.0
+    assert "governor of 200" in hard.reason
+    assert hard.counterexample["growth_rate"] > 100.0
+
+
+def test_circle_criterion_drag_is_below_critical_drag():
+    loop = SampledLoop(river().still(), Sampling(1e-3))
+    assert 0.3 < most_drag(loop, 300.0, 8.0) / 70.0 < 1.0
+    assert most_drag(loop, 20_000.0, 8.0) == 0.0

@@ -1,0 +1,88 @@
+"""Ctrl-C during a command: what was computed is kept, and stderr says how to continue."""
+
+import contextlib
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from experiments.cli import main
+from experiments.trials.study import DATABASE
+from sim.recording.recording import Recording
+
+
+def _default_interrupt() -> None:
+    """Undo the ignored SIGINT that a child of a background shell inherits."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: float) -> str:
+    """stderr of a command that gets SIGINT `wait` seconds after it is ready."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        start_new_session=True, preexec_fn=_default_interrupt,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120.0
+    while not ready() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(wait)
+    os.killpg(process.pid, signal.SIGINT)
+    stderr = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, stderr
+    return stderr
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["run", "--figure", "none", "--seconds", "2000", "--out", str(out)]
+    stderr = stderr_of_interrupted(words, (out / "run.h5").exists, wait=1.5)
+    assert f"hvf report {out}" in stderr.replace("\n", " ")
+    with Recording(out / "run.h5") as recording:
+        assert not recording.complete
+        assert len(recording.channel("ticks", "t")) > 500
+    assert main(["report", str(out)]) == 0
+    assert "The run was stopped: " in (out / "report.html").read_text(encoding="utf-8")
+    assert (out / "summary.json").exists()
+
+
+STUDY = """name = "Stopped"
+seconds = 2.0
+repetitions = 12
+[run]
+figure = "none"
+[users]
+number = 4
+[factors]
+stiffness = [100, 300]
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> None:
+    pytest.importorskip("statsmodels", reason="needs the study extra")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    words = ["trials", str(tmp_path / "study.toml"), "--out", str(tmp_path / "study")]
+    database = f"file:{tmp_path / 'study' / DATABASE}?mode=ro"
+
+    def stored_trials() -> int:
+        with (
+            contextlib.suppress(sqlite3.OperationalError),
+            sqlite3.connect(database, uri=True) as rows,
+        ):
+            return rows.execute("select count(*) from trials").fetchone()[0]
+        return 0
+
+    stderr = stderr_of_interrupted(words, lambda: stored_trials() > 0, wait=0.0)
+    assert "the same command goes on" in stderr
+    assert str(tmp_path / "study") in stderr
+    before = stored_trials()
+    assert 0 < before < 96
+    assert main(words) == 0
+    assert stored_trials() == 96

@@ -1,0 +1,96 @@
+"""Start of a run: it imports nothing that it does not need, and compiles nothing in its own process."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifted import Lifted
+from experiments.files.map_files import save_map
+from experiments.fitting.figure_legs import figure_legs
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
+from tests.experiments.own_process import RUNS, TELLS, compiled, process
+
+HEAVY = ("matplotlib", "casadi", "viser", "trimesh", "scipy.stats", "scipy.signal", "scipy.integrate")
+
+_IMPORTS = f"""
+import sys
+import experiments.cli, experiments.runs.run
+print(*(name for name in {HEAVY} if name in sys.modules))
+"""
+
+_EVALUATE_LAW = """
+import hvf
+import numpy as np
+field = hvf.Follow(hvf.circle(radius=0.0477, lap=4.0), k_r=300.0, b_d=8.0)
+print(np.linalg.norm(field.wrench(hvf.HandState.at((0.05, 0.0, 0.0)))[0]))
+"""
+
+_COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
+
+
+@pytest.mark.slow
+def test_run_imports_no_heavy_module_early() -> None:
+    assert not process(_IMPORTS).stdout.split()
+
+
+def test_only_the_named_command_is_imported() -> None:
+    code = "import sys; from experiments.cli import parsed; parsed(['track', 'walk']); print(*sys.modules)"
+    found = {name for name in process(code).stdout.split() if name.startswith("experiments.commands.")}
+    assert found == {"experiments.commands.track"}
+
+
+def test_compilation_listener_reports_compiled_functions() -> None:
+    assert "compiles smooth_step" in compiled(process(TELLS + _COMPILES))
+
+
+def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
+    """As certification does with the program of a run."""
+    for completed in (process(TELLS + _EVALUATE_LAW), process(TELLS + _EVALUATE_LAW)):
+        assert float(completed.stdout) > 0.0
+    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(completed)).split())
+
+
+@pytest.fixture(scope="module")
+def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = [embedded(name) for name in ("cheer", "angry")]
+    sites = np.tile([[0.05, 0.0], [0.06, 0.0]], (64, 1, 1))
+    angles = [np.linspace(0.0, 2.0 * np.pi, clip.n_frames) for clip in clips]
+    motions = [(clip.poses, clip.fps) for clip in clips]
+    path = tmp_path_factory.mktemp("start") / "map.npz"
+    save_map(Lifted(motions, [True, True], angles, sites, figure_legs(figure_model()), ("cheer", "angry")), path)
+    return path
+
+
+@pytest.mark.slow
+def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> None:
+    completed = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    assert "The stylus ran" in completed.stdout
+    assert compiled(completed) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls")],
+    ids=["cylinder", "lifted", "expressive"],
+)
+def test_run_compiles_nothing_in_its_own_process(arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path) -> None:
+    given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
+    completed = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
+    assert "The stylus ran" in completed.stdout
+    assert compiled(completed) == []
+
+
+@pytest.mark.slow
+def test_drawing_modules_are_not_imported_before_the_first_tick() -> None:
+    drawing = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
+    code = (
+        "import sys, experiments.cli, experiments.runs.run, experiments.setups.wiring; "
+        f"print([name for name in {drawing} if name in sys.modules])"
+    )
+    stdout = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert stdout.strip() == "[]"

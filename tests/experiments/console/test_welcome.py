@@ -1,0 +1,13 @@
+"""What `hvf` without arguments prints."""
+
+from experiments.cli import main, parsed
+from experiments.console.welcome import WELCOME
+
+
+def test_welcome_text_names_only_existing_commands(capsys) -> None:
+    assert main([]) == 0
+    stdout = capsys.readouterr().out
+    assert stdout == WELCOME + "\n"
+    for line in stdout.splitlines():
+        if line.startswith("  hvf "):
+            assert callable(parsed(line.strip().split("  ")[0].split()[1:])), line

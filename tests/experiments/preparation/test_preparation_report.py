@@ -1,0 +1,72 @@
+"""The report of `hvf prepare`: flights as certificates define them, and what was added to the file's motion."""
+
+import numpy as np
+import pytest
+
+from experiments.flights.ballistics import clip_ballistics, clip_flights
+from experiments.preparation.prepared_file import changes, doubts
+from models.gravity import GRAVITY
+from models.mocap.library import embedded, embedded_names
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation.bounds import FLYING, RESIDUAL
+from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation.well_formed import well_formed
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
+
+
+@pytest.mark.parametrize("name", embedded_names())
+def test_clip_flights_equal_those_of_its_certificate(name):
+    clip = embedded(name)
+    fits = [flight.fit for flight in clip_ballistics(clip).flights]
+    expected = [(fit.time, fit.time + fit.duration) for fit in fits]
+    np.testing.assert_allclose(np.reshape(clip_flights(clip), (-1, 2)), np.reshape(expected, (-1, 2)))
+    assert well_formed(clip, clip_flights(clip)).flights == len(fits)
+
+
+def test_flight_across_the_loop_seam_is_one_flight():
+    jump = embedded("jump")
+    cut = next(
+        part for k in range(0, jump.n_frames, 4)
+        if clip_flights(part := Clip(jump.with_next_lap().poses[k : k + jump.n_frames], jump.fps, "jump"))[-1][1]
+        > part.duration + 0.1
+    )  # fmt: skip
+    flights = clip_flights(cut)
+    assert [end - start for start, end in flights] == pytest.approx([end - start for start, end in clip_flights(jump)])
+    assert well_formed(cut, flights).falling < 0.1
+    quick = Clip(cut.poses, 2.0 * cut.fps, "quick")
+    assert well_formed(quick, clip_flights(quick)).falling == pytest.approx(3.0 * GRAVITY, rel=0.05)
+
+
+def test_flights_raise_the_residual_bound():
+    run = embedded("run")
+    measures = well_formed(run, clip_flights(run))
+    assert measures.flights > 0
+    assert RESIDUAL < FLYING
+    lacking = type(measures)(**{**vars(measures), "residual": (RESIDUAL + FLYING) / 2.0})
+    assert not any("contact lacks" in line for line in lacking.faults())
+    assert any("contact lacks" in line for line in type(measures)(**{**vars(lacking), "flights": 0}).faults())
+
+
+def test_hovering_clip_has_unknown_ballistics_in_the_report():
+    jump = embedded("jump")
+    hovering = Clip(jump.poses + np.eye(75)[2] * 0.03, jump.fps, "hovering")
+    (line,) = doubts(clip_ballistics(hovering))
+    assert line.startswith("whether it is ballistic is unknown: ")
+    assert "falls at" not in line  # of flights that are certified
+    assert doubts(clip_ballistics(jump)) == ()
+
+
+def test_turns_beyond_friction_are_reported():
+    ginga = embedded("ginga")
+    (line,) = doubts(clip_ballistics(Clip(ginga.poses, 4.0 * ginga.fps, "quick")))
+    assert line.startswith("turns are refuted: the floor gives it up to 0.")
+
+
+@pytest.mark.slow
+def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
+    walk = embedded("walk")
+    write_rig(Rig(), Clip(walk.poses[:2], walk.fps, "walk"), tmp_path / "two.bvh")
+    lines = changes(prepared(tmp_path / "two.bvh"))
+    assert (
+        "the file's own motion is 0.01 s; the rest is coming to rest at both ends, which is not in the file" in lines[1]
+    )

@@ -1,0 +1,36 @@
+"""The measure of the stylus' path."""
+
+import numpy as np
+import pytest
+
+from experiments.results.measures.run_measures import PathMeasure
+
+
+class PathRecording:
+    """The arrays of a recording that `PathMeasure` reads."""
+
+    def __init__(self, clip_seconds: float):
+        self._arrays = {"curve_span": np.array([0.0, 4.0]), "curve_closed": 0.0, "clip_seconds": clip_seconds}
+        self.texts: dict[str, str] = {}
+
+    def array(self, name: str) -> np.ndarray:
+        return np.asarray(self._arrays[name])
+
+
+@pytest.mark.parametrize("block", [100, 5000])
+def test_stylus_at_end_of_open_curve_is_reported_as_stopped(block: int) -> None:
+    t = np.arange(5000) * 1e-3
+    phase = np.minimum(2.0 * t, 4.0)  # twice its own pace, and at its end at 2 s
+    jitter = 2e-4 * np.sin(300.0 * t)
+    p = np.stack([0.01 * phase + jitter, 0.0 * t, 0.0 * t], axis=1)
+    rows = {"t": t, "phase": phase, "p": p, "nearest": p, "distance": 0.0 * t, "user": 0.0 * p}
+    measure = PathMeasure(PathRecording(4.0))  # pyright: ignore[reportArgumentType]
+    for first in range(0, len(t), block):
+        measure.add({name: values[first : first + block] for name, values in rows.items()})
+    path = measure.summary()
+    assert path.stopped_at == pytest.approx(1.95, abs=0.1)
+    assert path.pace == pytest.approx(2.0, rel=0.05)
+    assert "stood still from" in (path.line() or "")
+    going = PathMeasure(PathRecording(np.nan))  # pyright: ignore[reportArgumentType]
+    going.add({name: values[:1900] for name, values in rows.items()})
+    assert going.summary().line() is None

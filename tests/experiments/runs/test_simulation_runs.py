@@ -1,0 +1,108 @@
+"""Simulations from Python: the example script, runs in memory, ticks, own maps that fail, replay in a notebook."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hvf
+
+EXAMPLE = Path(__file__).with_name("interface_example.py").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_example_script_runs_unchanged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(EXAMPLE, "interface_example", "exec"), names)
+    run = names["run"]
+    assert isinstance(run, hvf.Run)
+    assert run.summary.path.deviation_rms < 1e-3
+    assert run.ticks["force"].shape == (20000, 3)
+    assert hvf.load("edited.bvh").duration == pytest.approx(20.0, abs=0.1)
+    assert {"force_0", "p_2"} <= set(run.frame().columns)
+    last = names["r"]
+    assert isinstance(last, hvf.Swept)
+    assert last.values == {"field.k_r": 800}
+    assert "so is any switching between them" in capsys.readouterr().out  # of the cases of the floor
+
+
+@pytest.fixture(scope="module")
+def sim() -> hvf.Simulation:
+    curve = hvf.circle(lap=2.0)
+    return hvf.Simulation(
+        field=hvf.Follow(curve, k_r=300, b_d=8), haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=curve),
+        figure=hvf.Figure(kind="none"),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(sim: hvf.Simulation) -> hvf.Run:
+    return sim.run(0.5)
+
+
+def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
+    values = [sim, sim.field, sim.haptic_map, run, run.ticks, hvf.circle(), hvf.clips("walk")[0], hvf.persona("median")]
+    for value in values:
+        assert len(repr(value)) < 600, repr(value)
+        assert "array(" not in repr(value), repr(value)
+        assert "0x" not in repr(value), repr(value)
+
+
+def test_channels_of_an_unreferenced_run_can_be_read(sim: hvf.Simulation) -> None:
+    assert sim.run(0.1).ticks["p"].shape == (100, 3)
+
+
+def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Failing(hvf.HapticMap):
+        def pose(self, x: np.ndarray) -> np.ndarray:
+            if x[1] > 1e-3:
+                raise ValueError("beyond what this map was made for")
+            return hvf.rest_pose()
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    moves = hvf.Simulation(
+        field=hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8), haptic_map=Failing(),
+        figure=hvf.Figure(kind="kinematic"),
+    )  # fmt: skip
+    with pytest.raises(Exception, match="beyond what this map"):
+        moves.run(0.5)
+    assert not list(tmp_path.iterdir())
+
+
+def test_html_repr_of_run_contains_the_replay(run: hvf.Run) -> None:
+    page = run._repr_html_()
+    assert page.startswith("<iframe srcdoc=")
+    assert "Replay in 3D" in page
+
+
+def test_simulation_is_iterated_tick_by_tick(sim: hvf.Simulation) -> None:
+    times = []
+    for tick in sim:
+        times.append(tick.hand.t)
+        if len(times) == 5:
+            break
+    np.testing.assert_allclose(np.diff(times), 1e-3, atol=1e-12)
+
+
+def test_errors_of_own_map_end_the_run() -> None:
+    class Fails(hvf.HapticMap):
+        def pose(self, x):
+            if x[1] > 0.0:
+                raise ValueError("no such place")
+            return hvf.rest_pose()
+
+    curve = hvf.circle(lap=1.0)
+    field = hvf.Follow(curve, k_r=300, b_d=8)
+    failing = hvf.Simulation(field=field, haptic_map=Fails(), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(ValueError, match="no such place"):
+        failing.run(0.5)
+
+    class Small(hvf.HapticMap):
+        def pose(self, x):
+            return np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+    with pytest.raises(hvf.ParameterError, match="poses of Small have 7 numbers; the figure's have 75"):
+        hvf.Simulation(field=field, haptic_map=Small()).run(0.5)

@@ -1,0 +1,18 @@
+"""Defaults of a run in its resolved configuration."""
+
+from pathlib import Path
+
+from experiments.cli import main, parsed
+
+
+def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> None:
+    """Default pushes are written out, so that a run of the file repeats them."""
+    from experiments.config.run_config import load_config
+    from experiments.setups.parts.defaults import resolved
+
+    out = tmp_path / "pushed"
+    assert main(["run", "--figure", "none", "--user", "push", "--lap", "0.5", "--seconds", "1", "--out", str(out)]) == 0
+    config = load_config(out / "config.json")
+    assert config.user.pushes
+    assert resolved(config) == config
+    assert parsed(["run", "--config", str(out / "config.json")])

@@ -1,0 +1,74 @@
+"""Mistakes on the command line: one line on stderr that names the option and what would be right, exit code 2."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.experiments.refused_command import refused
+
+ROOT = Path(__file__).resolve().parents[2]
+WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than 9223372036854775808"),
+        (["lift", "walk", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than"),
+        (["arm", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than"),
+        (["run", "--out", ""], "nothing is given behind --out; expected a value"),
+        (["run", "--out="], "nothing is given behind --out; expected a value"),
+        (["run", "--seconds", "1e12"], "--seconds is 1e+12: a recording of 4e+05 TB or more, and "),
+        (["run", "--seconds", "1e12", "--user", "push"], "--seconds is 1e+12: a recording of"),
+        (["arm", "--seconds", "1e12"], "--seconds is 1e+12: a recording of"),
+        (["run", "--mode", "stretch", "--lap", "0.01"], "--lap is 0.01; expected 0.1 s or more"),
+        (["run", "--stiffness", "abc"], "--stiffness is 'abc'; expected a number; hvf run --help"),
+        (["run", "--seed", "1.5"], "--seed is '1.5'; expected a whole number; hvf run --help"),
+        (["run", "--crossing", "sideways"], "--crossing is 'sideways'; expected discrete, smooth, sum; hvf run"),
+        (["run", "--mode"], "nothing is given behind --mode; expected a value; hvf run --help"),
+        (["run", "--clips"], "nothing is given behind --clips; expected one or more names"),
+        (["live", "--clips", "--mode", "lead"], "nothing is given behind --clips; expected one or more names"),
+        (["live", "--clips", "nope.bvh"], "nope.bvh: cannot be opened (No such file or directory)"),
+        (["live", "--map", "nope.npz"], "nope.npz: cannot be read (No such file or directory)"),
+        (["run", "--bogus", "1"], "unrecognized options: --bogus, 1; hvf run --help"),
+        (["certify", "--no-no-hand"], "unrecognized options: --no-no-hand"),
+        (["run", "--no-governor"], "unrecognized options: --no-governor"),
+        (["bogus"], "hvf COMMAND --help lists what there is"),
+        (["hardware"], "expected one of {list, doctor, run, "),
+        (
+            ["convert"],
+            "missing from hvf convert: PATH (Motion file to read), PATH (File to write: .bvh, or .glb for glTF)",
+        ),
+        (
+            ["picture", "run", "--fine", "run.png"],
+            "missing from hvf picture: PATH, or an option is mistyped; hvf picture",
+        ),
+        (["live", "--port", "99999999"], "--port is 99999999; expected less than 65536"),
+        (["convert", "nowhere.bvh", "x.bvh"], "hvf: nowhere.bvh: cannot be opened (No such file or directory)"),
+        (["convert", "walk.bvh", "x.fbx"], "only BVH and glTF can be written; expected a name that ends in .bvh, .glb"),
+        (["track", "nowhere.bvh"], "hvf: nowhere.bvh: cannot be opened (No such file or directory)"),
+        (["run", "--clips", "nowhere.amc"], "hvf: nowhere.amc: cannot be opened (No such file or directory)"),
+    ],
+)
+def test_mistake_is_refused_in_one_line(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message in refused(arguments, capsys)
+    assert not list(tmp_path.iterdir())
+
+
+def test_bend_too_large_for_the_lap_names_both_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["run", "--mode", "stretch", "--lap", "0.8", "--figure", "none", "--out", str(tmp_path / "run")]
+    assert "expected --lap 1.1 or more, or --bump 0.39 or less" in refused(command, capsys)
+
+
+def test_motion_file_of_unsupported_format_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(WALK, tmp_path / "walk.fbx")
+    stderr = refused(["convert", str(tmp_path / "walk.fbx"), str(tmp_path / "out.bvh")], capsys)
+    assert "walk.fbx: .fbx files are not read; expected BVH, AMC (with its ASF beside it) or DeepMimic JSON" in stderr
