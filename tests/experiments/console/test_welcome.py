@@ -1,7 +1,6 @@
 """What `hvf` without arguments prints."""
 
-from experiments.cli import main, parsed
-from experiments.console.welcome import WELCOME
+from experiments.cli import WELCOME, main, parsed
 
 
 def test_welcome_text_names_only_existing_commands(capsys) -> None:
