@@ -6,7 +6,10 @@ from tyro.conf import Positional
 
 from experiments.config.part import above, at_least, part
 from experiments.console.output import Json, say
-from sim.body.figure_state import CLIP_GAINS
+from sim.body.figure_state import FigureGains
+
+
+_GAINS = FigureGains()
 
 
 @part
@@ -19,9 +22,9 @@ class Command:
     """Simulated time for each [s]."""
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
-    residual_force: Annotated[float, at_least(0.0)] = CLIP_GAINS.force_bound
+    residual_force: Annotated[float, at_least(0.0)] = _GAINS.force_bound
     """Largest force at the root beside ground and joints, as a share of body weight [1]."""
-    residual_moment: Annotated[float, at_least(0.0)] = CLIP_GAINS.moment_bound
+    residual_moment: Annotated[float, at_least(0.0)] = _GAINS.moment_bound
     """Largest such moment, as a share of body weight × stature [1]."""
     json: Json = False
 

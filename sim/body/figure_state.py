@@ -87,11 +87,6 @@ class FigureGains(NamedTuple):
     placement_reach: float = 0.08
 
 
-CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)
-"""Gains for a clip at its own pace: the smallest bounds with which the embedded clips stand
-(docs/validation/residual-bounds.md)."""
-
-
 class FigureState(NamedTuple):
     """Views of the world's MjData, restricted to the figure, and scratch memory.
 

@@ -143,7 +143,7 @@ def test_common_stride_count_of_two_clips_is_found(map_with_offsets: RiverClips)
         joints = river_changes._clip_poses(alike, river, lap)[:, 7:]
         assert np.abs(joints - np.roll(joints, 840 // strides, axis=0)).max() < 0.02
     assert strides > 1
-    assert river_changes._strides(map_with_offsets.on_one_river(), 0, 2) == 1
+    assert river_changes._stride_count(map_with_offsets.on_one_river(), 0, 2) == 1
 
 
 @pytest.mark.parametrize(
