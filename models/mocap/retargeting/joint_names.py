@@ -123,6 +123,8 @@ def _parse(words: list[str], sided: frozenset[str], link: bool) -> JointName:
     if not side and not _CENTRE_WORDS.issuperset(others):
         others = [word for word in others if word not in _CENTRE_WORDS]
     bare = "".join(word for word in others if word not in _NOISE_WORDS)
+    beyond_torso = bare.removeprefix("torso")  # torso_head, lTorso_Clavicle (GAMES-105): between two bodies
+    bare = beyond_torso if beyond_torso == "head" or beyond_torso in sided else bare
     noisy, helper = link or not _NOISE_WORDS.isdisjoint(others), not _HELPER_WORDS.isdisjoint(others)
     if not side:
         for mark in _SIDES:

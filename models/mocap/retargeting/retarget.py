@@ -35,6 +35,7 @@ from models.mocap.retargeting.retarget_report import (
     frame_remarks,
     haste_remarks,
     held_remarks,
+    in_place_remarks,
     joint_jump_remarks,
     unit_name,
 )
@@ -112,6 +113,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *held_remarks(filled, motion.fps, frames.dropped),
         *haste_remarks(legs, motion.fps),
+        *in_place_remarks(path, hip_to_ankle, motion.fps),
         *joint_jump_remarks([jump for jump in joint_jumps if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
         *([_SITTING_REMARK.format(round(100.0 * hip_shift))] if hip_shift else ()),

@@ -40,6 +40,11 @@ COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captur
 # Speed of an ankle relative to its hip [m/s] that no leg exceeds for a tenth of a capture, and the quantile: 8 in a
 # file of a kick, 15 in the fastest of some 450 captures, an estimate from video; a walk has 3.
 _MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
+# Hips that stay within the first number of metres for the second number of seconds, and the median speed of the lower
+# ankle above which it slides [m/s]. In 410 captures and variants of them, feet of bodies that stay in place slide at
+# 0.35 m/s and more where the travel was taken out, and where legs never rest (a swimmer, jumping jacks); elsewhere at
+# 0.25 at most.
+_MAX_IN_PLACE_EXTENT, _MIN_IN_PLACE_TIME, _MIN_SLIDING_SPEED = 0.12, 0.5, 0.3
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -148,7 +153,7 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
 
 def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
     """Limbs whose end is defined neither by a joint nor by a tip."""
-    ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles}
+    ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles, "foot": lines.toes}
     named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
@@ -198,6 +203,32 @@ def haste_remarks(legs: Array, fps: float) -> Iterator[str]:
     if swift > _MAX_ANKLE_SPEED:
         remark = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
         yield f"{remark}: if {fps:g} frames a second are not so, state the --frame-rate"
+
+
+def in_place_remarks(path: Array, ankles: Array, fps: float) -> Iterator[str]:
+    """Feet that slide most of the time under a root that stays in one place.
+
+    Parameters
+    ----------
+    path : array of shape (n, 3)
+        Middle of the hips [m].
+    ankles : array of shape (n, 2, 3)
+        The ankles relative to it [m].
+    fps : float
+        Frame rate [1/s].
+    """
+    extent = float(np.ptp(path[:, :2], axis=0).max())
+    if extent > _MAX_IN_PLACE_EXTENT or len(path) < _MIN_IN_PLACE_TIME * fps:
+        return
+    places = path[:, None] + ankles
+    lower = np.argmin(places[:, :, 2], axis=1)
+    steps = np.gradient(places[:, :, :2], axis=0)[np.arange(len(path)), lower]
+    speed = fps * float(np.median(np.linalg.norm(steps, axis=1)))
+    if speed > _MIN_SLIDING_SPEED:
+        remark = (
+            f"the lower foot slides at {two_digits(speed)} m/s or more half of the time, while the hips stay in place"
+        )
+        yield f"{remark} (within {two_digits(extent)} m): if the body's travel was taken out, it is lost"
 
 
 def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iterator[str]:

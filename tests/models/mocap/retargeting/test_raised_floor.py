@@ -94,6 +94,20 @@ def test_root_that_does_not_move_is_given_as_the_reason_for_hanging_feet():
     assert "it stands on something" in remark
 
 
+@pytest.mark.parametrize(("name", "kept"), [("walk", 0.0), ("run", 0.01)])
+def test_feet_that_slide_under_a_root_whose_travel_was_taken_out_are_remarked(name, kept, tmp_path):
+    clip, poses = embedded(name), embedded(name).poses.copy()
+    poses[:, :2] *= kept
+    (remark,) = [line for line in report_of(Clip(poses, clip.fps, "r"), tmp_path / "r.bvh").remarks if "slides" in line]
+    speed = np.hypot(clip.displacement.x, clip.displacement.y) / clip.duration
+    assert float(remark.split("slides at ")[1].split(" m/s")[0]) == pytest.approx(speed, rel=0.35)
+
+
+@pytest.mark.parametrize("name", ["walk", "run", "squat_dance", "cheer", "angry", "ginga", "jump"])
+def test_feet_of_a_body_that_travels_or_stands_are_not_said_to_slide(name, tmp_path):
+    assert not [line for line in report_of(embedded(name), tmp_path / "r.bvh").remarks if "slides" in line]
+
+
 def test_floor_penetration_is_remarked_with_depth_and_time():
     clearance = np.zeros(200)
     clearance[50:60] = -0.28

@@ -45,6 +45,14 @@ VENDOR_RIGS = {
         センター @足ＩＫ @つま先ＩＫ""",
         "左 右", "下半身 上半身 上半身2 頭 左肩 左腕 左ひじ 左手首 左足 左ひざ 左足首 左つま先",
     ),
+    "GAMES-105": (
+        """RootJoint pelvis_lowerback lowerback_torso torso_head
+        lowerback_torso @Torso_Clavicle @Shoulder @Elbow @Wrist
+        RootJoint @Hip @Knee @Ankle @ToeJoint""",
+        "l r",
+        "RootJoint pelvis_lowerback lowerback_torso torso_head lTorso_Clavicle lShoulder lElbow lWrist lHip lKnee lAnkle "
+        "lToeJoint",
+    ),
     "Rigify metarig": (
         """spine spine.001 spine.002 spine.003 spine.004 spine.005 spine.006
         spine pelvis.@
