@@ -115,6 +115,12 @@ def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
 
 
 @njit
+def linkage_angles(theta: Vec3) -> tuple[float, float, float, float, float]:
+    """θ1, θ2, θ3, elbow θ3 − θ2 and twin θ2 − θ3: the joints that `models.phantom.spec` names; rates likewise."""
+    return theta[0], theta[1], theta[2], theta[2] - theta[1], theta[1] - theta[2]
+
+
+@njit
 def within_limits(theta: Vec3) -> bool:
     """Whether joint angles [rad] are within the limits of θ1, θ2, θ3 and, due to the parallelogram, of θ3 − θ2."""
     bend = theta[2] - theta[1]

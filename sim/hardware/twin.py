@@ -27,9 +27,9 @@ from numba import njit
 from controllers.state import Array, IntArray
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
-from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
+from models.phantom.kinematics import forward_kinematics, jacobian, linkage_angles, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
-from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS, MOTORS
+from models.phantom.spec import LINKAGE_JOINTS, MOTORS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.world.plant import Plant, make_plant, step
@@ -121,9 +121,8 @@ class TwinMemory(NamedTuple):
 @njit
 def _predict(twin: TwinMemory, predicted: Array) -> None:
     """Advance the model by a period; writes the joint angles to `predicted` (3,), and the rates to the twin's state."""
-    q, w, plant = twin.theta, twin.rate, twin.plant
-    angles = (q[0], q[1], q[2], q[2] - q[1], q[1] - q[2])
-    speeds = (w[0], w[1], w[2], w[2] - w[1], w[1] - w[2])
+    w, plant = twin.rate, twin.plant
+    angles, speeds = linkage_angles(twin.theta), linkage_angles(w)
     for i in range(5):
         plant.qpos[twin.places[i]], twin.qvel[twin.rates[i]] = angles[i], speeds[i]
     for i in range(3):
@@ -199,7 +198,7 @@ class Twin:
         self._world = World(scene, "none")
         self._world.reset(np.zeros(3), rest_pose())
         model, data = self._world.model, self._world.data
-        joints = [model.joint(PHANTOM + name) for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]
+        joints = [model.joint(PHANTOM + name) for name in LINKAGE_JOINTS]
         a, b, c = (int(model.actuator(PHANTOM + name).id) for name in MOTORS)
         pole = math.exp(-BANDWIDTH * scene.servo_period)
         self._memory = TwinMemory(
