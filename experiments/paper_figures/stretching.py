@@ -23,7 +23,7 @@ def stretching(runs: Path) -> Figure:
     """Figure 6: the curve before and after the hand has stretched it, and in FOLLOW with the force on the hand."""
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
-        before = MILLIMETRES * recording.array("curve")
+        before = MILLIMETRES * recording.arrays["curve"]
         start = performance_start(recording)
         end = float(recording.channel("ticks", "t")[-1])
         _, editing, pressed = ticks(recording, 0.0, start, "p", "switch")

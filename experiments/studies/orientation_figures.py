@@ -94,7 +94,7 @@ def turning_figure(recording: Recording) -> Figure:
 def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
     """Pictures of the physical figure side by side: with the stylus upright, and in each of its turns."""
     config = config_of(recording)
-    lap = recording.array("curve_span")[1]
+    lap = recording.arrays["curve_span"][1]
     moments = [0.95 * lap, *(lap * (1.25 + 0.5 * k) for k in range(6))]
     model = world_model(config.scene)
     data, root = mujoco.MjData(model), int(model.joint(FIGURE + "root").qposadr[0])

@@ -51,7 +51,7 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
         with mpl.rc_context(STYLE):
             draw(recording).savefig(file, dpi=150)
         images.append(f'<img alt="{name}" src="data:image/png;base64,{base64.b64encode(file.read_bytes()).decode()}">')
-    title = html.escape(f"{recording.text('title')}, on a device")
+    title = html.escape(f"{recording.texts['title']}, on a device")
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     (folder / REPORT).write_text(_PAGE.format(title=title, lines=items, figures="".join(images)), encoding="utf-8")
 
