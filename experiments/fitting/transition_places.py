@@ -6,9 +6,9 @@ that go there and back within a lap, such as a run from one end of a room to the
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
+from controllers.state import stylus_path
 from sim.reference.reference import map_poses
 
 # [m]; a hand changes over within about 0.25 s, so that a figure is carried by 1 m/s. Transitions of the embedded clips

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.curves.stylus import stylus_path
 from controllers.rotations import logarithm, multiply, rotate
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.config.words import run_config
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.results.pages.figures import AXES, STYLE
