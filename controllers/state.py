@@ -27,6 +27,8 @@ HAND_ANGULAR_VELOCITY = 11
 HAND_SWITCH = 14
 HAND_SIZE = 15
 
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+"""Orientation of the upright stylus, wxyz: its axes are parallel to those of H."""
 LONGEST_STEP = 0.05
 """Largest time step by which states driven by the hand's clock advance [s], so that they do not jump after a pause."""
 
@@ -67,8 +69,7 @@ class HandState(NamedTuple):
     @staticmethod
     def at(p: npt.ArrayLike, v: npt.ArrayLike = (0.0, 0.0, 0.0), t: float = 0.0) -> "HandState":
         """Hand at position p [m] with velocity v [m/s] at time t [s]; stylus upright, not turning, switch open."""
-        upright = np.array([1.0, 0.0, 0.0, 0.0])
-        return HandState(t, np.asarray(p, dtype=float), upright, np.asarray(v, dtype=float), np.zeros(3))
+        return HandState(t, np.asarray(p, dtype=float), np.array(UPRIGHT), np.asarray(v, dtype=float), np.zeros(3))
 
     @staticmethod
     def of(vector: Array) -> "HandState":
@@ -93,6 +94,11 @@ def hand_state(vector: Array) -> HandState:
         (vector[11], vector[12], vector[13]),  # pyright: ignore[reportArgumentType]
         vector[HAND_SWITCH] > 0.0,
     )
+
+
+def stylus_path(points: Array) -> Array:
+    """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
+    return np.hstack((points, np.tile(UPRIGHT, (len(points), 1))))
 
 
 class Wrench(NamedTuple):

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 from controllers.legs.limb_ends import SHARP, end_poses, lowest_point
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
+from controllers.motion.time_warping import least_cost_lead, smooth_lead
 from controllers.state import Array, IntArray
 
 LARGEST_LEAD = 0.125  # largest lead or lag of a warp, as a fraction of the lap
@@ -72,27 +73,12 @@ def _time_warp(reference: Array, features: Array) -> Array:
     cost = ((features[index] - reference[:, None, :]) ** 2).sum(axis=2)
     # A small cost of the lead, so that without a difference in mismatch there is no warp.
     cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _MAX_LEAD)
-    total = np.full(len(leads), np.inf)
-    total[_MAX_LEAD] = 0.0
-    steps = np.zeros((_SAMPLES, len(leads)), dtype=np.int64)
-    for k in range(_SAMPLES):
-        padded = np.pad(total, 1, constant_values=np.inf)
-        options = np.stack([padded[1:-1], padded[:-2] + 0.2, padded[2:] + 0.2])
-        steps[k] = np.array([0, -1, 1])[options.argmin(axis=0)]
-        total = options.min(axis=0) + cost[k]
-    lead = np.zeros(_SAMPLES)
-    at = _MAX_LEAD
-    for k in range(_SAMPLES - 1, -1, -1):
-        lead[k] = leads[at]
-        at += steps[k, at]
-    return lead
+    return least_cost_lead(cost, (0, 1, -1), np.array([0.0, 0.2, 0.2])).astype(np.float64)
 
 
 def _smooth_lead(lead: Array) -> Array:
     """Periodic lead smoothed by a Gaussian of a sixteenth of the lap, and scaled to the steepest slope allowed."""
-    frequency = np.fft.rfftfreq(_SAMPLES)
-    spectrum = np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _SAMPLES / 16.0) ** 2)
-    smooth = np.fft.irfft(spectrum, _SAMPLES)
+    smooth = smooth_lead(lead, 16.0)
     steepest = float(np.abs(np.diff(smooth, append=smooth[:1])).max())
     return smooth * min(1.0, _MAX_PACE_CHANGE / max(steepest, 1e-12))
 

@@ -71,17 +71,6 @@ def _mean_position(value: Array, slope: Array, column: int, weights: Array, chan
 
 
 @njit
-def _mean_drift(drifts: Array, weights: Array, changes: Array, mean: Array) -> None:
-    """Mean drift of a lap (4, 3), rows: value, derivatives by θ and the two other parameters."""
-    mean[:] = 0.0
-    for i in range(drifts.shape[0]):
-        for k in range(3):
-            mean[0, k] += weights[i] * drifts[i, k]
-            for parameter in range(_PARAMETERS):
-                mean[1 + parameter, k] += changes[parameter, i] * drifts[i, k]
-
-
-@njit
 def _mean_rotations(
     figure: Array, value: Array, slope: Array, weights: Array, changes: Array, q: Array, rates: Array, tangents: int
 ) -> None:
@@ -236,7 +225,9 @@ def _combine_borrowed(
     tangents = _PARAMETERS if jacobian.shape[0] > 0 else 0
 
     drift, shift, turn = work_array((1 + _PARAMETERS, 3)), work_array((2, 3)), work_array(3)
-    _mean_drift(drifts, weights[0], changes[0], drift)
+    constant = work_array(drifts.shape)
+    constant[:] = 0.0
+    _mean_position(drifts, constant, 0, weights[0], changes[0], drift)
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]

@@ -11,6 +11,8 @@ import numpy as np
 from controllers.errors import ControllerError
 
 Outcome: TypeAlias = Literal["certified", "refuted", "unknown"]
+FROM_WORST: tuple[Outcome, ...] = ("refuted", "unknown", "certified")
+"""Outcomes in order of severity."""
 Json: TypeAlias = bool | int | float | str | list["Json"] | dict[str, "Json"] | None
 
 

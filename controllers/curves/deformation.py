@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.bounds import NODE
+from controllers.curves.closest_point import chord_square
 from controllers.curves.trajectory import (
     BREAKS,
     COEFFICIENTS,
@@ -92,14 +93,6 @@ def _add_bump(record: Array, at: int, edit: int, source: int, target: int) -> tu
 
 
 @njit
-def _distance_to_chord(record: Array, node: int, x: float, y: float, z: float) -> float:
-    x, y, z = x - record[node], y - record[node + 1], z - record[node + 2]
-    dx, dy, dz = record[node + 3], record[node + 4], record[node + 5]
-    share = min(max((x * dx + y * dy + z * dz) * record[node + 6], 0.0), 1.0)
-    return np.sqrt((x - share * dx) ** 2 + (y - share * dy) ** 2 + (z - share * dz) ** 2)
-
-
-@njit
 def _set_chord(record: Array, node: int, x: float, y: float, z: float) -> None:
     record[node + 3], record[node + 4], record[node + 5] = x, y, z
     record[node + 6] = 1.0 / max(x * x + y * y + z * z, 1e-300)
@@ -117,10 +110,10 @@ def _bound_piece(record: Array, node: int, row: int, h: float) -> None:
     _set_chord(record, node, dx, dy, dz)
     x, y, z = record[row], record[row + 1], record[row + 2]
     x, y, z = x + a * record[row + 7], y + a * record[row + 8], z + a * record[row + 9]
-    radius = _distance_to_chord(record, node, x, y, z)
+    radius = np.sqrt(chord_square(record, node, x, y, z))
     x, y, z = x + a * record[row + 7], y + a * record[row + 8], z + a * record[row + 9]
     x, y, z = x + b * record[row + 14], y + b * record[row + 15], z + b * record[row + 16]
-    record[node + 7] = max(radius, _distance_to_chord(record, node, x, y, z)) + 1e-14
+    record[node + 7] = max(radius, np.sqrt(chord_square(record, node, x, y, z))) + 1e-14
 
 
 @njit
@@ -134,7 +127,7 @@ def _join_capsules(record: Array, node: int, left: int, right: int) -> None:
         z + record[right + 5] - record[left + 2],
     )  # fmt: skip
     thicker = max(record[left + 7], record[right + 7])
-    record[node + 7] = _distance_to_chord(record, node, x, y, z) + thicker + 1e-14
+    record[node + 7] = np.sqrt(chord_square(record, node, x, y, z)) + thicker + 1e-14
 
 
 @njit

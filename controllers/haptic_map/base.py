@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.checks import numbers_of
-from controllers.curves.stylus import stylus_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.map_stages import CompiledMap, register
 from controllers.haptic_map.own_map import (
@@ -19,7 +18,7 @@ from controllers.haptic_map.own_map import (
     finite_differences,
     own_map,
 )
-from controllers.state import Array, Pose
+from controllers.state import Array, Pose, stylus_path
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
 STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H

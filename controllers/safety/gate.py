@@ -33,6 +33,7 @@ from controllers.safety.arming import (
     pushes,
 )
 from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
+from controllers.safety.limiter import magnitude
 from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
 
@@ -68,8 +69,7 @@ def pass_gate(
     if not np.isfinite(force[0] + force[1] + force[2]):
         latch(faults, FORCE_NOT_FINITE, t, force[0] + force[1] + force[2])
         force[0] = force[1] = force[2] = 0.0
-    largest = max(abs(force[0]), abs(force[1]), abs(force[2]), 1e-300)
-    size = largest * np.sqrt((force[0] / largest) ** 2 + (force[1] / largest) ** 2 + (force[2] / largest) ** 2)
+    size = magnitude(force[0], force[1], force[2])
     held = params[_DEAD_MAN] == 0.0 or hand[HAND_SWITCH] > 0.0
     quiet = held and size <= params[_SMALL_FORCE]
     gate[GATE_QUIET] = gate[GATE_QUIET] + period if quiet else 0.0

@@ -24,6 +24,13 @@ def force_ceiling(heat: float, continuous: float, peak: float) -> float:
 
 
 @njit
+def magnitude(x: float, y: float, z: float) -> float:
+    """Norm of a vector, finite also where the squares of its components overflow."""
+    largest = max(abs(x), abs(y), abs(z), 1e-300)
+    return largest * np.sqrt((x / largest) ** 2 + (y / largest) ** 2 + (z / largest) ** 2)
+
+
+@njit
 def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> bool:
     """Saturate the force of a wrench at the device's ceiling for this tick.
 
@@ -55,10 +62,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
             force[i] = limiter[LIMITER_FORCE + i] = 0.0
         return False
     ceiling = force_ceiling(limiter[LIMITER_HEAT], limits[_CONTINUOUS], limits[_PEAK])
-    # Scaling by the largest component first keeps the norm of a huge force finite.
-    largest = max(abs(wrench[0]), abs(wrench[1]), abs(wrench[2]), 1e-300)
-    norm = largest * np.sqrt((wrench[0] / largest) ** 2 + (wrench[1] / largest) ** 2 + (wrench[2] / largest) ** 2)
-    scale = min(1.0, ceiling / max(norm, 1e-300))
+    scale = min(1.0, ceiling / max(magnitude(wrench[0], wrench[1], wrench[2]), 1e-300))
     for i in range(3):
         force[i] = scale * wrench[i]
     return True

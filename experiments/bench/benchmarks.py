@@ -13,14 +13,13 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.closest_point import closest_phase
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.map_feed import Maps, feed_maps, unlinked_maps
 from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
-from controllers.state import Array, HandState, IntArray
+from controllers.state import Array, HandState, IntArray, stylus_path
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
 from experiments.bench.figures import Figure, print_figures

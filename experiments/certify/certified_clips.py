@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from controllers.certificates.flight.tolerance import JUDGING, Judging
-from controllers.certificates.report import Verdict
+from controllers.certificates.report import FROM_WORST, Verdict
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
@@ -21,7 +21,6 @@ PLAYED = "as played"
 _PACE_ASSUMPTION = "clips are judged at their own pace, what a run played as it was played, its first second left out"
 _FPS = 125.0  # frame rate at which a played animation is judged [1/s]
 _MAX_DURATION = 120.0  # longest part of it that is judged [s]
-_SEVERITY_ORDER = ("refuted", "unknown", "certified")
 
 
 def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tuple[Clip, ...]]:
@@ -73,7 +72,7 @@ def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING, size: float
     verdicts: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(
-            ((name, by_kind[kind]) for name, by_kind in found), key=lambda pair: _SEVERITY_ORDER.index(pair[1].verdict)
+            ((name, by_kind[kind]) for name, by_kind in found), key=lambda pair: FROM_WORST.index(pair[1].verdict)
         )
         outcomes = {name: by_kind[kind].verdict for name, by_kind in found}
         listed = ", ".join(f"{clip} {outcome}" for clip, outcome in outcomes.items())

@@ -12,7 +12,7 @@ from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
-from controllers.certificates.report import Verdict
+from controllers.certificates.report import FROM_WORST, Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.leading import Leading
 from controllers.safety.limiter import ForceLimiter
@@ -148,6 +148,5 @@ def _walker_radius(
 
 def _worst_verdict(verdicts: Sequence[Verdict]) -> Verdict:
     """The worst verdict; of equal verdicts, the one with the smallest margin."""
-    order = ("refuted", "unknown", "certified")
-    worst = min(verdicts, key=lambda found: (order.index(found.verdict), found.margin or 0.0))
+    worst = min(verdicts, key=lambda found: (FROM_WORST.index(found.verdict), found.margin or 0.0))
     return replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))

@@ -10,9 +10,9 @@ from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
 from controllers.state import POSITION, Array
-from experiments.certify.trial_simulation import CLOSURE, trial_model
-from models.phantom.kinematics import jacobian, vector_to_hand_frame
-from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS
+from experiments.certify.trial_simulation import trial_model
+from models.phantom.kinematics import jacobian, linkage_angles, vector_to_hand_frame
+from models.phantom.spec import LINKAGE_JOINTS
 from models.world.scene import PHANTOM
 from sim.world.phantom_port import actuate, phantom_port, sense, sensed_before
 from sim.world.world import phantom_angles
@@ -32,10 +32,11 @@ def simulated_course(
     port = phantom_port(model, data, sampling.period, sampling.cutoff)
     theta = np.array(phantom_angles(start))
     columns = [vector_to_hand_frame(column) for column in np.array(jacobian(theta)).T]
-    rate = np.linalg.solve(np.array(columns).T, velocity)
-    for i, name in enumerate((*MOTOR_JOINTS, *CLOSING_JOINTS)):
+    rate = np.linalg.solve(np.array(columns).T, velocity).astype(np.float64)
+    angles, rates = linkage_angles.py_func(theta), linkage_angles.py_func(rate)
+    for name, angle, speed in zip(LINKAGE_JOINTS, angles, rates, strict=True):
         joint = data.joint(PHANTOM + name)
-        joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
+        joint.qpos[0], joint.qvel[0] = angle, speed
     mujoco.mj_forward(model, data)
     # The velocity filter starts settled at the initial velocity.
     sensed_before(port, theta, rate)

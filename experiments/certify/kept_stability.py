@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import Outcome, hash_of, leaving_out
+from controllers.certificates.report import FROM_WORST, Outcome, hash_of, leaving_out
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
@@ -16,7 +16,6 @@ from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import kept_folder
 
 _LEADING_REASON = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
-_SEVERITY = ("certified", "unknown", "refuted")
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
         return Stability("unknown", None, str(error))
     if missing:
         verdicts = [leaving_out(verdict, missing) for verdict in verdicts]
-    worst = max(verdicts, key=lambda verdict: _SEVERITY.index(verdict.verdict))
+    worst = min(verdicts, key=lambda verdict: FROM_WORST.index(verdict.verdict))
     margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)
 

@@ -25,7 +25,8 @@ from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
 from controllers.fields.follow import Follow
 from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
-from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS, phantom_spec
+from models.phantom.kinematics import linkage_angles
+from models.phantom.spec import LINKAGE_JOINTS, phantom_spec
 from models.world.scene import PHANTOM, R_WP
 from sim.compilation.compiled import entry_point
 from sim.errors import SimError
@@ -102,10 +103,6 @@ def run_late(
         if np.sum((path[k] - path[0]) ** 2) > 0.05**2:
             break
         advance(plant, port, hand, t, False, applied)
-
-
-CLOSURE = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 1], [0, 1, -1]], dtype=np.float64)
-"""Maps θ to the angles of all five hinges of the closed linkage."""
 
 
 @dataclass(frozen=True)
@@ -280,9 +277,10 @@ def hand_path(
         sensed_before(port, rest_angles + state[6:9], state[9:12])
         late += state[12:].reshape(-1, 3)[::-1]
     late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
-    names = [PHANTOM + name for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]
-    for i, name in enumerate(names):
-        data.joint(name).qpos[0], data.joint(name).qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
+    names = [PHANTOM + name for name in LINKAGE_JOINTS]
+    angles, rates = linkage_angles.py_func(theta), linkage_angles.py_func(rate)
+    for name, angle, speed in zip(names, angles, rates, strict=True):
+        data.joint(name).qpos[0], data.joint(name).qvel[0] = angle, speed
     mujoco.mj_forward(model, data)
     a, b, c = (int(model.joint(name).dofadr[0]) for name in names[:3])
     plant = Plant(

@@ -8,7 +8,6 @@ from experiments.config.part import above, at_least, part
 from experiments.console.output import Json, say
 from sim.body.figure_state import FigureGains
 
-
 _GAINS = FigureGains()
 
 

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.fitting.leg_choice import EVERY, SHARES, WELL, is_sound, push_profile
 from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
 from models.mocap.motion.clip import Clip

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import RIVER
 from controllers.legs.sole_heights import STANDS, SWINGS
+from controllers.state import stylus_path
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 from sim.reference.reference import map_poses

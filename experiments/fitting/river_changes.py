@@ -11,13 +11,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RiverClips
 from controllers.haptic_map.river_memory import PHASE, RIVER
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.console.progress import working
 from experiments.files.array_cache import is_kept, kept_array
 from experiments.fitting.figure_legs import packed_legs

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.easing import smooth_steps
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
+from controllers.state import stylus_path
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
 from experiments.fitting.verdict import FPS, tried

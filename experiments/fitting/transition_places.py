@@ -6,9 +6,9 @@ that travel there and back within a lap, such as a run from one end of a room to
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
+from controllers.state import stylus_path
 from sim.reference.reference import map_poses
 
 # [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 3 mm

@@ -60,7 +60,7 @@ def trajectory_and_vectors(runs: Path) -> Figure:
 def field_and_map(runs: Path) -> Figure:
     """Figure 2: the field around a curve from above, and the poses to which the map sends points of the curve."""
     with Recording(recording_in(runs / CYLINDER)) as recording:
-        curve, radius = curve_of(recording), MILLIMETRES * float(recording.array("tube_radius"))
+        curve, radius = curve_of(recording), MILLIMETRES * float(recording.arrays["tube_radius"])
         start, end = pushed_lap(recording)
         _, p, force = ticks(recording, start, end, "p", "force")
         t, lap = ticks(recording, 0.0, curve.duration * 1.05, "p")

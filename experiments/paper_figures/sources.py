@@ -28,10 +28,10 @@ def configs() -> dict[str, RunConfig]:
 
 def curve_of(recording: Recording) -> Trajectory:
     """The curve of a recording that leads the hand."""
-    start, end = (float(time) for time in recording.array("curve_span"))
-    points = recording.array("curve")
+    start, end = (float(time) for time in recording.arrays["curve_span"])
+    points = recording.arrays["curve"]
     return Trajectory(
-        np.linspace(start, end, len(points)), points, periodic=bool(recording.array("curve_closed") > 0.5)
+        np.linspace(start, end, len(points)), points, periodic=bool(recording.arrays["curve_closed"] > 0.5)
     )
 
 

@@ -59,12 +59,12 @@ class Workspace:
 
     def __init__(self, recording: Recording, world: ShownWorld, moments: Timeline):
         self._world, self._moments = world, moments
-        self._p_WH, self._p = recording.array("p_WH"), recording.channel("ticks", "p")
+        self._p_WH, self._p = recording.arrays["p_WH"], recording.channel("ticks", "p")
         self._forces = {name: recording.channel("ticks", name) for name in ("force", "user")}
         peak = max(*(typical_peak(channel) for channel in self._forces.values()), 1e-9)
         self.metres_per_newton = ARROW / peak
         self._trail = round(TRAIL_SECONDS * recording.rates["ticks"])
-        curve = self._p_WH + recording.array("curve")
+        curve = self._p_WH + recording.arrays["curve"]
         middle = 0.5 * (curve.min(axis=0) + curve.max(axis=0))
         size = float(np.linalg.norm(np.ptp(curve, axis=0)))
         self._view = View(tuple(middle + np.array([0.025, 0.0, 0.035])), 0.47 + 1.6 * size, 52.0, -25.0)

@@ -99,7 +99,7 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
     """
     if of_device(recording):
         raise SimError(f"{recording.path}: is of a device, without the figure; expected the recording of a simulation")
-    kind = recording.text("figure")
+    kind = recording.texts["figure"]
     scene = SceneConfig() if kind == "robot" else scene_of(recording)
     spec = {"robot": robot_spec, "none": device_spec}.get(kind, world_spec)(scene)
     if kind in ("physical", "kinematic"):

@@ -119,18 +119,18 @@ def animated(recording: Recording) -> bool:
 
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
     """The clips of a recording, as poses of the figure."""
-    names = recording.text("clip_names").split("\n") if recording.text("clip_names") else []
-    rates = recording.array("clip_fps")
-    return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
+    names = recording.texts["clip_names"].split("\n") if recording.texts["clip_names"] else []
+    rates = recording.arrays["clip_fps"]
+    return tuple(Clip(recording.arrays[f"clip_{i}"], float(rates[i]), name) for i, name in enumerate(names))
 
 
 def world_of(recording: Recording) -> mujoco.MjModel:
     """The MuJoCo model to which the recorded qpos belongs: with the figure or the robot arm if there was one."""
-    kind = cast(BodyKind, recording.text("figure"))
+    kind = cast(BodyKind, recording.texts["figure"])
     return World(scene_of(recording), kind).full_model()
 
 
 def scene_of(recording: Recording) -> SceneConfig:
     """Configuration of the world of a recording: the figure's size and the rates."""
-    stature, mass, servo_period, physics_step = (float(number) for number in recording.array("scene"))
+    stature, mass, servo_period, physics_step = (float(number) for number in recording.arrays["scene"])
     return SceneConfig(stature, mass, servo_period, physics_step)

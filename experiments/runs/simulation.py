@@ -11,14 +11,13 @@ import numpy as np
 from rich.console import Console
 
 from controllers.checks import check_kinds, of_kind
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array, HandState, Wrench
+from controllers.state import Array, HandState, Wrench, stylus_path
 from experiments.config.keywords import in_keywords
 from experiments.config.part import to_dict
 from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed

@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from controllers.walking.walker import walker_at
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.session import Session

@@ -7,10 +7,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from controllers.curves.stylus import UPRIGHT
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import STYLUS_POSE
+from controllers.state import STYLUS_POSE, UPRIGHT
 from controllers.walking.walker import walker_at
 from experiments.config.run_config import NOBODY_LED, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs

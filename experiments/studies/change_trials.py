@@ -10,12 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import smooth_steps
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.results.measures.soles import Soles

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.curves.stylus import stylus_path
 from controllers.rotations import logarithm, multiply, rotate
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.config.words import run_config
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.results.pages.figures import AXES, STYLE
@@ -94,7 +93,7 @@ def turning_figure(recording: Recording) -> Figure:
 def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
     """Pictures of the physical figure side by side: with the stylus upright, and in each of its turns."""
     config = config_of(recording)
-    lap = recording.array("curve_span")[1]
+    lap = recording.arrays["curve_span"][1]
     moments = [0.95 * lap, *(lap * (1.25 + 0.5 * k) for k in range(6))]
     model = world_model(config.scene)
     data, root = mujoco.MjData(model), int(model.joint(FIGURE + "root").qposadr[0])

@@ -115,6 +115,12 @@ def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
 
 
 @njit
+def linkage_angles(theta: Vec3) -> tuple[float, float, float, float, float]:
+    """θ1, θ2, θ3, elbow θ3 − θ2 and twin θ2 − θ3: the joints that `models.phantom.spec` names; rates likewise."""
+    return theta[0], theta[1], theta[2], theta[2] - theta[1], theta[1] - theta[2]
+
+
+@njit
 def within_limits(theta: Vec3) -> bool:
     """Whether joint angles [rad] are within the limits of θ1, θ2, θ3 and, due to the parallelogram, of θ3 − θ2."""
     bend = theta[2] - theta[1]
@@ -142,6 +148,38 @@ def joint_torques(theta: Vec3, f_P: Vec3) -> Scalars3:
         j[0][1] * f_P[0] + j[1][1] * f_P[1] + j[2][1] * f_P[2],
         j[0][2] * f_P[0] + j[1][2] * f_P[1] + j[2][2] * f_P[2],
     )
+
+
+@njit
+def least_gain(theta: Vec3) -> float:
+    """Least singular value of J(θ) [m/rad].
+
+    The turret moves the tip sideways, with the tip's distance |ρ| from the turret's axis as lever arm; upper arm and
+    forearm move it in their plane, at right angles to that. So the singular values of J are |ρ| and those of the 2×2
+    matrix of the two links, whose determinant is l1 l2 cos(θ3 − θ2).
+    """
+    reach = L1 * np.cos(theta[1]) + L2 * np.sin(theta[2])
+    elbow_angle = theta[2] - theta[1]
+    mean, half, cross = 0.5 * (L1 * L1 + L2 * L2), 0.5 * (L1 * L1 - L2 * L2), L1 * L2 * np.sin(elbow_angle)
+    largest = np.sqrt(mean + np.sqrt(half * half + cross * cross))
+    return min(abs(reach), abs(L1 * L2 * np.cos(elbow_angle)) / largest)
+
+
+@njit
+def force_from_torques(theta: Vec3, torque: Vec3, least: float) -> Scalars3:
+    """F = J⁻ᵀ τ: force at the tip [N] equivalent to torques at the joints [N m], in the device frame.
+
+    The inverse of `joint_torques`; zero where `least_gain` is below `least` [m/rad].
+    """
+    if least_gain(theta) < least:
+        return 0.0, 0.0, 0.0
+    s1, c1 = np.sin(theta[0]), np.cos(theta[0])
+    s2, c2 = np.sin(theta[1]), np.cos(theta[1])
+    s3, c3 = np.sin(theta[2]), np.cos(theta[2])
+    upper, fore, sideways = torque[1] / L1, torque[2] / L2, torque[0] / (L1 * c2 + L2 * s3)
+    cos_bend = np.cos(theta[2] - theta[1])
+    up, outwards = (c3 * upper + s2 * fore) / cos_bend, (c2 * fore - s3 * upper) / cos_bend
+    return c1 * sideways + s1 * outwards, up, c1 * outwards - s1 * sideways
 
 
 @njit

@@ -6,8 +6,8 @@ import matplotlib.image
 import mujoco
 import numpy as np
 
-from models.phantom.kinematics import R_HP
-from models.phantom.spec import CLOSING_JOINTS, GIMBAL_JOINTS, MOTOR_JOINTS, phantom_spec
+from models.phantom.kinematics import R_HP, linkage_angles
+from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS, phantom_spec
 
 WIDTH, HEIGHT = 960, 720  # [pixels]
 
@@ -32,9 +32,8 @@ def render(path: str, theta: tuple[float, float, float], gimbal: tuple[float, fl
     spec.attach(phantom_spec(), prefix="phantom/", frame=world.add_frame(quat=q_HP.tolist()))
     model = spec.compile()
     data = mujoco.MjData(model)
-    t1, t2, t3 = theta
-    names = (*MOTOR_JOINTS, *CLOSING_JOINTS, *GIMBAL_JOINTS)
-    for name, angle in zip(names, (t1, t2, t3, t3 - t2, t2 - t3, *gimbal), strict=True):
+    angles = (*linkage_angles.py_func(theta), *gimbal)
+    for name, angle in zip((*LINKAGE_JOINTS, *GIMBAL_JOINTS), angles, strict=True):
         data.joint(f"phantom/{name}").qpos[0] = angle
     mujoco.mj_forward(model, data)
     camera = mujoco.MjvCamera()

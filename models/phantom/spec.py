@@ -8,7 +8,7 @@ import numpy as np
 from models.phantom.parameters import PREMIUM_1_5, Pair, Triple
 
 MOTOR_JOINTS = ("theta1", "theta2", "theta3")
-CLOSING_JOINTS = ("elbow", "twin")
+LINKAGE_JOINTS = (*MOTOR_JOINTS, "elbow", "twin")  # motors, and joints that close the loop: see `linkage_angles`
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
 MOTORS = ("motor1", "motor2", "motor3")
 

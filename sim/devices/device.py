@@ -71,13 +71,6 @@ def read_device(device: DeviceState, t: float) -> None:
     sense(device, t)
 
 
-@entry_point
-def write_device(device: DeviceState, plant: Plant, t: float, force: Array, applied: Array) -> None:
-    """Call `actuate` and `advance` from Python, without a servo; `applied` (substeps, columns) is written."""
-    actuate(device, force)
-    advance(device, plant, t, False, applied)
-
-
 def device_units(device: DeviceState) -> tuple[Unit, ...]:
     """Compilation units that a device calls by address."""
     return device.units() if isinstance(device, SimulatedPhantom) else ()

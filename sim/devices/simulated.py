@@ -8,7 +8,7 @@ from controllers.state import HAND_TIME, Array
 from sim.compilation.units import Unit
 from sim.users.hand.arm import Arm
 from sim.users.person.person_state import PersonState
-from sim.users.person.person_unit import link_person, person_unit
+from sim.users.person.person_step import link_person, person_unit
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
 

@@ -7,10 +7,6 @@ Vendors' libraries report a pose and take a force at the tip. By the Phantom's i
 
 which is exactly the force of the field as long as no torque saturated. N, the gravity torques of the Phantom's linkage,
 are subtracted, since such a device compensates for its own weight.
-
-The turret moves the tip sideways, with the tip's distance ρ from the turret's axis as lever arm; upper arm and forearm
-move it in their plane, at right angles to that. So the singular values of J are \|ρ\| and those of the 2×2 matrix of
-the two links, whose determinant is :math:`l_1 l_2 \cos(\theta_3 - \theta_2)`.
 """
 
 import math
@@ -22,11 +18,10 @@ from controllers.safety.faults import Fault
 from controllers.state import Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import (
-    L1,
-    L2,
     Quat,
     Scalars3,
     Vec3,
+    force_from_torques,
     forward_kinematics,
     gimbal_angles,
     inverse_kinematics,
@@ -146,32 +141,14 @@ def pose_fault(fault: float, value: float) -> DriverFault:
 
 
 @njit
-def least_gain(theta: Vec3) -> float:
-    """Least singular value of J(θ) [m/rad]."""
-    reach = L1 * np.cos(theta[1]) + L2 * np.sin(theta[2])
-    elbow_angle = theta[2] - theta[1]
-    mean, half, cross = 0.5 * (L1 * L1 + L2 * L2), 0.5 * (L1 * L1 - L2 * L2), L1 * L2 * np.sin(elbow_angle)
-    largest = math.sqrt(mean + math.sqrt(half * half + cross * cross))
-    return min(abs(reach), abs(L1 * L2 * np.cos(elbow_angle)) / largest)
-
-
-@njit
 def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
     """Force at the tip in the device frame [N] equivalent to joint torques [N m], scaled to at most `largest`.
 
     Zero where the Jacobian is nearly singular, or the result is not finite.
     """
-    if least_gain(theta) < WEAKEST:
-        return 0.0, 0.0, 0.0
-    s1, c1 = np.sin(theta[0]), np.cos(theta[0])
-    s2, c2 = np.sin(theta[1]), np.cos(theta[1])
-    s3, c3 = np.sin(theta[2]), np.cos(theta[2])
     gravity = gravity_torques(theta)
-    upper, fore = (torque[1] - gravity[1]) / L1, (torque[2] - gravity[2]) / L2
-    sideways = (torque[0] - gravity[0]) / (L1 * c2 + L2 * s3)
-    cos_bend = np.cos(theta[2] - theta[1])
-    up, outwards = (c3 * upper + s2 * fore) / cos_bend, (c2 * fore - s3 * upper) / cos_bend
-    x, y, z = c1 * sideways + s1 * outwards, up, c1 * outwards - s1 * sideways
+    net = torque[0] - gravity[0], torque[1] - gravity[1], torque[2] - gravity[2]
+    x, y, z = force_from_torques(theta, net, WEAKEST)
     magnitude = math.sqrt(x * x + y * y + z * z)
     if not math.isfinite(magnitude):
         return 0.0, 0.0, 0.0

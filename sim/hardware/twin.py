@@ -27,9 +27,9 @@ from numba import njit
 from controllers.state import Array, IntArray
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
-from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
+from models.phantom.kinematics import force_from_torques, forward_kinematics, linkage_angles, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
-from models.phantom.spec import CLOSING_JOINTS, MOTOR_JOINTS, MOTORS
+from models.phantom.spec import LINKAGE_JOINTS, MOTORS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.world.plant import Plant, make_plant, step
@@ -45,6 +45,7 @@ TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "ha
 """Tip position predicted for the tick, in H [m], its distance from the measured one [m], and the hand's force in H
 [N]."""
 
+_LEAST_GAIN = 5e-5  # [m/rad] below it the hand's force cannot be determined and is zero: 50 µm from the turret's axis
 _INTEGRAL, _STARTED = 3, 6  # places in the memory of `momentum_residual`, which begins with r
 _VISCOUS, _COULOMB = PREMIUM_1_5.viscous_friction, PREMIUM_1_5.coulomb_friction
 
@@ -121,9 +122,8 @@ class TwinMemory(NamedTuple):
 @njit
 def _predict(twin: TwinMemory, predicted: Array) -> None:
     """Advance the model by a period; writes the joint angles to `predicted` (3,), and the rates to the twin's state."""
-    q, w, plant = twin.theta, twin.rate, twin.plant
-    angles = (q[0], q[1], q[2], q[2] - q[1], q[1] - q[2])
-    speeds = (w[0], w[1], w[2], w[2] - w[1], w[1] - w[2])
+    w, plant = twin.rate, twin.plant
+    angles, speeds = linkage_angles(twin.theta), linkage_angles(w)
     for i in range(5):
         plant.qpos[twin.places[i]], twin.qvel[twin.rates[i]] = angles[i], speeds[i]
     for i in range(3):
@@ -132,29 +132,6 @@ def _predict(twin: TwinMemory, predicted: Array) -> None:
     step(plant)
     for i in range(3):
         predicted[i], w[i] = plant.qpos[twin.places[i]], twin.qvel[twin.rates[i]]
-
-
-@njit
-def tip_force(theta: tuple[float, float, float], torque: Array, force: Array) -> None:
-    """Write F_H = J⁻ᵀ τ [N], shape (3,), by cofactors; zero near a singularity, where it cannot be determined."""
-    j = jacobian(theta)
-    ax = j[1][1] * j[2][2] - j[1][2] * j[2][1]
-    ay = j[1][2] * j[2][0] - j[1][0] * j[2][2]
-    az = j[1][0] * j[2][1] - j[1][1] * j[2][0]
-    bx = j[2][1] * j[0][2] - j[2][2] * j[0][1]
-    by = j[2][2] * j[0][0] - j[2][0] * j[0][2]
-    bz = j[2][0] * j[0][1] - j[2][1] * j[0][0]
-    cx = j[0][1] * j[1][2] - j[0][2] * j[1][1]
-    cy = j[0][2] * j[1][0] - j[0][0] * j[1][2]
-    cz = j[0][0] * j[1][1] - j[0][1] * j[1][0]
-    determinant = j[0][0] * ax + j[0][1] * ay + j[0][2] * az
-    scale = 1.0 / determinant if abs(determinant) > 1e-6 else 0.0
-    force_P = (
-        scale * (ax * torque[0] + ay * torque[1] + az * torque[2]),
-        scale * (bx * torque[0] + by * torque[1] + bz * torque[2]),
-        scale * (cx * torque[0] + cy * torque[1] + cz * torque[2]),
-    )
-    force[0], force[1], force[2] = vector_to_hand_frame(force_P)
 
 
 @entry_point
@@ -181,7 +158,8 @@ def follow_rows(
         b = vector_to_hand_frame(forward_kinematics((theta[k, 0], theta[k, 1], theta[k, 2])))
         apart[k] = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
         predicted[k, 0], predicted[k, 1], predicted[k, 2] = a
-        tip_force(q, twin.residual, force[k])
+        hand = force_from_torques(q, (twin.residual[0], twin.residual[1], twin.residual[2]), _LEAST_GAIN)
+        force[k, 0], force[k, 1], force[k, 2] = vector_to_hand_frame(hand)
         twin.torque[:] = torque[k]
         twin.last[0] = numbers[k]
 
@@ -199,7 +177,7 @@ class Twin:
         self._world = World(scene, "none")
         self._world.reset(np.zeros(3), rest_pose())
         model, data = self._world.model, self._world.data
-        joints = [model.joint(PHANTOM + name) for name in (*MOTOR_JOINTS, *CLOSING_JOINTS)]
+        joints = [model.joint(PHANTOM + name) for name in LINKAGE_JOINTS]
         a, b, c = (int(model.actuator(PHANTOM + name).id) for name in MOTORS)
         pole = math.exp(-BANDWIDTH * scene.servo_period)
         self._memory = TwinMemory(

@@ -210,26 +210,6 @@ class Recording:
             raise RecordingError(f"{self.path}: {group}/{name} has no rows; the run ended before the first was written")
         return channel
 
-    def array(self, name: str) -> Array:
-        """An array of `static`, constant during the run.
-
-        Raises
-        ------
-        RecordingError
-            If there is no array of that name.
-        """
-        return self.arrays[name]
-
-    def text(self, name: str) -> str:
-        """A text of `static`, constant during the run.
-
-        Raises
-        ------
-        RecordingError
-            If there is no text of that name.
-        """
-        return self.texts[name]
-
     @property
     def complete(self) -> bool:
         """Whether the run ended normally, with a summary."""

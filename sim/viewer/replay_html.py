@@ -92,8 +92,8 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
 
 def drawn_tube(recording: Recording) -> float:
     """Drawn radius of the tube [m]: the recorded radius, limited so that it does not hide the curve and the hand."""
-    extent = float(np.max(np.ptp(recording.array("curve"), axis=0)))
-    return min(float(recording.array("tube_radius")), TUBE_SHARE * extent)
+    extent = float(np.max(np.ptp(recording.arrays["curve"], axis=0)))
+    return min(float(recording.arrays["tube_radius"]), TUBE_SHARE * extent)
 
 
 class _Stage:
@@ -114,7 +114,7 @@ class _Stage:
         first = next(joints, None)
         self._root = 0 if first is None else int(model.jnt_qposadr[first])
         self._is_travelling = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
-        self._p_WH = recording.array("p_WH")
+        self._p_WH = recording.arrays["p_WH"]
         figure = body_shapes(model, prefix)
         self._phantom = Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION)
         self._figure = Actor(scene, "figure", figure, 1.0)

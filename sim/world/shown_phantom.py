@@ -7,12 +7,11 @@ import numpy as np
 from numba import njit
 
 from controllers.state import Array, IntArray
-from models.phantom.kinematics import gimbal_angles, inverse_kinematics, vector_to_device_frame
+from models.phantom.kinematics import gimbal_angles, inverse_kinematics, linkage_angles, vector_to_device_frame
+from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS
 from models.world.scene import PHANTOM
 
 Angles = tuple[float, float, float]
-
-_JOINTS = ("theta1", "theta2", "theta3", "elbow", "twin", "gimbal1", "gimbal2", "gimbal3")
 
 
 class ShownPhantom(NamedTuple):
@@ -34,7 +33,7 @@ class ShownPhantom(NamedTuple):
 
 def shown_phantom(model: mujoco.MjModel, data: mujoco.MjData) -> ShownPhantom:
     """The linkage of a world; the world must outlive it."""
-    joints = [model.joint(PHANTOM + name) for name in _JOINTS]
+    joints = [model.joint(PHANTOM + name) for name in (*LINKAGE_JOINTS, *GIMBAL_JOINTS)]
     places, rates = ([int(address[0]) for address in column] for column in zip(
         *((joint.qposadr, joint.dofadr) for joint in joints), strict=True
     ))  # fmt: skip
@@ -44,7 +43,7 @@ def shown_phantom(model: mujoco.MjModel, data: mujoco.MjData) -> ShownPhantom:
 @njit
 def show_angles(shown: ShownPhantom, theta: Angles, gimbal: Angles) -> None:
     """Put the linkage at joint angles [rad], at rest."""
-    angles = (theta[0], theta[1], theta[2], theta[2] - theta[1], theta[1] - theta[2], gimbal[0], gimbal[1], gimbal[2])
+    angles = linkage_angles(theta) + gimbal
     for i in range(8):
         shown.qpos[shown.places[i]] = angles[i]
         shown.qvel[shown.rates[i]] = 0.0

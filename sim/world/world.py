@@ -15,9 +15,11 @@ from models.phantom.kinematics import (
     gimbal_angles,
     inverse_kinematics,
     jacobian,
+    linkage_angles,
     vector_to_device_frame,
     within_limits,
 )
+from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS
 from models.robot_arm.spec import ARM_JOINTS, arm_model
 from models.world.scene import (
     FIGURE,
@@ -169,19 +171,12 @@ def place_stylus(
     mujoco.mj_resetData(model, data)
     theta = phantom_angles(p_H)
     gimbal = (0.0, 0.0, 0.0) if q_HS is None else gimbal_angles.py_func(theta, q_HS)
-    rates = (0.0, 0.0, 0.0)
+    rates = np.zeros(3)
     if v_H is not None:
-        rates = np.linalg.solve(jacobian.py_func(theta), vector_to_device_frame.py_func(tuple(v_H)))
-    for name, angle, rate in (
-        ("theta1", theta[0], rates[0]),
-        ("theta2", theta[1], rates[1]),
-        ("theta3", theta[2], rates[2]),
-        ("elbow", theta[2] - theta[1], rates[2] - rates[1]),
-        ("twin", theta[1] - theta[2], rates[1] - rates[2]),
-        ("gimbal1", gimbal[0], 0.0),
-        ("gimbal2", gimbal[1], 0.0),
-        ("gimbal3", gimbal[2], 0.0),
-    ):
+        rates[:] = np.linalg.solve(jacobian.py_func(theta), vector_to_device_frame.py_func(tuple(v_H)))
+    angles = (*linkage_angles.py_func(theta), *gimbal)
+    velocities = (*linkage_angles.py_func(rates), 0.0, 0.0, 0.0)
+    for name, angle, rate in zip((*LINKAGE_JOINTS, *GIMBAL_JOINTS), angles, velocities, strict=True):
         joint = model.joint(PHANTOM + name)
         data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = angle, rate
 

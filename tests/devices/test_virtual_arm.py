@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, jacobian, joint_torques, stylus_orientation
+from models.phantom.kinematics import forward_kinematics, jacobian, joint_torques, least_gain, stylus_orientation
 from sim.devices.driver import DriverFault
-from sim.devices.virtual_arm import SKEWED, WEAKEST, least_gain, quaternion_of, skewness, tip_force, write_pose
+from sim.devices.virtual_arm import SKEWED, WEAKEST, quaternion_of, skewness, tip_force, write_pose
 
 
 def test_forward_kinematics_of_written_angles_gives_the_pose() -> None:

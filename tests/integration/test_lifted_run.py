@@ -91,7 +91,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
         t, p = recording.channel("ticks", "t")[:], recording.channel("ticks", "p")[:]
         distance = recording.channel("ticks", "distance")[:]
         residual, reference = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
-        frames, weight = recording.channel("frames", "t")[:], recording.array("body_weight")
+        frames, weight = recording.channel("frames", "t")[:], recording.arrays["body_weight"]
     at = p[np.searchsorted(t, change.t)]
     assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
     # For at least five seconds the hand stays in the other river, and the figure with its clip.

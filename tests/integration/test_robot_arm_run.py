@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_tool_follows_the_scaled_curve_and_yields_to_the_hand(folder: Path) -> None:
     with Recording(folder / "run.h5") as recording:
         t, tool = recording.channel("frames", "t")[:], recording.channel("frames", "tool")[:]
-        curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.array("curve")
+        curve = HOME + [0.0, 0.0, PEDESTAL] + 1.5 * recording.arrays["curve"]
     distance = np.array([np.linalg.norm(curve - place, axis=1).min() for place in tool])
     alone = (t > 1.0) & (t < 4.4)
     assert distance[alone].max() < 2.0e-3  # the curve is drawn with a point every 2 mm

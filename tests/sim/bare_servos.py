@@ -13,7 +13,8 @@ from models.phantom.kinematics import encoder_reading, gimbal_reading
 from models.world.scene import SceneConfig
 from sim.body.unsimulated import no_figure
 from sim.compilation.compiled import entry_point
-from sim.devices.device import DeviceState, read_device, write_device
+from sim.devices.device import DeviceState, actuate, read_device
+from sim.devices.device import advance as advance_device
 from sim.devices.exchange import (
     READING_CLOCK,
     READING_GIMBAL,
@@ -72,6 +73,13 @@ def run(servo: Servo, n: int, first: int = 0) -> tuple[TickLog, FrameLog]:
 def pass_period(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: np.ndarray) -> None:
     """Advance a simulated Phantom, whose motors the caller has set, by a servo period."""
     advance(plant, port, user, t, False, applied)
+
+
+@entry_point
+def write_device(device: DeviceState, plant: Plant, t: float, force: np.ndarray, applied: np.ndarray) -> None:
+    """Call `actuate` and `advance` from Python, without a servo; `applied` (substeps, columns) is written."""
+    actuate(device, force)
+    advance_device(device, plant, t, False, applied)
 
 
 class SteppedPhantom:

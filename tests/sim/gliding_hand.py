@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.state import stylus_path
 
 GLIDE = 0.3  # [s], half of it before the moment
 

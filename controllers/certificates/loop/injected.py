@@ -46,10 +46,6 @@ class Injection(NamedTuple):
     activity: tuple[float, ...]
     rounding: float
 
-    def bound(self, ideal: float, speed: float, band: int) -> float:
-        """P̄ [W] for a vibration of RMS speed V [m/s] within a band, including the ideal bound [W]."""
-        return ideal + self.activity[band] * speed**2 + self.rounding * speed
-
 
 def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
     """E(ω) [N s/m] at frequencies [Hz] above 0 and up to the Nyquist frequency."""

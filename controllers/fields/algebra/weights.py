@@ -11,6 +11,7 @@ from controllers.checks import checked, numbers_of, of_kind
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
+from controllers.safety.limiter import magnitude
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
 _MIN_RADIUS = 1e-9  # [m] smallest radius of a ball; a smaller one would never contain a hand
@@ -58,10 +59,7 @@ def blend(params: Array, at: int, hand: Array, wrench: Array, other: Array) -> N
 def limit(params: Array, at: int, wrench: Array) -> None:
     """Instruction LIMIT: F ← F min(1, L/|F|), and the moment likewise; parameters [L of the force, L of the moment]."""
     for part in range(2):
-        x, y, z = wrench[3 * part], wrench[3 * part + 1], wrench[3 * part + 2]
-        # Scaled by the largest component, so that the squares do not overflow.
-        largest = max(abs(x), abs(y), abs(z), 1e-300)
-        norm = largest * np.sqrt((x / largest) ** 2 + (y / largest) ** 2 + (z / largest) ** 2)
+        norm = magnitude(wrench[3 * part], wrench[3 * part + 1], wrench[3 * part + 2])
         if norm > params[at + part]:
             for i in range(3):
                 wrench[3 * part + i] *= params[at + part] / norm

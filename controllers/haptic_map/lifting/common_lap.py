@@ -13,13 +13,14 @@ from scipy.interpolate import CubicSpline
 from controllers.blending.alignment import LARGEST_LEAD
 from controllers.easing import smooth_steps
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
+from controllers.motion.time_warping import least_cost_lead, smooth_lead
 from controllers.state import Array
 
 SAMPLES = 385  # samples of a motion's features over its duration
 _STEPS = 96  # steps of the lap in the dynamic programme
 _LEADS_PER_STEP = 4  # leads per step: the pace changes by quarters of the clip's own
 _MAX_LEAD = int(LARGEST_LEAD * _STEPS * _LEADS_PER_STEP)
-_LEAD_CHANGES = np.arange(-2, 3)  # possible changes of the lead in a step: paces 0.5 to 1.5
+_LEAD_CHANGES = (-2, -1, 0, 1, 2)  # possible changes of the lead in a step: paces 0.5 to 1.5
 # Largest change of the pace after smoothing. With half of it jump and backflip have their transition at 313° instead of
 # 146° and the condition number of h_* is up to 201 instead of 81; with twice up to 70, but in-betweens sink 4 mm into
 # the floor instead of 2.
@@ -119,30 +120,15 @@ def _warped_phase(costs: Array, start: float, gap: float) -> Phase:
     # A closed clip continues with its next lap; an open one is clamped to its ends.
     s = np.mod(s, 1.0) if gap == 0.0 else np.where(lap[:, None] < 1.0 - gap, np.clip(s, 0.0, 1.0), 2.0)
     table = _table_entries(costs, (start + lap)[:, None] + 0.0 * leads, s)
-    total = np.full(len(leads), np.inf)
-    total[_MAX_LEAD] = 0.0
-    steps = np.zeros((_STEPS, len(leads)), dtype=np.int64)
-    price = _PACE_CHANGE_COST * table.mean() * _LEAD_CHANGES.astype(float) ** 2
-    reach = int(_LEAD_CHANGES[-1])
-    for k in range(_STEPS):
-        padded = np.pad(total, reach, constant_values=np.inf)
-        options = np.stack(
-            [padded[reach - c : reach - c + len(leads)] + p for c, p in zip(_LEAD_CHANGES, price, strict=True)]
-        )
-        steps[k] = _LEAD_CHANGES[options.argmin(axis=0)]
-        total = options.min(axis=0) + table[k]
-    lead, at = np.zeros(_STEPS), _MAX_LEAD
-    for k in range(_STEPS - 1, -1, -1):
-        lead[k] = leads[at]
-        at -= int(steps[k, at])
+    prices = _PACE_CHANGE_COST * table.mean() * np.square(_LEAD_CHANGES).astype(np.float64)
+    lead = least_cost_lead(table, _LEAD_CHANGES, prices) / (_STEPS * _LEADS_PER_STEP)
     return Phase(start, gap, _smooth_lead(lead, gap))
 
 
 def _smooth_lead(lead: Array, gap: float) -> CubicSpline:
     """C² lead that is zero at the ends, no steeper than allowed."""
     knots = np.arange(_STEPS + 1) / _STEPS
-    frequency = np.fft.rfftfreq(_STEPS)
-    smooth = np.fft.irfft(np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _STEPS / 24.0) ** 2), _STEPS)
+    smooth = smooth_lead(lead, 24.0)
     smooth = np.append(smooth, smooth[0])
     if gap > 0.0:
         # Within the gap the lead is zero, and at its edges pace and acceleration are the clip's own.

@@ -6,6 +6,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from controllers.curves.deformation import redo, undo
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Program
 from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
@@ -13,8 +14,8 @@ from controllers.state import HAND_SWITCH, POSITION, Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
 from experiments.setups.setups import parts_of
+from sim.compilation.compiled import entry_point
 from sim.devices.simulated import SimulatedPhantom
-from sim.loop.bends import redo_bend, undo_bend
 from sim.loop.loop import make_logs
 from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import KeptState, kept_state, put_back
@@ -25,6 +26,18 @@ STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force
 FASTEST = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
 HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three frames of the page
 KEPT_EVERY, KEPT = 1.0, 120  # [s] between stored states, and their largest number
+
+
+@entry_point
+def _undo_bend(memory: Array, record: int) -> bool:
+    """Undo the last edit of the curve whose edit record begins at ``memory[record]``; False if there is none."""
+    return undo(memory, record)
+
+
+@entry_point
+def _redo_bend(memory: Array, record: int) -> bool:
+    """Redo the edit that was undone last; False if there is none."""
+    return redo(memory, record)
 
 
 class Drag(NamedTuple):
@@ -179,11 +192,11 @@ class Engine:
 
     def undo(self) -> bool:
         """Undo the last bend; False if there is none."""
-        return self._can_edit() and undo_bend(self.memory, self._bend_record)
+        return self._can_edit() and _undo_bend(self.memory, self._bend_record)
 
     def redo(self) -> bool:
         """Redo the last undone bend; False if there is none."""
-        return self._can_edit() and redo_bend(self.memory, self._bend_record)
+        return self._can_edit() and _redo_bend(self.memory, self._bend_record)
 
     def _can_edit(self) -> bool:
         """Whether the mode bends a curve and nobody holds it, neither by a drag nor by the switch as last sensed."""

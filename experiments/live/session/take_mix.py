@@ -71,8 +71,8 @@ class TakeData:
             poses = recording.channel("frames", "reference")[::stride]
             every = stride * round(recording.rates["ticks"] / recording.rates["frames"])
             ticks = {name: recording.channel("ticks", name)[::every] for name in ("phase", "p", "force", "distance")}
-            start, end = recording.array("curve_span")
-            lap = float(end - start) if float(recording.array("curve_closed")) else np.inf
+            start, end = recording.arrays["curve_span"]
+            lap = float(end - start) if float(recording.arrays["curve_closed"]) else np.inf
         phase = ticks["phase"] if np.isinf(lap) else np.unwrap(ticks["phase"], period=lap)
         force = np.linalg.norm(ticks["force"], axis=1)
         return TakeData(folder.name, poses, phase, lap, ticks["p"], force, ticks["distance"])

@@ -38,8 +38,8 @@ class FigureMeasure:
     """
 
     def __init__(self, recording: Recording):
-        self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
-        height = float(recording.array("com_height"))
+        self._weight, self._rate = float(recording.arrays["body_weight"]), recording.rates["frames"]
+        height = float(recording.arrays["com_height"])
         self._joints, self._root = MeanSquare(), MeanSquare()
         self._stance, self._flight, self._airborne = (
             ResidualMeasure(self._weight, height, 1.0 / self._rate) for _ in range(3)

@@ -120,7 +120,7 @@ def _replay_summary(recording: Recording) -> ReplaySummary | None:
     if "replayed" not in recording.texts:
         return None
     away = _deviation(recording, 0.0)
-    return ReplaySummary(recording.texts["replayed"], 1e3 * away.root, recording.text("distance_from"))
+    return ReplaySummary(recording.texts["replayed"], 1e3 * away.root, recording.texts["distance_from"])
 
 
 def _deviation(recording: Recording, since: float) -> MeanSquare:
@@ -137,11 +137,11 @@ class PathMeasure:
 
     def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
         self._since, self._handled = since, tuple(handled)
-        start, end = recording.array("curve_span")
-        self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
+        start, end = recording.arrays["curve_span"]
+        self._span, self._closed = float(end - start), bool(recording.arrays["curve_closed"])
         self._left_alone = MeanSquare()
         self._phase: float | None = None
-        self._clip_seconds = float(recording.array("clip_seconds"))
+        self._clip_seconds = float(recording.arrays["clip_seconds"])
         self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
         self._last_push_time = -math.inf

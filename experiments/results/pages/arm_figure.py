@@ -10,7 +10,7 @@ from sim.viewer.palette import CURVE, FIELD, USER
 def arm_figure(recording: Recording) -> Figure:
     """Path of the tool over the scaled curve of the stylus, and the tracking error of the tool over time."""
     t, tool, led = (recording.channel("frames", name)[:] for name in ("t", "tool", "led"))
-    curve = recording.array("tool_home") + recording.array("tool_scale") * recording.array("curve")
+    curve = recording.arrays["tool_home"] + recording.arrays["tool_scale"] * recording.arrays["curve"]
     ticks, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     path, error = figure.subplots(1, 2, width_ratios=(1, 1.6))

@@ -84,7 +84,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
     drawn, path = courses(recording.static), 1e3 * thinned_rows(recording, "p")
-    radius = 1e3 * float(recording.array("tube_radius"))
+    radius = 1e3 * float(recording.arrays["tube_radius"])
     pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
@@ -112,7 +112,7 @@ def path_figure(recording: Recording) -> Figure:
 def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
     t = thinned_rows(recording, "t")
-    distance, radius = 1e3 * thinned_rows(recording, "distance"), 1e3 * float(recording.array("tube_radius"))
+    distance, radius = 1e3 * thinned_rows(recording, "distance"), 1e3 * float(recording.arrays["tube_radius"])
     pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
@@ -151,8 +151,8 @@ def forces_figure(recording: Recording) -> Figure:
 def torques_figure(recording: Recording) -> Figure:
     """Torques of the three motors with their continuous and peak limits [mN m]."""
     t, torque = thinned_rows(recording, "t"), 1e3 * thinned_rows(recording, "torque")
-    continuous = 1e3 * recording.array("motor_continuous")
-    peak = 1e3 * recording.array("motor_peak")
+    continuous = 1e3 * recording.arrays["motor_continuous"]
+    peak = 1e3 * recording.arrays["motor_peak"]
     figure, axes = _panels(3, 1, height=4.8)
     for i, ax in enumerate(axes):
         ax.plot(t, torque[:, i], color=AXES[i])
@@ -175,7 +175,7 @@ def tracking_figure(recording: Recording) -> Figure:
     """
     t, flight = thinned_rows(recording, "t", "frames"), thinned_rows(recording, "flight", "frames") > 0.5
     down = thinned_rows(recording, "down", "frames") > 0.5
-    weight = float(recording.array("body_weight"))
+    weight = float(recording.arrays["body_weight"])
     residual = 100 * np.linalg.norm(thinned_rows(recording, "residual", "frames")[:, :3], axis=1) / weight
     ground = 100 * thinned_rows(recording, "ground", "frames")[:, 2] / weight
     curves = (

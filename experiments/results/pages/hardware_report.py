@@ -44,7 +44,7 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
         images.append(image(file, name))
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     body = f"<ul>{items}</ul>{''.join(images)}"
-    page = html_page(f"{recording.text('title')}, on a device", body, _PAGE_STYLE)
+    page = html_page(f"{recording.texts['title']}, on a device", body, _PAGE_STYLE)
     (folder / REPORT).write_text(page, encoding="utf-8")
 
 

@@ -47,7 +47,7 @@ def lead_figure(recording: Recording) -> Figure:
 
 def _draw_speed(ax: Axes, recording: Recording, t: Array, s: Array) -> None:
     """Speed of the figure along its path, negative on the way back, shaded by the number of feet in support."""
-    feet, lap = recording.array("lead_support"), s / float(recording.array("lead_stride"))
+    feet, lap = recording.arrays["lead_support"], s / float(recording.arrays["lead_stride"])
     count = feet[(len(feet) * (lap - np.floor(lap))).astype(int) % len(feet)]
     for number, colour, name in SUPPORTS:
         held = count == number
@@ -61,7 +61,7 @@ def _draw_speed(ax: Axes, recording: Recording, t: Array, s: Array) -> None:
 
 def _draw_paths(ax: Axes, recording: Recording, stride: int, turned: int) -> None:
     """Paths over the floor: the hand and the animation's root, forth and back, and the physical figure's root."""
-    every, scale = round(recording.rates["ticks"] / recording.rates["frames"]), float(recording.array("lead_scale"))
+    every, scale = round(recording.rates["ticks"] / recording.rates["frames"]), float(recording.arrays["lead_scale"])
     hand = scale * recording.channel("ticks", "p")[:][:: every * stride]
     shown = recording.channel("frames", "reference")[::stride]
     qpos = recording.channel("frames", "qpos")[::stride]

@@ -89,7 +89,7 @@ def _plots(recording: Recording) -> list[Plot]:
     ]
     found += [Plot("forces", "N", tuple(lines))] * bool(lines)
     if "joint_error" in frames and "body_weight" in recording.arrays:
-        weight = float(recording.array("body_weight"))
+        weight = float(recording.arrays["body_weight"])
         up = (
             frames["down"][:] == UP if "down" in frames else np.array(1.0)
         )  # the wrench that sets a fallen figure back is no residual

@@ -65,7 +65,7 @@ def write_report(
     t = recording.channel("ticks", "t")
     seconds = float(t[-1] - t[0])
     replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
-    radius, drawn = float(recording.array("tube_radius")), drawn_tube(recording)
+    radius, drawn = float(recording.arrays["tube_radius"]), drawn_tube(recording)
     tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
     body = _BODY.format(
         lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
@@ -91,5 +91,5 @@ def _curve_legend(recording: Recording, tube: str) -> str:
         rivers = ", ".join(f'<b style="color:{course.line}">{html.escape(course.name)}</b>' for course in drawn)
         return f"The rivers, each in its {name}{tube}: {rivers}."
     bent = recording.texts.get("hand_does", "").startswith("grabs")
-    about = f"Light blue: the {name} around the curve{tube}." if recording.array("tube_radius") > 0.0 else ""
+    about = f"Light blue: the {name} around the curve{tube}." if recording.arrays["tube_radius"] > 0.0 else ""
     return about + " The curve is drawn as it was before it was bent." * bent

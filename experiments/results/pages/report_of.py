@@ -36,10 +36,10 @@ def write_report_of(folder: Path) -> None:
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")
             draw_stretch(recording, folder, figures[0])
-        if recording.text("hand_does") == "leads":
+        if recording.texts["hand_does"] == "leads":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        title, lines = recording.text("title"), lines_of(recording, folder)
+        title, lines = recording.texts["title"], lines_of(recording, folder)
         write_report(folder / REPORT, recording, world_of(recording), title, lines, figures)
 
 

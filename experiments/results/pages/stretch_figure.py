@@ -22,7 +22,7 @@ def draw_stretch(recording: Recording, folder: Path, target: Path) -> None:
     thin = path[:: max(1, len(path) // POINTS)]
     phases = np.linspace(bent.start, bent.end, POINTS)
     with mpl.rc_context(STYLE):
-        stretch_figure(recording.array("curve"), bent.point(phases), thin).savefig(target, dpi=150)
+        stretch_figure(recording.arrays["curve"], bent.point(phases), thin).savefig(target, dpi=150)
 
 
 def stretch_figure(before: Array, after: Array, path: Array) -> Figure:

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.orientation import Orientation
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import stylus_path
 from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.results.measures.run_measures import trace_summary

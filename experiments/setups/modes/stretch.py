@@ -5,14 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.safety.energy_tank import river_power, spring_store
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.config.modes import Stretch, StretchThenFollow
 from experiments.config.run_config import Replay, RunConfig, User
 from experiments.results.measures.stretch_measures import editing_summary, performance_summary

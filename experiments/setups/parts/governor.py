@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.governor import Governor
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import change_clip
-from controllers.state import Array
+from controllers.state import Array, stylus_path
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip

@@ -13,9 +13,8 @@ from controllers.checks import check_kinds, takes
 from controllers.curves.trajectory import Trajectory
 from controllers.kernel_call import address_of
 from sim.errors import SimError
-from sim.users.person.own_intent import INTENT_ARGUMENTS
 from sim.users.person.person_state import BELIEF, FELT_FORCE, PersonState
-from sim.users.person.wishes import ENGAGED, FORCE, GRIP, OWN, PLACE, SWITCH, Wishes, resting
+from sim.users.person.wishes import ENGAGED, FORCE, GRIP, INTENT_ARGUMENTS, OWN, PLACE, SWITCH, Wishes, resting
 
 
 class Wish(NamedTuple):
@@ -50,8 +49,9 @@ class Own:
     ----------
     function : callable
         In Python ``function(t, place, force)`` returns a `Wish`, or a position [m]. Compiled, ``function(t, place,
-        force, rows)`` writes the wishes' two rows (see `sim.users.person.own_intent`). Its arguments are the time [s],
-        her estimate of her hand's position [m] and the force of her hand as she feels it [N], in H, shape (3,).
+        force, rows)`` writes the wishes' two rows (see `call_intent` in `sim.users.person.wishes`). Its arguments are
+        the time [s], her estimate of her hand's position [m] and the force of her hand as she feels it [N], in H, shape
+        (3,).
     every : float
         Time between two calls in Python [s].
     compiled : bool

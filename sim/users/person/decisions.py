@@ -8,7 +8,6 @@ from controllers.state import Array
 from controllers.work_array import work_array
 from sim.users.person.body import REFERENCE_GRIP
 from sim.users.person.motor_plan import aim, drive, may_decide, submove
-from sim.users.person.own_intent import call_intent
 from sim.users.person.person_state import (
     BELIEF,
     CLOCK,
@@ -35,7 +34,7 @@ from sim.users.person.person_state import (
     WISH_PERIOD,
     PersonState,
 )
-from sim.users.person.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
+from sim.users.person.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, call_intent, wanted_motion
 from sim.users.person.wishes import GRIP as WISHED_GRIP
 
 ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise

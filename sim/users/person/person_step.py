@@ -4,9 +4,12 @@ Her inputs are those of a real person: force and motion of the stylus with noise
 delay, and her wishes. She has no access to field, phase or limiter.
 """
 
-from numba import njit
+import numpy as np
+from numba import njit, typeof, types
 
+from controllers.lent import Lent
 from controllers.state import Array
+from sim.compilation.units import Unit
 from sim.users.person.body import REFERENCE_GRIP
 from sim.users.person.decisions import want
 from sim.users.person.muscles import move
@@ -26,6 +29,7 @@ from sim.users.person.person_state import (
     STIFFENING,
     STIFFER,
     PersonState,
+    nobody,
 )
 from sim.users.person.senses import sense
 
@@ -73,3 +77,14 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
     memory[STARTED], memory[CAPACITY] = 1.0, 1.0
     memory[STIFFER] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
     memory[DECIDED] = -person.numbers[REFRACTORY]
+
+
+def person_unit() -> Unit:
+    """The compilation unit of `person_step`, separate so that a change in it does not recompile the loop."""
+    number, vector = types.float64, typeof(np.zeros(3))
+    return Unit.of(person_step, Lent(typeof(nobody())), number, number, types.int64, vector, vector, vector, vector)
+
+
+def link_person(person: PersonState) -> None:
+    """Set the address of a person's compiled time step, in place; compiles it if it is not in the cache."""
+    person.units[0] = person_unit().address()

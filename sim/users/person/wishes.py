@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
+from controllers.kernel_call import kernel_call
 from controllers.state import Array
 from sim.errors import SimError
 
@@ -13,6 +14,11 @@ PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
 [m], 1 if the switch is pressed, and 1 if the person is active; otherwise she lets the field lead the stylus."""
 OWN = -1.0
 """Value of `Wishes.period` that marks wishes written by a user-defined intent."""
+_VECTOR = types.Array(types.float64, 1, "C")
+INTENT_ARGUMENTS = (types.float64, _VECTOR, _VECTOR, types.Array(types.float64, 2, "C"))
+call_intent = kernel_call(INTENT_ARGUMENTS)
+"""Calls a compiled user-defined intent (see `sim.users.intents.own`) with ``(t, place, force, rows)``, from compiled
+code. It writes two rows: the wish now, and in the place columns of the second row the velocity of the wanted place."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,7 @@ class Wishes:
         Wishes, shape (n, 10), columns as above.
     period : float
         Time between two rows [s]; 0 if each row is a target, to be reached before the next one; negative if a
-        user-defined intent writes the two rows (see `sim.users.person.own_intent`).
+        user-defined intent writes the two rows (see `call_intent`).
     lap : float
         Period with which the wishes repeat, for learning from one repetition to the next [s]; 0: never.
 

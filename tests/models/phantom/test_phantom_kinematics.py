@@ -87,6 +87,15 @@ def test_joint_torques_have_the_power_of_the_tip_force(configurations):
         assert np.dot(kinematics.joint_torques(theta, force), rate) == pytest.approx(power_at_tip, abs=1e-14)
 
 
+def test_the_tip_force_is_the_one_whose_torques_they_are(configurations):
+    rng = np.random.default_rng(1)
+    for theta in configurations[:100]:
+        torque = rng.normal(size=3)
+        force = kinematics.force_from_torques(theta, torque, 1e-3)
+        np.testing.assert_allclose(kinematics.joint_torques(theta, force), torque, atol=1e-9)
+        assert kinematics.force_from_torques(theta, torque, 1.0) == (0.0, 0.0, 0.0)
+
+
 def test_stylus_orientation_agrees_with_the_compiled_gimbal(linkage, configurations):
     R_HP = np.array(kinematics.R_HP)
     rng = np.random.default_rng(4)

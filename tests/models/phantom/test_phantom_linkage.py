@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques
+from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, linkage_angles
 from models.phantom.parameters import PREMIUM_1_5
-from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, MOTORS, phantom_spec
+from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS, MOTOR_JOINTS, MOTORS, phantom_spec
 
 
 def _loop_gap(data):
@@ -38,7 +38,9 @@ def test_device_geoms_have_no_collisions(linkage):
 
 def test_parallelogram_closes_in_every_configuration(linkage, configurations):
     for theta in configurations[:200]:
-        assert _loop_gap(linkage.place(theta)) < 1e-12
+        data = linkage.place(theta)
+        assert _loop_gap(data) < 1e-12
+        assert [data.joint(name).qpos[0] for name in LINKAGE_JOINTS] == list(linkage_angles(theta))
 
 
 @pytest.mark.parametrize("step", [1e-3, *(pytest.param(step, marks=pytest.mark.slow) for step in (5e-4, 2.5e-4))])

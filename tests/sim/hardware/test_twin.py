@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from controllers.safety.arming import ARM
-from models.phantom.kinematics import jacobian
 from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import Ticker
-from sim.hardware.twin import RESIDUAL_GAIN, Twin, tip_force
+from sim.hardware.twin import RESIDUAL_GAIN, Twin
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
 from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo, run
@@ -61,13 +60,3 @@ def test_observer_restarts_where_ticks_are_missing(pushed) -> None:
     assert twin["apart"][1000] == 0.0
     assert np.isfinite(twin["hand_force"]).all()
     assert np.sqrt(np.mean(twin["apart"][1300:] ** 2)) < 5e-5
-
-
-def test_tip_force_solves_the_transposed_jacobian() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        theta = tuple(rng.uniform(-0.6, 0.6, 3))
-        torque, force = rng.normal(size=3), np.zeros(3)
-        tip_force(theta, torque, force)
-        x, y, z = force
-        np.testing.assert_allclose(np.array(jacobian(theta)).T @ np.array([-y, z, -x]), torque, atol=1e-9)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from controllers.curves.closest_point import closest_phases
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
+from controllers.state import stylus_path
 from experiments.config.modes import Stretch
 from experiments.config.words import run_config
 from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve

@@ -282,7 +282,7 @@ def test_error_for_a_missing_channel_names_the_recorded_ones(tmp_path):
         recorder.append("ticks", block(0, 5))
     with Recording(tmp_path / "run.h5") as recording:
         assert len(recording.channel("ticks", "p")) == 5
-        assert recording.array("curve") == [1.0]
+        assert recording.arrays["curve"] == [1.0]
         with pytest.raises(RecordingError, match=r"no channel ticks/q; there are \['applied', 'p', 't'\]"):
             recording.channel("ticks", "q")
         with pytest.raises(RecordingError, match=r"no group pings; there are \['frames', 'ticks'\]"):
@@ -290,9 +290,9 @@ def test_error_for_a_missing_channel_names_the_recorded_ones(tmp_path):
         with pytest.raises(RecordingError, match=r"frames/t has no rows"):
             recording.channel("frames", "t")
         with pytest.raises(RecordingError, match=r"no array tube; there are \['curve'\]"):
-            recording.array("tube")
+            recording.arrays["tube"]
         with pytest.raises(RecordingError, match=r"no text title; there are \[\]"):
-            recording.text("title")
+            recording.texts["title"]
         with pytest.raises(RecordingError, match=r"run\.h5: no array or text river; there are \['curve'\]"):
             recording.static["river"]
         with pytest.raises(RecordingError, match=r"run\.h5: no channel ticks/q; there are"):

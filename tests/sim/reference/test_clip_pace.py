@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import PHASE, SHOWN
+from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import figure_model

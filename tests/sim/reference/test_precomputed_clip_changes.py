@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import CHANGE, COURSE, RIVER
+from controllers.state import stylus_path
 from experiments.config.words import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs

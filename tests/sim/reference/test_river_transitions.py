@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.legs.sole_heights import SWINGS
+from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.setups.modes.rivers import river_bundle

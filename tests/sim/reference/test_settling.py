@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.curves.stylus import stylus_path
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.state import stylus_path
 from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.setups.modes.stretch import flight_remarks

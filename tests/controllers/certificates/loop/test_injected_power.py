@@ -46,9 +46,11 @@ def injected(sampling, frequency, amplitude, direction, rounded=True, gains=(300
 
 
 def bound(sampling, frequency, speed, gains=(300.0, 8.0)):
+    """P̄ [W] for a vibration of RMS speed V [m/s], including the ideal bound."""
     river = River(FOLLOW_LAW, *gains, 0.25, CIRCLE, DEVICE, sampling)
     band = next(i for i, f in enumerate(BANDS) if frequency <= f)
-    return injection(river, river.still()).bound(river_power(gains[1], PACE), speed, band)
+    found = injection(river, river.still())
+    return river_power(gains[1], PACE) + found.activity[band] * speed**2 + found.rounding * speed
 
 
 RADIAL = CIRCLE.point(1.0) / np.linalg.norm(CIRCLE.point(1.0))

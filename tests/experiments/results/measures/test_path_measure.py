@@ -10,11 +10,8 @@ class PathRecording:
     """The arrays of a recording that `PathMeasure` reads."""
 
     def __init__(self, clip_seconds: float):
-        self._arrays = {"curve_span": np.array([0.0, 4.0]), "curve_closed": 0.0, "clip_seconds": clip_seconds}
+        self.arrays = {"curve_span": np.array([0.0, 4.0]), "curve_closed": 0.0, "clip_seconds": clip_seconds}
         self.texts: dict[str, str] = {}
-
-    def array(self, name: str) -> np.ndarray:
-        return np.asarray(self._arrays[name])
 
 
 @pytest.mark.parametrize("block", [100, 5000])

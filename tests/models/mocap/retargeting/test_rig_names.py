@@ -50,8 +50,8 @@ VENDOR_RIGS = {
         lowerback_torso @Torso_Clavicle @Shoulder @Elbow @Wrist
         RootJoint @Hip @Knee @Ankle @ToeJoint""",
         "l r",
-        "RootJoint pelvis_lowerback lowerback_torso torso_head lTorso_Clavicle lShoulder lElbow lWrist lHip lKnee lAnkle "
-        "lToeJoint",
+        "RootJoint pelvis_lowerback lowerback_torso torso_head lTorso_Clavicle lShoulder lElbow lWrist lHip lKnee "
+        "lAnkle lToeJoint",
     ),
     "Rigify metarig": (
         """spine spine.001 spine.002 spine.003 spine.004 spine.005 spine.006

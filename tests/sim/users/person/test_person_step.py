@@ -26,7 +26,7 @@ from sim.users.person.person_state import (
     REFLEX,
     PersonState,
 )
-from sim.users.person.person_unit import link_person
+from sim.users.person.person_step import link_person
 from sim.users.person.senses import ASTRAY_TIME, VEER_TIME, go_astray
 from sim.users.person.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
